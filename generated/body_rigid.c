@@ -8,574 +8,208 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_body_rigid;
-int mstmm_body_rigid_inertia(const real *restrict p, real *restrict S);
-int mstmm_body_rigid_bias_load(const real *restrict p, const real *restrict motion,
-    real *restrict e);
-int mstmm_body_rigid_energy(const real *restrict p, const real *restrict v, const real *restrict w,
-    real *restrict T);
-int mstmm_body_rigid_bias_load_slope(const real *restrict p, const real *restrict motion,
-    const real *restrict d_motion, real *restrict d_e);
-int mstmm_body_rigid_load_by_motion(const real *restrict p, const real *restrict motion,
-    real *restrict J);
-
 /* mass matrix of the rigid body
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * out S[21] f = S a + e of everything outboard, at P
  */
-int mstmm_body_rigid_inertia(const real *restrict p, real *restrict S)
+int mstmm_body_rigid_inertia(in_t p, out_t S)
 {
-    S[0] = p[0];
-    S[1] = 0.0;
-    S[2] = 0.0;
-    S[3] = 0.0;
-    S[4] = p[3];
-    const real t0 = -p[2];
-    S[5] = t0;
-    S[6] = p[0];
-    S[7] = 0.0;
-    const real t1 = -p[3];
-    S[8] = t1;
-    S[9] = 0.0;
-    S[10] = p[1];
-    S[11] = p[0];
-    S[12] = p[2];
-    const real t2 = -p[1];
-    S[13] = t2;
-    S[14] = 0.0;
-    S[15] = p[4];
-    S[16] = p[5];
-    S[17] = p[6];
-    S[18] = p[7];
-    S[19] = p[8];
-    S[20] = p[9];
-    return 0;
+  S[0] = p[0];
+  S[1] = S[2] = S[3] = 0.0;
+  S[4] = p[3];
+  S[5] = -p[2];
+  S[6] = p[0];
+  S[7] = 0.0;
+  S[8] = -p[3];
+  S[9] = 0.0;
+  S[10] = p[1];
+  S[11] = p[0];
+  S[12] = p[2];
+  S[13] = -p[1];
+  S[14] = 0.0;
+  S[15] = p[4];
+  S[16] = p[5];
+  S[17] = p[6];
+  S[18] = p[7];
+  S[19] = p[8];
+  S[20] = p[9];
+  return 0;
 }
 
-static int mstmm_body_rigid_inertia_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_body_rigid_inertia(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_body_rigid_inertia_inputs[] = {
-    {"p", 10, "", 0, 0},
-};
-
-static const mstmm_port mstmm_body_rigid_inertia_outputs[] = {
-    {"S", 21, "", 0, 0},
-};
+MSTMM_CALL(mstmm_body_rigid_inertia, (in[0], out[0]))
 
 /* load required by the bias motion of the rigid body
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_body_rigid_bias_load(const real *restrict p, const real *restrict motion,
-    real *restrict e)
+int mstmm_body_rigid_bias_load(in_t p, in_t motion, out_t e)
 {
-    const real t0 = p[0] * motion[6];
-    const real t1 = motion[0] * motion[1];
-    const real t2 = t1 - motion[5];
-    const real t3 = p[2] * t2;
-    const real t4 = motion[0] * motion[2];
-    const real t5 = motion[4] + t4;
-    const real t6 = p[3] * t5;
-    const real t7 = t3 + t6;
-    const real t8 = motion[1] * motion[1];
-    const real t9 = motion[2] * motion[2];
-    const real t10 = t8 + t9;
-    const real t11 = p[1] * t10;
-    const real t12 = t7 - t11;
-    const real t13 = t0 + t12;
-    e[0] = t13;
-    const real t14 = p[0] * motion[7];
-    const real t15 = motion[5] + t1;
-    const real t16 = p[1] * t15;
-    const real t17 = motion[1] * motion[2];
-    const real t18 = t17 - motion[3];
-    const real t19 = p[3] * t18;
-    const real t20 = t16 + t19;
-    const real t21 = motion[0] * motion[0];
-    const real t22 = t9 + t21;
-    const real t23 = p[2] * t22;
-    const real t24 = t20 - t23;
-    const real t25 = t14 + t24;
-    e[1] = t25;
-    const real t26 = p[0] * motion[8];
-    const real t27 = t4 - motion[4];
-    const real t28 = p[1] * t27;
-    const real t29 = motion[3] + t17;
-    const real t30 = p[2] * t29;
-    const real t31 = t28 + t30;
-    const real t32 = t8 + t21;
-    const real t33 = p[3] * t32;
-    const real t34 = t31 - t33;
-    const real t35 = t26 + t34;
-    e[2] = t35;
-    const real t36 = p[2] * motion[8];
-    const real t37 = p[6] * motion[5];
-    const real t38 = p[5] * motion[4];
-    const real t39 = p[4] * motion[3];
-    const real t40 = p[9] * motion[2];
-    const real t41 = p[6] * motion[0];
-    const real t42 = p[8] * motion[1];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    const real t45 = motion[1] * t44;
-    const real t46 = p[8] * motion[2];
-    const real t47 = p[5] * motion[0];
-    const real t48 = p[7] * motion[1];
-    const real t49 = t47 + t48;
-    const real t50 = t46 + t49;
-    const real t51 = motion[2] * t50;
-    const real t52 = t45 - t51;
-    const real t53 = t39 + t52;
-    const real t54 = t38 + t53;
-    const real t55 = t37 + t54;
-    const real t56 = p[3] * motion[7];
-    const real t57 = t55 - t56;
-    const real t58 = t36 + t57;
-    e[3] = t58;
-    const real t59 = p[3] * motion[6];
-    const real t60 = p[8] * motion[5];
-    const real t61 = p[7] * motion[4];
-    const real t62 = p[5] * motion[3];
-    const real t63 = p[6] * motion[2];
-    const real t64 = p[4] * motion[0];
-    const real t65 = p[5] * motion[1];
-    const real t66 = t64 + t65;
-    const real t67 = t63 + t66;
-    const real t68 = motion[2] * t67;
-    const real t69 = motion[0] * t44;
-    const real t70 = t68 - t69;
-    const real t71 = t62 + t70;
-    const real t72 = t61 + t71;
-    const real t73 = t60 + t72;
-    const real t74 = t59 + t73;
-    const real t75 = p[1] * motion[8];
-    const real t76 = t74 - t75;
-    e[4] = t76;
-    const real t77 = p[1] * motion[7];
-    const real t78 = p[9] * motion[5];
-    const real t79 = p[8] * motion[4];
-    const real t80 = p[6] * motion[3];
-    const real t81 = motion[0] * t50;
-    const real t82 = motion[1] * t67;
-    const real t83 = t81 - t82;
-    const real t84 = t80 + t83;
-    const real t85 = t79 + t84;
-    const real t86 = t78 + t85;
-    const real t87 = p[2] * motion[6];
-    const real t88 = t86 - t87;
-    const real t89 = t77 + t88;
-    e[5] = t89;
-    return 0;
+  real t1 = motion[0] * motion[1];
+  real t4 = motion[0] * motion[2];
+  real t8 = motion[1] * motion[1];
+  real t9 = motion[2] * motion[2];
+  e[0] = p[0] * motion[6] + (p[2] * (t1 - motion[5]) + p[3] * (motion[4] + t4) - p[1] * (t8 + t9));
+  real t17 = motion[1] * motion[2];
+  real t21 = motion[0] * motion[0];
+  e[1] = p[0] * motion[7] + (p[1] * (motion[5] + t1) + p[3] * (t17 - motion[3]) - p[2] * (t9 +
+    t21));
+  e[2] = p[0] * motion[8] + (p[1] * (t4 - motion[4]) + p[2] * (motion[3] + t17) - p[3] * (t8 +
+    t21));
+  real t44 = p[9] * motion[2] + (p[6] * motion[0] + p[8] * motion[1]);
+  real t50 = p[8] * motion[2] + (p[5] * motion[0] + p[7] * motion[1]);
+  e[3] = p[2] * motion[8] + (p[6] * motion[5] + (p[5] * motion[4] + (p[4] * motion[3] + (motion[1] *
+    t44 - motion[2] * t50))) - p[3] * motion[7]);
+  real t67 = p[6] * motion[2] + (p[4] * motion[0] + p[5] * motion[1]);
+  e[4] = p[3] * motion[6] + (p[8] * motion[5] + (p[7] * motion[4] + (p[5] * motion[3] + (motion[2] *
+    t67 - motion[0] * t44)))) - p[1] * motion[8];
+  e[5] = p[1] * motion[7] + (p[9] * motion[5] + (p[8] * motion[4] + (p[6] * motion[3] + (motion[0] *
+    t50 - motion[1] * t67))) - p[2] * motion[6]);
+  return 0;
 }
 
-static int mstmm_body_rigid_bias_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_body_rigid_bias_load(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_body_rigid_bias_load_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_body_rigid_bias_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_body_rigid_bias_load, (in[0], in[1], out[0]))
 
 /* kinetic energy of the rigid body
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  v[3] (m/s) velocity of P
  * in  w[3] (rad/s) angular velocity
  * out T[1] (J) kinetic energy
  */
-int mstmm_body_rigid_energy(const real *restrict p, const real *restrict v, const real *restrict w,
-    real *restrict T)
+int mstmm_body_rigid_energy(in_t p, in_t v, in_t w, out_t T)
 {
-    const real t0 = v[2] * v[2];
-    const real t1 = v[0] * v[0];
-    const real t2 = v[1] * v[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = p[0] * t4;
-    const real t6 = 0.5 * t5;
-    const real t7 = p[9] * w[2];
-    const real t8 = p[6] * w[0];
-    const real t9 = p[8] * w[1];
-    const real t10 = t8 + t9;
-    const real t11 = t7 + t10;
-    const real t12 = w[2] * t11;
-    const real t13 = 0.5 * t12;
-    const real t14 = p[8] * w[2];
-    const real t15 = p[5] * w[0];
-    const real t16 = p[7] * w[1];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = w[1] * t18;
-    const real t20 = 0.5 * t19;
-    const real t21 = p[6] * w[2];
-    const real t22 = p[4] * w[0];
-    const real t23 = p[5] * w[1];
-    const real t24 = t22 + t23;
-    const real t25 = t21 + t24;
-    const real t26 = w[0] * t25;
-    const real t27 = t26 * 0.5;
-    const real t28 = p[3] * w[1];
-    const real t29 = p[2] * w[2];
-    const real t30 = t28 - t29;
-    const real t31 = v[0] * t30;
-    const real t32 = p[2] * w[0];
-    const real t33 = p[1] * w[1];
-    const real t34 = t32 - t33;
-    const real t35 = v[2] * t34;
-    const real t36 = p[1] * w[2];
-    const real t37 = p[3] * w[0];
-    const real t38 = t36 - t37;
-    const real t39 = v[1] * t38;
-    const real t40 = t35 + t39;
-    const real t41 = t31 + t40;
-    const real t42 = t27 + t41;
-    const real t43 = t20 + t42;
-    const real t44 = t13 + t43;
-    const real t45 = t6 + t44;
-    T[0] = t45;
-    return 0;
+  T[0] = 0.5 * (p[0] * (v[2] * v[2] + (v[0] * v[0] + v[1] * v[1]))) + (0.5 * (w[2] * (p[9] * w[2] +
+    (p[6] * w[0] + p[8] * w[1]))) + (0.5 * (w[1] * (p[8] * w[2] + (p[5] * w[0] + p[7] * w[1]))) +
+    (w[0] * (p[6] * w[2] + (p[4] * w[0] + p[5] * w[1])) * 0.5 + (v[0] * (p[3] * w[1] - p[2] * w[2])
+    + (v[2] * (p[2] * w[0] - p[1] * w[1]) + v[1] * (p[1] * w[2] - p[3] * w[0]))))));
+  return 0;
 }
 
-static int mstmm_body_rigid_energy_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_body_rigid_energy(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_body_rigid_energy_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_body_rigid_energy_outputs[] = {
-    {"T", 1, "J", 0, 0},
-};
+MSTMM_CALL(mstmm_body_rigid_energy, (in[0], in[1], in[2], out[0]))
 
 /* bias_load and its derivative along a direction
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * in  d_motion[9] derivative of motion
  * out d_e[6] (N, N*m) derivative of e
  */
-int mstmm_body_rigid_bias_load_slope(const real *restrict p, const real *restrict motion,
-    const real *restrict d_motion, real *restrict d_e)
+int mstmm_body_rigid_bias_load_slope(in_t p, in_t motion, in_t d_motion, out_t d_e)
 {
-    const real t0 = motion[2] * d_motion[0];
-    const real t1 = motion[0] * d_motion[2];
-    const real t2 = t0 + t1;
-    const real t3 = d_motion[4] + t2;
-    const real t4 = p[3] * t3;
-    const real t5 = motion[1] * d_motion[0];
-    const real t6 = motion[0] * d_motion[1];
-    const real t7 = t5 + t6;
-    const real t8 = t7 - d_motion[5];
-    const real t9 = p[2] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = motion[2] * d_motion[2];
-    const real t12 = t11 + t11;
-    const real t13 = motion[1] * d_motion[1];
-    const real t14 = t13 + t13;
-    const real t15 = t12 + t14;
-    const real t16 = p[1] * t15;
-    const real t17 = t10 - t16;
-    const real t18 = p[0] * d_motion[6];
-    const real t19 = t17 + t18;
-    d_e[0] = t19;
-    const real t20 = motion[2] * d_motion[1];
-    const real t21 = motion[1] * d_motion[2];
-    const real t22 = t20 + t21;
-    const real t23 = t22 - d_motion[3];
-    const real t24 = p[3] * t23;
-    const real t25 = d_motion[5] + t7;
-    const real t26 = p[1] * t25;
-    const real t27 = t24 + t26;
-    const real t28 = motion[0] * d_motion[0];
-    const real t29 = t28 + t28;
-    const real t30 = t12 + t29;
-    const real t31 = p[2] * t30;
-    const real t32 = t27 - t31;
-    const real t33 = p[0] * d_motion[7];
-    const real t34 = t32 + t33;
-    d_e[1] = t34;
-    const real t35 = d_motion[3] + t22;
-    const real t36 = p[2] * t35;
-    const real t37 = t2 - d_motion[4];
-    const real t38 = p[1] * t37;
-    const real t39 = t36 + t38;
-    const real t40 = t14 + t29;
-    const real t41 = p[3] * t40;
-    const real t42 = t39 - t41;
-    const real t43 = p[0] * d_motion[8];
-    const real t44 = t42 + t43;
-    d_e[2] = t44;
-    const real t45 = motion[2] * p[9];
-    const real t46 = motion[0] * p[6];
-    const real t47 = motion[1] * p[8];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    const real t50 = t49 * d_motion[1];
-    const real t51 = p[8] * d_motion[1];
-    const real t52 = p[6] * d_motion[0];
-    const real t53 = t51 + t52;
-    const real t54 = p[9] * d_motion[2];
-    const real t55 = t53 + t54;
-    const real t56 = motion[1] * t55;
-    const real t57 = t50 + t56;
-    const real t58 = motion[2] * p[8];
-    const real t59 = motion[0] * p[5];
-    const real t60 = motion[1] * p[7];
-    const real t61 = t59 + t60;
-    const real t62 = t58 + t61;
-    const real t63 = t62 * d_motion[2];
-    const real t64 = p[7] * d_motion[1];
-    const real t65 = p[5] * d_motion[0];
-    const real t66 = t64 + t65;
-    const real t67 = p[8] * d_motion[2];
-    const real t68 = t66 + t67;
-    const real t69 = motion[2] * t68;
-    const real t70 = t63 + t69;
-    const real t71 = t57 - t70;
-    const real t72 = p[4] * d_motion[3];
-    const real t73 = t71 + t72;
-    const real t74 = p[5] * d_motion[4];
-    const real t75 = t73 + t74;
-    const real t76 = p[6] * d_motion[5];
-    const real t77 = t75 + t76;
-    const real t78 = p[3] * d_motion[7];
-    const real t79 = t77 - t78;
-    const real t80 = p[2] * d_motion[8];
-    const real t81 = t79 + t80;
-    d_e[3] = t81;
-    const real t82 = motion[2] * p[6];
-    const real t83 = motion[0] * p[4];
-    const real t84 = motion[1] * p[5];
-    const real t85 = t83 + t84;
-    const real t86 = t82 + t85;
-    const real t87 = t86 * d_motion[2];
-    const real t88 = p[5] * d_motion[1];
-    const real t89 = p[4] * d_motion[0];
-    const real t90 = t88 + t89;
-    const real t91 = p[6] * d_motion[2];
-    const real t92 = t90 + t91;
-    const real t93 = motion[2] * t92;
-    const real t94 = t87 + t93;
-    const real t95 = t49 * d_motion[0];
-    const real t96 = motion[0] * t55;
-    const real t97 = t95 + t96;
-    const real t98 = t94 - t97;
-    const real t99 = p[5] * d_motion[3];
-    const real t100 = t98 + t99;
-    const real t101 = p[7] * d_motion[4];
-    const real t102 = t100 + t101;
-    const real t103 = p[8] * d_motion[5];
-    const real t104 = t102 + t103;
-    const real t105 = p[3] * d_motion[6];
-    const real t106 = t104 + t105;
-    const real t107 = p[1] * d_motion[8];
-    const real t108 = t106 - t107;
-    d_e[4] = t108;
-    const real t109 = t62 * d_motion[0];
-    const real t110 = motion[0] * t68;
-    const real t111 = t109 + t110;
-    const real t112 = t86 * d_motion[1];
-    const real t113 = motion[1] * t92;
-    const real t114 = t112 + t113;
-    const real t115 = t111 - t114;
-    const real t116 = p[6] * d_motion[3];
-    const real t117 = t115 + t116;
-    const real t118 = p[8] * d_motion[4];
-    const real t119 = t117 + t118;
-    const real t120 = p[9] * d_motion[5];
-    const real t121 = t119 + t120;
-    const real t122 = p[2] * d_motion[6];
-    const real t123 = t121 - t122;
-    const real t124 = p[1] * d_motion[7];
-    const real t125 = t123 + t124;
-    d_e[5] = t125;
-    return 0;
+  real t2 = motion[2] * d_motion[0] + motion[0] * d_motion[2];
+  real t7 = motion[1] * d_motion[0] + motion[0] * d_motion[1];
+  real t11 = motion[2] * d_motion[2];
+  real t12 = t11 + t11;
+  real t13 = motion[1] * d_motion[1];
+  real t14 = t13 + t13;
+  d_e[0] = p[3] * (d_motion[4] + t2) + p[2] * (t7 - d_motion[5]) - p[1] * (t12 + t14) + p[0] *
+    d_motion[6];
+  real t22 = motion[2] * d_motion[1] + motion[1] * d_motion[2];
+  real t28 = motion[0] * d_motion[0];
+  real t29 = t28 + t28;
+  d_e[1] = p[3] * (t22 - d_motion[3]) + p[1] * (d_motion[5] + t7) - p[2] * (t12 + t29) + p[0] *
+    d_motion[7];
+  d_e[2] = p[2] * (d_motion[3] + t22) + p[1] * (t2 - d_motion[4]) - p[3] * (t14 + t29) + p[0] *
+    d_motion[8];
+  real t49 = motion[2] * p[9] + (motion[0] * p[6] + motion[1] * p[8]);
+  real t55 = p[8] * d_motion[1] + p[6] * d_motion[0] + p[9] * d_motion[2];
+  real t62 = motion[2] * p[8] + (motion[0] * p[5] + motion[1] * p[7]);
+  real t68 = p[7] * d_motion[1] + p[5] * d_motion[0] + p[8] * d_motion[2];
+  d_e[3] = t49 * d_motion[1] + motion[1] * t55 - (t62 * d_motion[2] + motion[2] * t68) + p[4] *
+    d_motion[3] + p[5] * d_motion[4] + p[6] * d_motion[5] - p[3] * d_motion[7] + p[2] * d_motion[8];
+  real t86 = motion[2] * p[6] + (motion[0] * p[4] + motion[1] * p[5]);
+  real t92 = p[5] * d_motion[1] + p[4] * d_motion[0] + p[6] * d_motion[2];
+  d_e[4] = t86 * d_motion[2] + motion[2] * t92 - (t49 * d_motion[0] + motion[0] * t55) + p[5] *
+    d_motion[3] + p[7] * d_motion[4] + p[8] * d_motion[5] + p[3] * d_motion[6] - p[1] * d_motion[8];
+  d_e[5] = t62 * d_motion[0] + motion[0] * t68 - (t86 * d_motion[1] + motion[1] * t92) + p[6] *
+    d_motion[3] + p[8] * d_motion[4] + p[9] * d_motion[5] - p[2] * d_motion[6] + p[1] * d_motion[7];
+  return 0;
 }
 
-static int mstmm_body_rigid_bias_load_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_body_rigid_bias_load_slope(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_body_rigid_bias_load_slope_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_body_rigid_bias_load_slope_outputs[] = {
-    {"d_e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_body_rigid_bias_load_slope, (in[0], in[1], in[2], out[0]))
 
 /* bias_load by motion
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out J[9][6] e by motion, transposed
  */
-int mstmm_body_rigid_load_by_motion(const real *restrict p, const real *restrict motion,
-    real *restrict J)
+int mstmm_body_rigid_load_by_motion(in_t p, in_t motion, out_t J)
 {
-    const real t0 = motion[2] * p[3];
-    const real t1 = motion[1] * p[2];
-    const real t2 = t0 + t1;
-    J[0] = t2;
-    const real t3 = motion[1] * p[1];
-    const real t4 = motion[0] + motion[0];
-    const real t5 = p[2] * t4;
-    const real t6 = t3 - t5;
-    J[1] = t6;
-    const real t7 = motion[2] * p[1];
-    const real t8 = p[3] * t4;
-    const real t9 = t7 - t8;
-    J[2] = t9;
-    const real t10 = motion[1] * p[6];
-    const real t11 = motion[2] * p[5];
-    const real t12 = t10 - t11;
-    J[3] = t12;
-    const real t13 = motion[2] * p[4];
-    const real t14 = motion[0] * p[6];
-    const real t15 = motion[2] * p[9];
-    const real t16 = motion[1] * p[8];
-    const real t17 = t14 + t16;
-    const real t18 = t15 + t17;
-    const real t19 = t14 + t18;
-    const real t20 = t13 - t19;
-    J[4] = t20;
-    const real t21 = motion[0] * p[5];
-    const real t22 = motion[2] * p[8];
-    const real t23 = motion[1] * p[7];
-    const real t24 = t21 + t23;
-    const real t25 = t22 + t24;
-    const real t26 = t21 + t25;
-    const real t27 = motion[1] * p[4];
-    const real t28 = t26 - t27;
-    J[5] = t28;
-    const real t29 = motion[0] * p[2];
-    const real t30 = motion[1] + motion[1];
-    const real t31 = p[1] * t30;
-    const real t32 = t29 - t31;
-    J[6] = t32;
-    const real t33 = motion[0] * p[1];
-    const real t34 = t0 + t33;
-    J[7] = t34;
-    const real t35 = p[2] * motion[2];
-    const real t36 = p[3] * t30;
-    const real t37 = t35 - t36;
-    J[8] = t37;
-    const real t38 = t16 + t18;
-    const real t39 = motion[2] * p[7];
-    const real t40 = t38 - t39;
-    J[9] = t40;
-    const real t41 = motion[0] * p[8];
-    const real t42 = t11 - t41;
-    J[10] = t42;
-    const real t43 = motion[0] * p[7];
-    const real t44 = motion[1] * p[5];
-    const real t45 = motion[2] * p[6];
-    const real t46 = motion[0] * p[4];
-    const real t47 = t46 + t44;
-    const real t48 = t45 + t47;
-    const real t49 = t44 + t48;
-    const real t50 = t43 - t49;
-    J[11] = t50;
-    const real t51 = motion[0] * p[3];
-    const real t52 = motion[2] + motion[2];
-    const real t53 = p[1] * t52;
-    const real t54 = t51 - t53;
-    J[12] = t54;
-    const real t55 = motion[1] * p[3];
-    const real t56 = p[2] * t52;
-    const real t57 = t55 - t56;
-    J[13] = t57;
-    const real t58 = t1 + t33;
-    J[14] = t58;
-    const real t59 = motion[1] * p[9];
-    const real t60 = t22 + t25;
-    const real t61 = t59 - t60;
-    J[15] = t61;
-    const real t62 = t45 + t48;
-    const real t63 = motion[0] * p[9];
-    const real t64 = t62 - t63;
-    J[16] = t64;
-    const real t65 = t41 - t10;
-    J[17] = t65;
-    J[18] = 0.0;
-    const real t66 = -p[3];
-    J[19] = t66;
-    J[20] = p[2];
-    J[21] = p[4];
-    J[22] = p[5];
-    J[23] = p[6];
-    J[24] = p[3];
-    J[25] = 0.0;
-    const real t67 = -p[1];
-    J[26] = t67;
-    J[27] = p[5];
-    J[28] = p[7];
-    J[29] = p[8];
-    const real t68 = -p[2];
-    J[30] = t68;
-    J[31] = p[1];
-    J[32] = 0.0;
-    J[33] = p[6];
-    J[34] = p[8];
-    J[35] = p[9];
-    J[36] = p[0];
-    J[37] = 0.0;
-    J[38] = 0.0;
-    J[39] = 0.0;
-    J[40] = p[3];
-    J[41] = t68;
-    J[42] = 0.0;
-    J[43] = p[0];
-    J[44] = 0.0;
-    J[45] = t66;
-    J[46] = 0.0;
-    J[47] = p[1];
-    J[48] = 0.0;
-    J[49] = 0.0;
-    J[50] = p[0];
-    J[51] = p[2];
-    J[52] = t67;
-    J[53] = 0.0;
-    return 0;
+  real t0 = motion[2] * p[3];
+  real t1 = motion[1] * p[2];
+  J[0] = t0 + t1;
+  real t4 = motion[0] + motion[0];
+  J[1] = motion[1] * p[1] - p[2] * t4;
+  J[2] = motion[2] * p[1] - p[3] * t4;
+  real t10 = motion[1] * p[6];
+  real t11 = motion[2] * p[5];
+  J[3] = t10 - t11;
+  real t14 = motion[0] * p[6];
+  real t16 = motion[1] * p[8];
+  real t18 = motion[2] * p[9] + (t14 + t16);
+  J[4] = motion[2] * p[4] - (t14 + t18);
+  real t21 = motion[0] * p[5];
+  real t22 = motion[2] * p[8];
+  real t25 = t22 + (t21 + motion[1] * p[7]);
+  J[5] = t21 + t25 - motion[1] * p[4];
+  real t30 = motion[1] + motion[1];
+  J[6] = motion[0] * p[2] - p[1] * t30;
+  real t33 = motion[0] * p[1];
+  J[7] = t0 + t33;
+  J[8] = p[2] * motion[2] - p[3] * t30;
+  J[9] = t16 + t18 - motion[2] * p[7];
+  real t41 = motion[0] * p[8];
+  J[10] = t11 - t41;
+  real t44 = motion[1] * p[5];
+  real t45 = motion[2] * p[6];
+  real t48 = t45 + (motion[0] * p[4] + t44);
+  J[11] = motion[0] * p[7] - (t44 + t48);
+  real t52 = motion[2] + motion[2];
+  J[12] = motion[0] * p[3] - p[1] * t52;
+  J[13] = motion[1] * p[3] - p[2] * t52;
+  J[14] = t1 + t33;
+  J[15] = motion[1] * p[9] - (t22 + t25);
+  J[16] = t45 + t48 - motion[0] * p[9];
+  J[17] = t41 - t10;
+  J[18] = 0.0;
+  real t66 = -p[3];
+  J[19] = t66;
+  J[20] = p[2];
+  J[21] = p[4];
+  J[22] = p[5];
+  J[23] = p[6];
+  J[24] = p[3];
+  J[25] = 0.0;
+  real t67 = -p[1];
+  J[26] = t67;
+  J[27] = p[5];
+  J[28] = p[7];
+  J[29] = p[8];
+  real t68 = -p[2];
+  J[30] = t68;
+  J[31] = p[1];
+  J[32] = 0.0;
+  J[33] = p[6];
+  J[34] = p[8];
+  J[35] = p[9];
+  J[36] = p[0];
+  J[37] = J[38] = J[39] = 0.0;
+  J[40] = p[3];
+  J[41] = t68;
+  J[42] = 0.0;
+  J[43] = p[0];
+  J[44] = 0.0;
+  J[45] = t66;
+  J[46] = 0.0;
+  J[47] = p[1];
+  J[48] = J[49] = 0.0;
+  J[50] = p[0];
+  J[51] = p[2];
+  J[52] = t67;
+  J[53] = 0.0;
+  return 0;
 }
 
-static int mstmm_body_rigid_load_by_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_body_rigid_load_by_motion(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_body_rigid_load_by_motion_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_body_rigid_load_by_motion_outputs[] = {
-    {"J", 54, "", 0, 0},
-};
+MSTMM_CALL(mstmm_body_rigid_load_by_motion, (in[0], in[1], out[0]))
 
 static const char *const mstmm_body_rigid_p_names[] = {
     "mass", "mcx", "mcy", "mcz", "Jxx", "Jxy", "Jxz", "Jyy", "Jyz", "Jzz",
@@ -586,73 +220,29 @@ static const char *const mstmm_body_rigid_p_units[] = {
 };
 
 static const mstmm_kernel mstmm_body_rigid_kernels[] = {
-    {
-        .name = "inertia",
-        .function = (void (*)(void))mstmm_body_rigid_inertia,
-        .call = mstmm_body_rigid_inertia_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_body_rigid_inertia_inputs,
-        .outputs = mstmm_body_rigid_inertia_outputs,
-        .ir_hash = "2dcb24e040f4147b102370c47eccc8dcc0e62343bb54001595c25efd1ac0dad9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "bias_load",
-        .function = (void (*)(void))mstmm_body_rigid_bias_load,
-        .call = mstmm_body_rigid_bias_load_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_body_rigid_bias_load_inputs,
-        .outputs = mstmm_body_rigid_bias_load_outputs,
-        .ir_hash = "19f010227d166c8285f188e124c49ed67e8cc6ff90d7b9c8a49e8dd4da43a78f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "energy",
-        .function = (void (*)(void))mstmm_body_rigid_energy,
-        .call = mstmm_body_rigid_energy_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_body_rigid_energy_inputs,
-        .outputs = mstmm_body_rigid_energy_outputs,
-        .ir_hash = "db089443d2953deb6d07e6bd92feb353a6c4b4bc573541ddbed84165dd7e8a76",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "bias_load_slope",
-        .function = (void (*)(void))mstmm_body_rigid_bias_load_slope,
-        .call = mstmm_body_rigid_bias_load_slope_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_body_rigid_bias_load_slope_inputs,
-        .outputs = mstmm_body_rigid_bias_load_slope_outputs,
-        .ir_hash = "4703e361982e2c7582fe85b26d69528a4853cccf7d6716acaeaaee03b26cfda4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "load_by_motion",
-        .function = (void (*)(void))mstmm_body_rigid_load_by_motion,
-        .call = mstmm_body_rigid_load_by_motion_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_body_rigid_load_by_motion_inputs,
-        .outputs = mstmm_body_rigid_load_by_motion_outputs,
-        .ir_hash = "0ade45848cfb8bb5c6cd693ec53400bba2ef5aa25201d1d00b94594262ee3290",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"inertia", MSTMM_FUNCTIONS(mstmm_body_rigid_inertia), 1, 1, (const mstmm_port[]){{"p", 10, "", 0,
+    0}}, (const mstmm_port[]){{"S", 21, "", 0, 0}},
+    "c76ee7e4f9f36bf71b0bf49a998769060fe2986b63abf5e9387c4c15685a4e34", 0, NULL},
+  {"bias_load", MSTMM_FUNCTIONS(mstmm_body_rigid_bias_load), 2, 1, (const mstmm_port[]){{"p", 10,
+    "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "2a2c53b1e896fb31a3caf1adc9b4afffc3b9c13a021e3a7ccde090e71d0b9163", 0, NULL},
+  {"energy", MSTMM_FUNCTIONS(mstmm_body_rigid_energy), 3, 1, (const mstmm_port[]){{"p", 10, "", 0,
+    0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}}, (const mstmm_port[]){{"T", 1, "J", 0, 0}},
+    "3ccd6616026596a5e5899bfbc9601a609b957c549bf25f6982af8a722649f23f", 0, NULL},
+  {"bias_load_slope", MSTMM_FUNCTIONS(mstmm_body_rigid_bias_load_slope), 3, 1, (const
+    mstmm_port[]){{"p", 10, "", 0, 0}, {"motion", 9, "", 0, 0}, {"d_motion", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d_e", 6, "N, N*m", 0, 0}},
+    "bf496b95768c122c362efe45e5c4469848df827d579f0fe1eef293e5f722db49", 0, NULL},
+  {"load_by_motion", MSTMM_FUNCTIONS(mstmm_body_rigid_load_by_motion), 2, 1, (const
+    mstmm_port[]){{"p", 10, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"J", 54, "",
+    0, 0}}, "57685beb54656d2b14e1345577565310731e6ce73abf40c29a02eb7ba7370a6a", 0, NULL},
 };
 
 const mstmm_element mstmm_body_rigid = {
     .abi = MSTMM_ABI,
     .kind = "body",
     .name = "rigid",
-    .hash = "dfb605181739088faa6c0d9275b13a9c9ebbc0010b3e0b553c46ef5835c3c984",
+    .hash = "4f755919aecf9b3be4d1c36ab5425e5d3a7ddba189895b85e594c43fd84f7dad",
     .nq = 0,
     .nu = 0,
     .np = 10,

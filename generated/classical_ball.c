@@ -8,673 +8,277 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_ball;
-int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F_scale,
-    const real *restrict tau_n, real *restrict U_h, real *restrict margin);
-
 /* ball hinge, classical transfer matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 5, (5.39) to (5.49)
  * in  U[13][13] ([m/s2, rad/s2, N*m, N, 1]) transfer matrix of the outboard body
  * in  F_scale[6][6] (kg*m, kg*m2; kg, kg*m) F_scale of the outboard body
  * in  tau_n[3] (N*m) moment of the next ball, inertial axes
  * out U_h[13][13] ([m/s2, rad/s2, N*m, N, 1]) transfer matrix, z_O = U_h z_I
  * out margin[1] (1) relative size of the pivot, 0 to 1
  */
-int mstmm_classical_ball_transfer(const real *restrict U, const real *restrict F_scale,
-    const real *restrict tau_n, real *restrict U_h, real *restrict margin)
+int mstmm_classical_ball_transfer(in_t U, in_t F_scale, in_t tau_n, out_t U_h, out_t margin)
 {
-    const real t0 = fabs(U[81]);
-    const real t1 = fabs(U[94]);
-    const real t2 = t0 < t1;
-    const real t3 = t2 != 0 ? U[94] : U[81];
-    const real t4 = fabs(t3);
-    const real t5 = fabs(U[107]);
-    const real t6 = t4 < t5;
-    const real t7 = fabs(U[108]);
-    const real t8 = t5 + t7;
-    const real t9 = fabs(U[109]);
-    const real t10 = t8 + t9;
-    const real t11 = fabs(U[95]);
-    const real t12 = t1 + t11;
-    const real t13 = fabs(U[96]);
-    const real t14 = t12 + t13;
-    const real t15 = fabs(U[82]);
-    const real t16 = t0 + t15;
-    const real t17 = fabs(U[83]);
-    const real t18 = t16 + t17;
-    const real t19 = t2 != 0 ? t14 : t18;
-    const real t20 = t6 != 0 ? t10 : t19;
-    const real t21 = t20 * ((real)1 / (real)10000000000000);
-    const real t22 = t6 != 0 ? U[107] : t3;
-    const real t23 = fabs(t22);
-    const real t24 = t21 < t23;
-    if (!(t24 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t25 = t2 != 0 ? U[82] : U[95];
-    const real t26 = t2 != 0 ? U[95] : U[82];
-    const real t27 = t6 != 0 ? U[108] : t26;
-    const real t28 = t2 != 0 ? U[81] : U[94];
-    const real t29 = 1.0 / t22;
-    const real t30 = t28 * t29;
-    const real t31 = t27 * t30;
-    const real t32 = t25 - t31;
-    const real t33 = fabs(t32);
-    const real t34 = t6 != 0 ? t26 : U[108];
-    const real t35 = t6 != 0 ? t3 : U[107];
-    const real t36 = t35 * t29;
-    const real t37 = t27 * t36;
-    const real t38 = t34 - t37;
-    const real t39 = fabs(t38);
-    const real t40 = t33 < t39;
-    const real t41 = t6 != 0 ? t19 : t10;
-    const real t42 = t2 != 0 ? t18 : t14;
-    const real t43 = t40 != 0 ? t41 : t42;
-    const real t44 = ((real)1 / (real)10000000000000) * t43;
-    const real t45 = t40 != 0 ? t38 : t32;
-    const real t46 = fabs(t45);
-    const real t47 = t44 < t46;
-    if (!(t47 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t48 = t40 != 0 ? t42 : t41;
-    const real t49 = ((real)1 / (real)10000000000000) * t48;
-    const real t50 = t2 != 0 ? U[83] : U[96];
-    const real t51 = t2 != 0 ? U[96] : U[83];
-    const real t52 = t6 != 0 ? U[109] : t51;
-    const real t53 = t52 * t30;
-    const real t54 = t50 - t53;
-    const real t55 = t6 != 0 ? t51 : U[109];
-    const real t56 = t52 * t36;
-    const real t57 = t55 - t56;
-    const real t58 = t40 != 0 ? t54 : t57;
-    const real t59 = t40 != 0 ? t57 : t54;
-    const real t60 = t40 != 0 ? t32 : t38;
-    const real t61 = 1.0 / t45;
-    const real t62 = t60 * t61;
-    const real t63 = t59 * t62;
-    const real t64 = t58 - t63;
-    const real t65 = fabs(t64);
-    const real t66 = t49 < t65;
-    if (!(t66 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t67 = t2 != 0 ? 1.0 : 0.0;
-    const real t68 = t2 != 0 ? 0.0 : 1.0;
-    const real t69 = t6 != 0 ? 0.0 : t68;
-    const real t70 = t69 * t30;
-    const real t71 = t67 - t70;
-    const real t72 = t6 != 0 ? t68 : 0.0;
-    const real t73 = t69 * t36;
-    const real t74 = t72 - t73;
-    const real t75 = t40 != 0 ? t71 : t74;
-    const real t76 = t40 != 0 ? t74 : t71;
-    const real t77 = t76 * t62;
-    const real t78 = t75 - t77;
-    const real t79 = 1.0 / t64;
-    const real t80 = t78 * t79;
-    const real t81 = fabs(t80);
-    const real t82 = F_scale[5] * t81;
-    const real t83 = t6 != 0 ? 0.0 : t67;
-    const real t84 = t83 * t30;
-    const real t85 = t68 - t84;
-    const real t86 = t6 != 0 ? t67 : 0.0;
-    const real t87 = t83 * t36;
-    const real t88 = t86 - t87;
-    const real t89 = t40 != 0 ? t85 : t88;
-    const real t90 = t40 != 0 ? t88 : t85;
-    const real t91 = t90 * t62;
-    const real t92 = t89 - t91;
-    const real t93 = t92 * t79;
-    const real t94 = fabs(t93);
-    const real t95 = F_scale[11] * t94;
-    const real t96 = t82 + t95;
-    const real t97 = t6 != 0 ? 1.0 : 0.0;
-    const real t98 = t97 * t30;
-    const real t99 = -t98;
-    const real t100 = t6 != 0 ? 0.0 : 1.0;
-    const real t101 = t97 * t36;
-    const real t102 = t100 - t101;
-    const real t103 = t40 != 0 ? t99 : t102;
-    const real t104 = t40 != 0 ? t102 : t99;
-    const real t105 = t104 * t62;
-    const real t106 = t103 - t105;
-    const real t107 = t106 * t79;
-    const real t108 = fabs(t107);
-    const real t109 = F_scale[17] * t108;
-    const real t110 = t96 + t109;
-    const real t111 = F_scale[3] * t81;
-    const real t112 = F_scale[9] * t94;
-    const real t113 = t111 + t112;
-    const real t114 = F_scale[15] * t108;
-    const real t115 = t113 + t114;
-    const real t116 = F_scale[4] * t81;
-    const real t117 = F_scale[10] * t94;
-    const real t118 = t116 + t117;
-    const real t119 = F_scale[16] * t108;
-    const real t120 = t118 + t119;
-    const real t121 = t115 + t120;
-    const real t122 = t110 + t121;
-    const real t123 = t59 * t80;
-    const real t124 = t76 - t123;
-    const real t125 = t61 * t124;
-    const real t126 = t27 * t125;
-    const real t127 = t69 - t126;
-    const real t128 = t52 * t80;
-    const real t129 = t127 - t128;
-    const real t130 = t29 * t129;
-    const real t131 = fabs(t130);
-    const real t132 = F_scale[5] * t131;
-    const real t133 = t59 * t93;
-    const real t134 = t90 - t133;
-    const real t135 = t61 * t134;
-    const real t136 = t27 * t135;
-    const real t137 = t83 - t136;
-    const real t138 = t52 * t93;
-    const real t139 = t137 - t138;
-    const real t140 = t29 * t139;
-    const real t141 = fabs(t140);
-    const real t142 = F_scale[11] * t141;
-    const real t143 = t132 + t142;
-    const real t144 = t59 * t107;
-    const real t145 = t104 - t144;
-    const real t146 = t61 * t145;
-    const real t147 = t27 * t146;
-    const real t148 = t97 - t147;
-    const real t149 = t52 * t107;
-    const real t150 = t148 - t149;
-    const real t151 = t29 * t150;
-    const real t152 = fabs(t151);
-    const real t153 = F_scale[17] * t152;
-    const real t154 = t143 + t153;
-    const real t155 = F_scale[3] * t131;
-    const real t156 = F_scale[9] * t141;
-    const real t157 = t155 + t156;
-    const real t158 = F_scale[15] * t152;
-    const real t159 = t157 + t158;
-    const real t160 = F_scale[4] * t131;
-    const real t161 = F_scale[10] * t141;
-    const real t162 = t160 + t161;
-    const real t163 = F_scale[16] * t152;
-    const real t164 = t162 + t163;
-    const real t165 = t159 + t164;
-    const real t166 = t154 + t165;
-    const real t167 = fabs(t125);
-    const real t168 = F_scale[5] * t167;
-    const real t169 = fabs(t135);
-    const real t170 = F_scale[11] * t169;
-    const real t171 = t168 + t170;
-    const real t172 = fabs(t146);
-    const real t173 = F_scale[17] * t172;
-    const real t174 = t171 + t173;
-    const real t175 = F_scale[3] * t167;
-    const real t176 = F_scale[9] * t169;
-    const real t177 = t175 + t176;
-    const real t178 = F_scale[15] * t172;
-    const real t179 = t177 + t178;
-    const real t180 = F_scale[4] * t167;
-    const real t181 = F_scale[10] * t169;
-    const real t182 = t180 + t181;
-    const real t183 = F_scale[16] * t172;
-    const real t184 = t182 + t183;
-    const real t185 = t179 + t184;
-    const real t186 = t174 + t185;
-    const real t187 = (t166 < t186 || isnan(t186)) ? t186 : t166;
-    const real t188 = (t122 < t187 || isnan(t187)) ? t187 : t122;
-    const real t189 = 1.0 / t188;
-    const real t190 = ((real)1 / (real)100000000) < t189;
-    if (!(t190 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 1.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 1.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    const real t191 = -U[104];
-    const real t192 = -U[91];
-    const real t193 = -U[78];
-    const real t194 = t2 != 0 ? t192 : t193;
-    const real t195 = t6 != 0 ? t191 : t194;
-    const real t196 = t6 != 0 ? t194 : t191;
-    const real t197 = t195 * t36;
-    const real t198 = t196 - t197;
-    const real t199 = t2 != 0 ? t193 : t192;
-    const real t200 = t195 * t30;
-    const real t201 = t199 - t200;
-    const real t202 = t40 != 0 ? t198 : t201;
-    const real t203 = t40 != 0 ? t201 : t198;
-    const real t204 = t202 * t62;
-    const real t205 = t203 - t204;
-    const real t206 = t205 * t79;
-    const real t207 = t59 * t206;
-    const real t208 = t202 - t207;
-    const real t209 = t61 * t208;
-    const real t210 = t27 * t209;
-    const real t211 = t195 - t210;
-    const real t212 = t52 * t206;
-    const real t213 = t211 - t212;
-    const real t214 = t29 * t213;
-    U_h[39] = t214;
-    const real t215 = -U[105];
-    const real t216 = -U[92];
-    const real t217 = -U[79];
-    const real t218 = t2 != 0 ? t216 : t217;
-    const real t219 = t6 != 0 ? t215 : t218;
-    const real t220 = t6 != 0 ? t218 : t215;
-    const real t221 = t219 * t36;
-    const real t222 = t220 - t221;
-    const real t223 = t2 != 0 ? t217 : t216;
-    const real t224 = t219 * t30;
-    const real t225 = t223 - t224;
-    const real t226 = t40 != 0 ? t222 : t225;
-    const real t227 = t40 != 0 ? t225 : t222;
-    const real t228 = t226 * t62;
-    const real t229 = t227 - t228;
-    const real t230 = t229 * t79;
-    const real t231 = t59 * t230;
-    const real t232 = t226 - t231;
-    const real t233 = t61 * t232;
-    const real t234 = t27 * t233;
-    const real t235 = t219 - t234;
-    const real t236 = t52 * t230;
-    const real t237 = t235 - t236;
-    const real t238 = t29 * t237;
-    U_h[40] = t238;
-    const real t239 = -U[106];
-    const real t240 = -U[93];
-    const real t241 = -U[80];
-    const real t242 = t2 != 0 ? t240 : t241;
-    const real t243 = t6 != 0 ? t239 : t242;
-    const real t244 = t6 != 0 ? t242 : t239;
-    const real t245 = t243 * t36;
-    const real t246 = t244 - t245;
-    const real t247 = t2 != 0 ? t241 : t240;
-    const real t248 = t243 * t30;
-    const real t249 = t247 - t248;
-    const real t250 = t40 != 0 ? t246 : t249;
-    const real t251 = t40 != 0 ? t249 : t246;
-    const real t252 = t250 * t62;
-    const real t253 = t251 - t252;
-    const real t254 = t253 * t79;
-    const real t255 = t59 * t254;
-    const real t256 = t250 - t255;
-    const real t257 = t61 * t256;
-    const real t258 = t27 * t257;
-    const real t259 = t243 - t258;
-    const real t260 = t52 * t254;
-    const real t261 = t259 - t260;
-    const real t262 = t29 * t261;
-    U_h[41] = t262;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 0.0;
-    const real t263 = -U[110];
-    const real t264 = -U[97];
-    const real t265 = -U[84];
-    const real t266 = t2 != 0 ? t264 : t265;
-    const real t267 = t6 != 0 ? t263 : t266;
-    const real t268 = t6 != 0 ? t266 : t263;
-    const real t269 = t267 * t36;
-    const real t270 = t268 - t269;
-    const real t271 = t2 != 0 ? t265 : t264;
-    const real t272 = t267 * t30;
-    const real t273 = t271 - t272;
-    const real t274 = t40 != 0 ? t270 : t273;
-    const real t275 = t40 != 0 ? t273 : t270;
-    const real t276 = t274 * t62;
-    const real t277 = t275 - t276;
-    const real t278 = t277 * t79;
-    const real t279 = t59 * t278;
-    const real t280 = t274 - t279;
-    const real t281 = t61 * t280;
-    const real t282 = t27 * t281;
-    const real t283 = t267 - t282;
-    const real t284 = t52 * t278;
-    const real t285 = t283 - t284;
-    const real t286 = t29 * t285;
-    U_h[45] = t286;
-    const real t287 = -U[111];
-    const real t288 = -U[98];
-    const real t289 = -U[85];
-    const real t290 = t2 != 0 ? t288 : t289;
-    const real t291 = t6 != 0 ? t287 : t290;
-    const real t292 = t6 != 0 ? t290 : t287;
-    const real t293 = t291 * t36;
-    const real t294 = t292 - t293;
-    const real t295 = t2 != 0 ? t289 : t288;
-    const real t296 = t291 * t30;
-    const real t297 = t295 - t296;
-    const real t298 = t40 != 0 ? t294 : t297;
-    const real t299 = t40 != 0 ? t297 : t294;
-    const real t300 = t298 * t62;
-    const real t301 = t299 - t300;
-    const real t302 = t301 * t79;
-    const real t303 = t59 * t302;
-    const real t304 = t298 - t303;
-    const real t305 = t61 * t304;
-    const real t306 = t27 * t305;
-    const real t307 = t291 - t306;
-    const real t308 = t52 * t302;
-    const real t309 = t307 - t308;
-    const real t310 = t29 * t309;
-    U_h[46] = t310;
-    const real t311 = -U[112];
-    const real t312 = -U[99];
-    const real t313 = -U[86];
-    const real t314 = t2 != 0 ? t312 : t313;
-    const real t315 = t6 != 0 ? t311 : t314;
-    const real t316 = t6 != 0 ? t314 : t311;
-    const real t317 = t315 * t36;
-    const real t318 = t316 - t317;
-    const real t319 = t2 != 0 ? t313 : t312;
-    const real t320 = t315 * t30;
-    const real t321 = t319 - t320;
-    const real t322 = t40 != 0 ? t318 : t321;
-    const real t323 = t40 != 0 ? t321 : t318;
-    const real t324 = t322 * t62;
-    const real t325 = t323 - t324;
-    const real t326 = t325 * t79;
-    const real t327 = t59 * t326;
-    const real t328 = t322 - t327;
-    const real t329 = t61 * t328;
-    const real t330 = t27 * t329;
-    const real t331 = t315 - t330;
-    const real t332 = t52 * t326;
-    const real t333 = t331 - t332;
-    const real t334 = t29 * t333;
-    U_h[47] = t334;
-    const real t335 = -U[113];
-    const real t336 = -U[100];
-    const real t337 = -U[87];
-    const real t338 = t2 != 0 ? t336 : t337;
-    const real t339 = t6 != 0 ? t335 : t338;
-    const real t340 = t6 != 0 ? t338 : t335;
-    const real t341 = t339 * t36;
-    const real t342 = t340 - t341;
-    const real t343 = t2 != 0 ? t337 : t336;
-    const real t344 = t339 * t30;
-    const real t345 = t343 - t344;
-    const real t346 = t40 != 0 ? t342 : t345;
-    const real t347 = t40 != 0 ? t345 : t342;
-    const real t348 = t346 * t62;
-    const real t349 = t347 - t348;
-    const real t350 = t349 * t79;
-    const real t351 = t59 * t350;
-    const real t352 = t346 - t351;
-    const real t353 = t61 * t352;
-    const real t354 = t27 * t353;
-    const real t355 = t339 - t354;
-    const real t356 = t52 * t350;
-    const real t357 = t355 - t356;
-    const real t358 = t29 * t357;
-    U_h[48] = t358;
-    const real t359 = -U[114];
-    const real t360 = -U[101];
-    const real t361 = -U[88];
-    const real t362 = t2 != 0 ? t360 : t361;
-    const real t363 = t6 != 0 ? t359 : t362;
-    const real t364 = t6 != 0 ? t362 : t359;
-    const real t365 = t363 * t36;
-    const real t366 = t364 - t365;
-    const real t367 = t2 != 0 ? t361 : t360;
-    const real t368 = t363 * t30;
-    const real t369 = t367 - t368;
-    const real t370 = t40 != 0 ? t366 : t369;
-    const real t371 = t40 != 0 ? t369 : t366;
-    const real t372 = t370 * t62;
-    const real t373 = t371 - t372;
-    const real t374 = t373 * t79;
-    const real t375 = t59 * t374;
-    const real t376 = t370 - t375;
-    const real t377 = t61 * t376;
-    const real t378 = t27 * t377;
-    const real t379 = t363 - t378;
-    const real t380 = t52 * t374;
-    const real t381 = t379 - t380;
-    const real t382 = t29 * t381;
-    U_h[49] = t382;
-    const real t383 = -U[115];
-    const real t384 = -U[102];
-    const real t385 = -U[89];
-    const real t386 = t2 != 0 ? t384 : t385;
-    const real t387 = t6 != 0 ? t383 : t386;
-    const real t388 = t6 != 0 ? t386 : t383;
-    const real t389 = t387 * t36;
-    const real t390 = t388 - t389;
-    const real t391 = t2 != 0 ? t385 : t384;
-    const real t392 = t387 * t30;
-    const real t393 = t391 - t392;
-    const real t394 = t40 != 0 ? t390 : t393;
-    const real t395 = t40 != 0 ? t393 : t390;
-    const real t396 = t394 * t62;
-    const real t397 = t395 - t396;
-    const real t398 = t397 * t79;
-    const real t399 = t59 * t398;
-    const real t400 = t394 - t399;
-    const real t401 = t61 * t400;
-    const real t402 = t27 * t401;
-    const real t403 = t387 - t402;
-    const real t404 = t52 * t398;
-    const real t405 = t403 - t404;
-    const real t406 = t29 * t405;
-    U_h[50] = t406;
-    const real t407 = tau_n[2] - U[116];
-    const real t408 = tau_n[1] - U[103];
-    const real t409 = tau_n[0] - U[90];
-    const real t410 = t2 != 0 ? t408 : t409;
-    const real t411 = t6 != 0 ? t407 : t410;
-    const real t412 = t6 != 0 ? t410 : t407;
-    const real t413 = t411 * t36;
-    const real t414 = t412 - t413;
-    const real t415 = t2 != 0 ? t409 : t408;
-    const real t416 = t411 * t30;
-    const real t417 = t415 - t416;
-    const real t418 = t40 != 0 ? t414 : t417;
-    const real t419 = t40 != 0 ? t417 : t414;
-    const real t420 = t418 * t62;
-    const real t421 = t419 - t420;
-    const real t422 = t421 * t79;
-    const real t423 = t59 * t422;
-    const real t424 = t418 - t423;
-    const real t425 = t61 * t424;
-    const real t426 = t27 * t425;
-    const real t427 = t411 - t426;
-    const real t428 = t52 * t422;
-    const real t429 = t427 - t428;
-    const real t430 = t29 * t429;
-    U_h[51] = t430;
-    U_h[52] = t209;
-    U_h[53] = t233;
-    U_h[54] = t257;
-    U_h[55] = 0.0;
-    U_h[56] = 0.0;
-    U_h[57] = 0.0;
-    U_h[58] = t281;
-    U_h[59] = t305;
-    U_h[60] = t329;
-    U_h[61] = t353;
-    U_h[62] = t377;
-    U_h[63] = t401;
-    U_h[64] = t425;
-    U_h[65] = t206;
-    U_h[66] = t230;
-    U_h[67] = t254;
-    U_h[68] = 0.0;
-    U_h[69] = 0.0;
-    U_h[70] = 0.0;
-    U_h[71] = t278;
-    U_h[72] = t302;
-    U_h[73] = t326;
-    U_h[74] = t350;
-    U_h[75] = t374;
-    U_h[76] = t398;
-    U_h[77] = t422;
-    U_h[78] = 0.0;
-    U_h[79] = 0.0;
-    U_h[80] = 0.0;
-    U_h[81] = 0.0;
-    U_h[82] = 0.0;
-    U_h[83] = 0.0;
-    U_h[84] = 1.0;
-    U_h[85] = 0.0;
-    U_h[86] = 0.0;
-    U_h[87] = 0.0;
-    U_h[88] = 0.0;
-    U_h[89] = 0.0;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 0.0;
-    U_h[97] = 0.0;
-    U_h[98] = 1.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 1.0;
-    U_h[127] = 0.0;
-    U_h[128] = 0.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 1.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 0.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 1.0;
-    U_h[155] = 0.0;
-    U_h[156] = 0.0;
-    U_h[157] = 0.0;
-    U_h[158] = 0.0;
-    U_h[159] = 0.0;
-    U_h[160] = 0.0;
-    U_h[161] = 0.0;
-    U_h[162] = 0.0;
-    U_h[163] = 0.0;
-    U_h[164] = 0.0;
-    U_h[165] = 0.0;
-    U_h[166] = 0.0;
-    U_h[167] = 0.0;
-    U_h[168] = 1.0;
-    margin[0] = t189;
-    return 0;
+  real t0 = fabs(U[81]);
+  real t1 = fabs(U[94]);
+  real t2 = t0 < t1;
+  real t3 = t2 != 0 ? U[94] : U[81];
+  real t5 = fabs(U[107]);
+  real t6 = (fabs(t3)) < t5;
+  real t10 = t5 + (fabs(U[108])) + (fabs(U[109]));
+  real t14 = t1 + (fabs(U[95])) + (fabs(U[96]));
+  real t18 = t0 + (fabs(U[82])) + (fabs(U[83]));
+  real t19 = t2 != 0 ? t14 : t18;
+  real t22 = t6 != 0 ? U[107] : t3;
+  if (!(((t6 != 0 ? t10 : t19) * ((real)1 / (real)10000000000000) < (fabs(t22))))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t26 = t2 != 0 ? U[95] : U[82];
+  real t27 = t6 != 0 ? U[108] : t26;
+  real t29 = 1.0 / t22;
+  real t30 = (t2 != 0 ? U[81] : U[94]) * t29;
+  real t32 = (t2 != 0 ? U[82] : U[95]) - t27 * t30;
+  real t36 = (t6 != 0 ? t3 : U[107]) * t29;
+  real t38 = (t6 != 0 ? t26 : U[108]) - t27 * t36;
+  real t40 = (fabs(t32)) < (fabs(t38));
+  real t41 = t6 != 0 ? t19 : t10;
+  real t42 = t2 != 0 ? t18 : t14;
+  real t45 = t40 != 0 ? t38 : t32;
+  if (!((((real)1 / (real)10000000000000) * (t40 != 0 ? t41 : t42) < (fabs(t45))))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t51 = t2 != 0 ? U[96] : U[83];
+  real t52 = t6 != 0 ? U[109] : t51;
+  real t54 = (t2 != 0 ? U[83] : U[96]) - t52 * t30;
+  real t57 = (t6 != 0 ? t51 : U[109]) - t52 * t36;
+  real t59 = t40 != 0 ? t57 : t54;
+  real t61 = 1.0 / t45;
+  real t62 = (t40 != 0 ? t32 : t38) * t61;
+  real t64 = (t40 != 0 ? t54 : t57) - t59 * t62;
+  if (!((((real)1 / (real)10000000000000) * (t40 != 0 ? t42 : t41) < (fabs(t64))))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t67 = t2 != 0 ? 1.0 : 0.0;
+  real t68 = t2 != 0 ? 0.0 : 1.0;
+  real t69 = t6 != 0 ? 0.0 : t68;
+  real t71 = t67 - t69 * t30;
+  real t74 = (t6 != 0 ? t68 : 0.0) - t69 * t36;
+  real t76 = t40 != 0 ? t74 : t71;
+  real t79 = 1.0 / t64;
+  real t80 = ((t40 != 0 ? t71 : t74) - t76 * t62) * t79;
+  real t81 = fabs(t80);
+  real t83 = t6 != 0 ? 0.0 : t67;
+  real t85 = t68 - t83 * t30;
+  real t88 = (t6 != 0 ? t67 : 0.0) - t83 * t36;
+  real t90 = t40 != 0 ? t88 : t85;
+  real t93 = ((t40 != 0 ? t85 : t88) - t90 * t62) * t79;
+  real t94 = fabs(t93);
+  real t97 = t6 != 0 ? 1.0 : 0.0;
+  real t99 = -(t97 * t30);
+  real t102 = (t6 != 0 ? 0.0 : 1.0) - t97 * t36;
+  real t104 = t40 != 0 ? t102 : t99;
+  real t107 = ((t40 != 0 ? t99 : t102) - t104 * t62) * t79;
+  real t108 = fabs(t107);
+  real t122 = F_scale[5] * t81 + F_scale[11] * t94 + F_scale[17] * t108 + (F_scale[3] * t81 +
+    F_scale[9] * t94 + F_scale[15] * t108 + (F_scale[4] * t81 + F_scale[10] * t94 + F_scale[16] *
+    t108));
+  real t125 = t61 * (t76 - t59 * t80);
+  real t130 = t29 * (t69 - t27 * t125 - t52 * t80);
+  real t131 = fabs(t130);
+  real t135 = t61 * (t90 - t59 * t93);
+  real t140 = t29 * (t83 - t27 * t135 - t52 * t93);
+  real t141 = fabs(t140);
+  real t146 = t61 * (t104 - t59 * t107);
+  real t151 = t29 * (t97 - t27 * t146 - t52 * t107);
+  real t152 = fabs(t151);
+  real t166 = F_scale[5] * t131 + F_scale[11] * t141 + F_scale[17] * t152 + (F_scale[3] * t131 +
+    F_scale[9] * t141 + F_scale[15] * t152 + (F_scale[4] * t131 + F_scale[10] * t141 + F_scale[16] *
+    t152));
+  real t167 = fabs(t125);
+  real t169 = fabs(t135);
+  real t172 = fabs(t146);
+  real t186 = F_scale[5] * t167 + F_scale[11] * t169 + F_scale[17] * t172 + (F_scale[3] * t167 +
+    F_scale[9] * t169 + F_scale[15] * t172 + (F_scale[4] * t167 + F_scale[10] * t169 + F_scale[16] *
+    t172));
+  real t187 = (t166 < t186 || isnan(t186)) ? t186 : t166;
+  real t189 = 1.0 / ((t122 < t187 || isnan(t187)) ? t187 : t122);
+  if (!((((real)1 / (real)100000000) < t189))) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = 0.0;
+  U_h[14] = 1.0;
+  U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24]
+    = U_h[25] = U_h[26] = U_h[27] = 0.0;
+  U_h[28] = 1.0;
+  U_h[29] = U_h[30] = U_h[31] = U_h[32] = U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38]
+    = 0.0;
+  real t191 = -U[104];
+  real t192 = -U[91];
+  real t193 = -U[78];
+  real t194 = t2 != 0 ? t192 : t193;
+  real t195 = t6 != 0 ? t191 : t194;
+  real t198 = (t6 != 0 ? t194 : t191) - t195 * t36;
+  real t201 = (t2 != 0 ? t193 : t192) - t195 * t30;
+  real t202 = t40 != 0 ? t198 : t201;
+  real t206 = ((t40 != 0 ? t201 : t198) - t202 * t62) * t79;
+  real t209 = t61 * (t202 - t59 * t206);
+  U_h[39] = t29 * (t195 - t27 * t209 - t52 * t206);
+  real t215 = -U[105];
+  real t216 = -U[92];
+  real t217 = -U[79];
+  real t218 = t2 != 0 ? t216 : t217;
+  real t219 = t6 != 0 ? t215 : t218;
+  real t222 = (t6 != 0 ? t218 : t215) - t219 * t36;
+  real t225 = (t2 != 0 ? t217 : t216) - t219 * t30;
+  real t226 = t40 != 0 ? t222 : t225;
+  real t230 = ((t40 != 0 ? t225 : t222) - t226 * t62) * t79;
+  real t233 = t61 * (t226 - t59 * t230);
+  U_h[40] = t29 * (t219 - t27 * t233 - t52 * t230);
+  real t239 = -U[106];
+  real t240 = -U[93];
+  real t241 = -U[80];
+  real t242 = t2 != 0 ? t240 : t241;
+  real t243 = t6 != 0 ? t239 : t242;
+  real t246 = (t6 != 0 ? t242 : t239) - t243 * t36;
+  real t249 = (t2 != 0 ? t241 : t240) - t243 * t30;
+  real t250 = t40 != 0 ? t246 : t249;
+  real t254 = ((t40 != 0 ? t249 : t246) - t250 * t62) * t79;
+  real t257 = t61 * (t250 - t59 * t254);
+  U_h[41] = t29 * (t243 - t27 * t257 - t52 * t254);
+  U_h[42] = U_h[43] = U_h[44] = 0.0;
+  real t263 = -U[110];
+  real t264 = -U[97];
+  real t265 = -U[84];
+  real t266 = t2 != 0 ? t264 : t265;
+  real t267 = t6 != 0 ? t263 : t266;
+  real t270 = (t6 != 0 ? t266 : t263) - t267 * t36;
+  real t273 = (t2 != 0 ? t265 : t264) - t267 * t30;
+  real t274 = t40 != 0 ? t270 : t273;
+  real t278 = ((t40 != 0 ? t273 : t270) - t274 * t62) * t79;
+  real t281 = t61 * (t274 - t59 * t278);
+  U_h[45] = t29 * (t267 - t27 * t281 - t52 * t278);
+  real t287 = -U[111];
+  real t288 = -U[98];
+  real t289 = -U[85];
+  real t290 = t2 != 0 ? t288 : t289;
+  real t291 = t6 != 0 ? t287 : t290;
+  real t294 = (t6 != 0 ? t290 : t287) - t291 * t36;
+  real t297 = (t2 != 0 ? t289 : t288) - t291 * t30;
+  real t298 = t40 != 0 ? t294 : t297;
+  real t302 = ((t40 != 0 ? t297 : t294) - t298 * t62) * t79;
+  real t305 = t61 * (t298 - t59 * t302);
+  U_h[46] = t29 * (t291 - t27 * t305 - t52 * t302);
+  real t311 = -U[112];
+  real t312 = -U[99];
+  real t313 = -U[86];
+  real t314 = t2 != 0 ? t312 : t313;
+  real t315 = t6 != 0 ? t311 : t314;
+  real t318 = (t6 != 0 ? t314 : t311) - t315 * t36;
+  real t321 = (t2 != 0 ? t313 : t312) - t315 * t30;
+  real t322 = t40 != 0 ? t318 : t321;
+  real t326 = ((t40 != 0 ? t321 : t318) - t322 * t62) * t79;
+  real t329 = t61 * (t322 - t59 * t326);
+  U_h[47] = t29 * (t315 - t27 * t329 - t52 * t326);
+  real t335 = -U[113];
+  real t336 = -U[100];
+  real t337 = -U[87];
+  real t338 = t2 != 0 ? t336 : t337;
+  real t339 = t6 != 0 ? t335 : t338;
+  real t342 = (t6 != 0 ? t338 : t335) - t339 * t36;
+  real t345 = (t2 != 0 ? t337 : t336) - t339 * t30;
+  real t346 = t40 != 0 ? t342 : t345;
+  real t350 = ((t40 != 0 ? t345 : t342) - t346 * t62) * t79;
+  real t353 = t61 * (t346 - t59 * t350);
+  U_h[48] = t29 * (t339 - t27 * t353 - t52 * t350);
+  real t359 = -U[114];
+  real t360 = -U[101];
+  real t361 = -U[88];
+  real t362 = t2 != 0 ? t360 : t361;
+  real t363 = t6 != 0 ? t359 : t362;
+  real t366 = (t6 != 0 ? t362 : t359) - t363 * t36;
+  real t369 = (t2 != 0 ? t361 : t360) - t363 * t30;
+  real t370 = t40 != 0 ? t366 : t369;
+  real t374 = ((t40 != 0 ? t369 : t366) - t370 * t62) * t79;
+  real t377 = t61 * (t370 - t59 * t374);
+  U_h[49] = t29 * (t363 - t27 * t377 - t52 * t374);
+  real t383 = -U[115];
+  real t384 = -U[102];
+  real t385 = -U[89];
+  real t386 = t2 != 0 ? t384 : t385;
+  real t387 = t6 != 0 ? t383 : t386;
+  real t390 = (t6 != 0 ? t386 : t383) - t387 * t36;
+  real t393 = (t2 != 0 ? t385 : t384) - t387 * t30;
+  real t394 = t40 != 0 ? t390 : t393;
+  real t398 = ((t40 != 0 ? t393 : t390) - t394 * t62) * t79;
+  real t401 = t61 * (t394 - t59 * t398);
+  U_h[50] = t29 * (t387 - t27 * t401 - t52 * t398);
+  real t407 = tau_n[2] - U[116];
+  real t408 = tau_n[1] - U[103];
+  real t409 = tau_n[0] - U[90];
+  real t410 = t2 != 0 ? t408 : t409;
+  real t411 = t6 != 0 ? t407 : t410;
+  real t414 = (t6 != 0 ? t410 : t407) - t411 * t36;
+  real t417 = (t2 != 0 ? t409 : t408) - t411 * t30;
+  real t418 = t40 != 0 ? t414 : t417;
+  real t422 = ((t40 != 0 ? t417 : t414) - t418 * t62) * t79;
+  real t425 = t61 * (t418 - t59 * t422);
+  U_h[51] = t29 * (t411 - t27 * t425 - t52 * t422);
+  U_h[52] = t209;
+  U_h[53] = t233;
+  U_h[54] = t257;
+  U_h[55] = U_h[56] = U_h[57] = 0.0;
+  U_h[58] = t281;
+  U_h[59] = t305;
+  U_h[60] = t329;
+  U_h[61] = t353;
+  U_h[62] = t377;
+  U_h[63] = t401;
+  U_h[64] = t425;
+  U_h[65] = t206;
+  U_h[66] = t230;
+  U_h[67] = t254;
+  U_h[68] = U_h[69] = U_h[70] = 0.0;
+  U_h[71] = t278;
+  U_h[72] = t302;
+  U_h[73] = t326;
+  U_h[74] = t350;
+  U_h[75] = t374;
+  U_h[76] = t398;
+  U_h[77] = t422;
+  U_h[78] = U_h[79] = U_h[80] = U_h[81] = U_h[82] = U_h[83] = 0.0;
+  U_h[84] = 1.0;
+  U_h[85] = U_h[86] = U_h[87] = U_h[88] = U_h[89] = U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94]
+    = U_h[95] = U_h[96] = U_h[97] = 0.0;
+  U_h[98] = 1.0;
+  U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] = U_h[106] = U_h[107] =
+    U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = 0.0;
+  U_h[126] = 1.0;
+  U_h[127] = U_h[128] = U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] =
+    U_h[136] = U_h[137] = U_h[138] = U_h[139] = 0.0;
+  U_h[140] = 1.0;
+  U_h[141] = U_h[142] = U_h[143] = U_h[144] = U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] =
+    U_h[150] = U_h[151] = U_h[152] = U_h[153] = 0.0;
+  U_h[154] = 1.0;
+  U_h[155] = U_h[156] = U_h[157] = U_h[158] = U_h[159] = U_h[160] = U_h[161] = U_h[162] = U_h[163] =
+    U_h[164] = U_h[165] = U_h[166] = U_h[167] = 0.0;
+  U_h[168] = 1.0;
+  margin[0] = t189;
+  return 0;
 }
 
-static int mstmm_classical_ball_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_ball_transfer(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_classical_ball_transfer_inputs[] = {
-    {"U", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0},
-    {"F_scale", 36, "kg*m, kg*m2; kg, kg*m", 0, 0},
-    {"tau_n", 3, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_ball_transfer_outputs[] = {
-    {"U_h", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0},
-    {"margin", 1, "1", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_ball_transfer_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
-};
+MSTMM_CALL(mstmm_classical_ball_transfer, (in[0], in[1], in[2], out[0], out[1]))
 
 static const mstmm_kernel mstmm_classical_ball_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_ball_transfer,
-        .call = mstmm_classical_ball_transfer_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_classical_ball_transfer_inputs,
-        .outputs = mstmm_classical_ball_transfer_outputs,
-        .ir_hash = "1ca0ff9e3d87d12559165bd2d964c789dff80d2e0bb235e32b79993c02898036",
-        .n_guards = 4,
-        .guards = mstmm_classical_ball_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_ball_transfer), 3, 2, (const mstmm_port[]){{"U", 169,
+    "[m/s2, rad/s2, N*m, N, 1]", 0, 0}, {"F_scale", 36, "kg*m, kg*m2; kg, kg*m", 0, 0}, {"tau_n", 3,
+    "N*m", 0, 0}}, (const mstmm_port[]){{"U_h", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0}, {"margin",
+    1, "1", 0, 0}}, "3a50c3b281309615519af90cc1e68d0e63188d1bc6b6dfaa81f488a50485a6f2", 4, (const
+    mstmm_guard[]){{1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {2,
+    "the pivot vanishes: no transfer matrix here, use the Riccati sweep"}}},
 };
 
 const mstmm_element mstmm_classical_ball = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "ball",
-    .hash = "8fc8f8f087c9cdf4dfb2ba48319ad9bc76ee2bf68aabbcd6a284febd3c854dfe",
+    .hash = "da75294642e43f5e86edcf8bc8df06e7c44bb5dee5be7854a8fdd58d0d2df444",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,20 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_beam_planar_discrete;
-int mstmm_classical_beam_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict I_0, const real *restrict s, const real *restrict S_c,
-    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
-    const real *restrict L, const real *restrict phi_O, const real *restrict Theta_O,
-    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
-    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
-    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
-    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
-    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
-    const real *restrict f_eta, real *restrict U, real *restrict W);
-
 /* planar beam of Euler and Bernoulli with 3 modes, discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, (8.63) to (8.89)
  * in  m[1] (kg) mass
  * in  S_0[2] (kg*m) first moments at rest, frame axes
  * in  I_0[1] (kg*m2) moment of inertia at rest about the input end
@@ -52,918 +39,274 @@ int mstmm_classical_beam_planar_discrete_transfer(const real *restrict m, const 
  * out U[10][10] ([m, rad, N*m, N, m, 1]) matrix, z_O = U z_I
  * out W[3][10] (N) modal rows, W z_I = 0
  */
-int mstmm_classical_beam_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict I_0, const real *restrict s, const real *restrict S_c,
-    const real *restrict M_f, const real *restrict K_f, const real *restrict D_f,
-    const real *restrict L, const real *restrict phi_O, const real *restrict Theta_O,
-    const real *restrict Theta_I, const real *restrict A, const real *restrict C,
-    const real *restrict B_r, const real *restrict B_theta, const real *restrict D_theta,
-    const real *restrict B_eta, const real *restrict D_eta, const real *restrict r_p,
-    const real *restrict theta_p, const real *restrict eta_p, const real *restrict q_p,
-    const real *restrict g, const real *restrict f_r, const real *restrict f_m,
-    const real *restrict f_eta, real *restrict U, real *restrict W)
+int mstmm_classical_beam_planar_discrete_transfer(in_t m, in_t S_0, in_t I_0, in_t s, in_t S_c,
+    in_t M_f, in_t K_f, in_t D_f, in_t L, in_t phi_O, in_t Theta_O, in_t Theta_I, in_t A, in_t C,
+    in_t B_r, in_t B_theta, in_t D_theta, in_t B_eta, in_t D_eta, in_t r_p, in_t theta_p,
+    in_t eta_p, in_t q_p, in_t g, in_t f_r, in_t f_m, in_t f_eta, out_t U, out_t W)
 {
-    U[0] = 1.0;
-    U[1] = 0.0;
-    const real t0 = sin(theta_p[0]);
-    const real t1 = L[0] * t0;
-    const real t2 = cos(theta_p[0]);
-    const real t3 = phi_O[0] * eta_p[0];
-    const real t4 = phi_O[1] * eta_p[1];
-    const real t5 = t3 + t4;
-    const real t6 = phi_O[2] * eta_p[2];
-    const real t7 = t5 + t6;
-    const real t8 = t2 * t7;
-    const real t9 = t1 + t8;
-    const real t10 = -t9;
-    U[2] = t10;
-    U[3] = 0.0;
-    U[4] = 0.0;
-    U[5] = 0.0;
-    const real t11 = phi_O[0] * t0;
-    const real t12 = -t11;
-    U[6] = t12;
-    const real t13 = phi_O[1] * t0;
-    const real t14 = -t13;
-    U[7] = t14;
-    const real t15 = phi_O[2] * t0;
-    const real t16 = -t15;
-    U[8] = t16;
-    const real t17 = L[0] * t2;
-    const real t18 = t0 * t7;
-    const real t19 = t17 - t18;
-    const real t20 = eta_p[0] * t11;
-    const real t21 = eta_p[1] * t13;
-    const real t22 = t20 + t21;
-    const real t23 = eta_p[2] * t15;
-    const real t24 = t22 + t23;
-    const real t25 = theta_p[0] * t9;
-    const real t26 = t24 + t25;
-    const real t27 = t19 + t26;
-    U[9] = t27;
-    U[10] = 0.0;
-    U[11] = 1.0;
-    U[12] = t19;
-    U[13] = 0.0;
-    U[14] = 0.0;
-    U[15] = 0.0;
-    const real t28 = phi_O[0] * t2;
-    U[16] = t28;
-    const real t29 = phi_O[1] * t2;
-    U[17] = t29;
-    const real t30 = phi_O[2] * t2;
-    U[18] = t30;
-    const real t31 = eta_p[0] * t28;
-    const real t32 = eta_p[1] * t29;
-    const real t33 = t31 + t32;
-    const real t34 = eta_p[2] * t30;
-    const real t35 = t33 + t34;
-    const real t36 = theta_p[0] * t19;
-    const real t37 = t35 + t36;
-    const real t38 = t9 - t37;
-    U[19] = t38;
-    U[20] = 0.0;
-    U[21] = 0.0;
-    U[22] = 1.0;
-    U[23] = 0.0;
-    U[24] = 0.0;
-    U[25] = 0.0;
-    U[26] = 0.0;
-    U[27] = 0.0;
-    U[28] = 0.0;
-    U[29] = 0.0;
-    const real t39 = s[2] * eta_p[2];
-    const real t40 = s[0] * eta_p[0];
-    const real t41 = s[1] * eta_p[1];
-    const real t42 = t40 + t41;
-    const real t43 = t39 + t42;
-    const real t44 = S_0[1] + t43;
-    const real t45 = A[0] * t44;
-    const real t46 = t2 * t45;
-    const real t47 = S_0[0] * A[0];
-    const real t48 = t0 * t47;
-    const real t49 = t46 + t48;
-    const real t50 = m[0] * A[0];
-    const real t51 = t2 * t50;
-    const real t52 = t0 * t51;
-    const real t53 = t0 * t50;
-    const real t54 = t2 * t53;
-    const real t55 = t52 - t54;
-    const real t56 = t18 - t17;
-    const real t57 = t55 * t56;
-    const real t58 = t2 * t51;
-    const real t59 = t0 * t53;
-    const real t60 = t58 + t59;
-    const real t61 = t60 * t9;
-    const real t62 = t57 - t61;
-    const real t63 = t49 + t62;
-    U[30] = t63;
-    const real t64 = t54 - t52;
-    const real t65 = t9 * t64;
-    const real t66 = t60 * t56;
-    const real t67 = t65 - t66;
-    const real t68 = t0 * t45;
-    const real t69 = t2 * t47;
-    const real t70 = t68 - t69;
-    const real t71 = t67 + t70;
-    U[31] = t71;
-    const real t72 = A[0] * r_p[1];
-    const real t73 = t72 - g[1];
-    const real t74 = B_r[1] + t73;
-    const real t75 = t2 * t74;
-    const real t76 = A[0] * r_p[0];
-    const real t77 = t76 - g[0];
-    const real t78 = B_r[0] + t77;
-    const real t79 = t0 * t78;
-    const real t80 = t75 - t79;
-    const real t81 = t80 * t44;
-    const real t82 = t2 * t78;
-    const real t83 = t0 * t74;
-    const real t84 = t82 + t83;
-    const real t85 = S_0[0] * t84;
-    const real t86 = t81 + t85;
-    const real t87 = M_f[5] * eta_p[2];
-    const real t88 = M_f[2] * eta_p[0];
-    const real t89 = M_f[4] * eta_p[1];
-    const real t90 = t88 + t89;
-    const real t91 = t87 + t90;
-    const real t92 = eta_p[2] * t91;
-    const real t93 = M_f[2] * eta_p[2];
-    const real t94 = M_f[0] * eta_p[0];
-    const real t95 = M_f[1] * eta_p[1];
-    const real t96 = t94 + t95;
-    const real t97 = t93 + t96;
-    const real t98 = eta_p[0] * t97;
-    const real t99 = M_f[4] * eta_p[2];
-    const real t100 = M_f[1] * eta_p[0];
-    const real t101 = M_f[3] * eta_p[1];
-    const real t102 = t100 + t101;
-    const real t103 = t99 + t102;
-    const real t104 = eta_p[1] * t103;
-    const real t105 = t98 + t104;
-    const real t106 = t92 + t105;
-    const real t107 = I_0[0] + t106;
-    const real t108 = A[0] * t107;
-    const real t109 = C[0] * eta_p[2];
-    const real t110 = D_eta[2] + t109;
-    const real t111 = t91 * 2.0;
-    const real t112 = t110 * t111;
-    const real t113 = C[0] * eta_p[0];
-    const real t114 = D_eta[0] + t113;
-    const real t115 = t97 * 2.0;
-    const real t116 = t114 * t115;
-    const real t117 = C[0] * eta_p[1];
-    const real t118 = D_eta[1] + t117;
-    const real t119 = t103 * 2.0;
-    const real t120 = t118 * t119;
-    const real t121 = t116 + t120;
-    const real t122 = t112 + t121;
-    const real t123 = C[0] * t122;
-    const real t124 = t108 + t123;
-    const real t125 = t86 - t124;
-    const real t126 = q_p[1] * t9;
-    const real t127 = q_p[0] * t19;
-    const real t128 = t126 + t127;
-    const real t129 = m[0] * t84;
-    const real t130 = C[0] * theta_p[0];
-    const real t131 = D_theta[0] + t130;
-    const real t132 = t131 * t131;
-    const real t133 = S_0[0] * t132;
-    const real t134 = t129 - t133;
-    const real t135 = A[0] * theta_p[0];
-    const real t136 = B_theta[0] + t135;
-    const real t137 = t136 * t44;
-    const real t138 = t134 - t137;
-    const real t139 = s[0] * t114;
-    const real t140 = t131 * t139;
-    const real t141 = 2.0 * t140;
-    const real t142 = t138 - t141;
-    const real t143 = s[1] * t118;
-    const real t144 = t131 * t143;
-    const real t145 = 2.0 * t144;
-    const real t146 = t142 - t145;
-    const real t147 = s[2] * t110;
-    const real t148 = t131 * t147;
-    const real t149 = 2.0 * t148;
-    const real t150 = t146 - t149;
-    const real t151 = t150 - t129;
-    const real t152 = t131 * t44;
-    const real t153 = 2.0 * t152;
-    const real t154 = C[0] * t153;
-    const real t155 = t47 - t154;
-    const real t156 = t151 + t155;
-    const real t157 = t0 * t156;
-    const real t158 = m[0] * t80;
-    const real t159 = A[0] * eta_p[2];
-    const real t160 = B_eta[2] + t159;
-    const real t161 = s[2] * t160;
-    const real t162 = A[0] * eta_p[1];
-    const real t163 = B_eta[1] + t162;
-    const real t164 = s[1] * t163;
-    const real t165 = A[0] * eta_p[0];
-    const real t166 = B_eta[0] + t165;
-    const real t167 = s[0] * t166;
-    const real t168 = S_0[0] * t136;
-    const real t169 = t158 + t168;
-    const real t170 = t44 * t132;
-    const real t171 = t169 - t170;
-    const real t172 = t167 + t171;
-    const real t173 = t164 + t172;
-    const real t174 = t161 + t173;
-    const real t175 = t158 - t174;
-    const real t176 = S_0[0] * t131;
-    const real t177 = t139 + t176;
-    const real t178 = t143 + t177;
-    const real t179 = t147 + t178;
-    const real t180 = 2.0 * t179;
-    const real t181 = C[0] * t180;
-    const real t182 = t45 + t181;
-    const real t183 = t175 - t182;
-    const real t184 = t2 * t183;
-    const real t185 = t157 - t184;
-    const real t186 = t9 * t185;
-    const real t187 = t0 * t183;
-    const real t188 = t2 * t156;
-    const real t189 = t187 + t188;
-    const real t190 = t189 * t56;
-    const real t191 = t186 - t190;
-    const real t192 = t128 + t191;
-    const real t193 = t125 + t192;
-    U[32] = t193;
-    U[33] = 1.0;
-    U[34] = t9;
-    U[35] = t56;
-    const real t194 = q_p[1] * t11;
-    const real t195 = q_p[0] * t28;
-    const real t196 = t194 + t195;
-    const real t197 = s[0] * t136;
-    const real t198 = s[0] * t131;
-    const real t199 = 2.0 * t198;
-    const real t200 = C[0] * t199;
-    const real t201 = t197 + t200;
-    const real t202 = t2 * t201;
-    const real t203 = s[0] * A[0];
-    const real t204 = s[0] * t132;
-    const real t205 = t203 - t204;
-    const real t206 = t0 * t205;
-    const real t207 = t202 + t206;
-    const real t208 = t207 * t9;
-    const real t209 = t0 * t201;
-    const real t210 = t2 * t205;
-    const real t211 = t209 - t210;
-    const real t212 = t211 * t56;
-    const real t213 = t208 + t212;
-    const real t214 = t196 + t213;
-    const real t215 = M_f[2] * t110;
-    const real t216 = t131 * t215;
-    const real t217 = 2.0 * t216;
-    const real t218 = M_f[1] * t118;
-    const real t219 = t131 * t218;
-    const real t220 = 2.0 * t219;
-    const real t221 = M_f[0] * t114;
-    const real t222 = t131 * t221;
-    const real t223 = 2.0 * t222;
-    const real t224 = t136 * t115;
-    const real t225 = s[0] * t84;
-    const real t226 = t224 - t225;
-    const real t227 = t223 + t226;
-    const real t228 = t220 + t227;
-    const real t229 = t217 + t228;
-    const real t230 = S_c[0] * A[0];
-    const real t231 = t131 * t115;
-    const real t232 = C[0] * t231;
-    const real t233 = t230 + t232;
-    const real t234 = t229 + t233;
-    const real t235 = t214 - t234;
-    U[36] = t235;
-    const real t236 = q_p[1] * t13;
-    const real t237 = q_p[0] * t29;
-    const real t238 = t236 + t237;
-    const real t239 = s[1] * t136;
-    const real t240 = s[1] * t131;
-    const real t241 = 2.0 * t240;
-    const real t242 = C[0] * t241;
-    const real t243 = t239 + t242;
-    const real t244 = t2 * t243;
-    const real t245 = s[1] * A[0];
-    const real t246 = s[1] * t132;
-    const real t247 = t245 - t246;
-    const real t248 = t0 * t247;
-    const real t249 = t244 + t248;
-    const real t250 = t249 * t9;
-    const real t251 = t0 * t243;
-    const real t252 = t2 * t247;
-    const real t253 = t251 - t252;
-    const real t254 = t253 * t56;
-    const real t255 = t250 + t254;
-    const real t256 = t238 + t255;
-    const real t257 = M_f[4] * t110;
-    const real t258 = t131 * t257;
-    const real t259 = 2.0 * t258;
-    const real t260 = M_f[3] * t118;
-    const real t261 = t131 * t260;
-    const real t262 = 2.0 * t261;
-    const real t263 = M_f[1] * t114;
-    const real t264 = t131 * t263;
-    const real t265 = 2.0 * t264;
-    const real t266 = t136 * t119;
-    const real t267 = s[1] * t84;
-    const real t268 = t266 - t267;
-    const real t269 = t265 + t268;
-    const real t270 = t262 + t269;
-    const real t271 = t259 + t270;
-    const real t272 = S_c[1] * A[0];
-    const real t273 = t131 * t119;
-    const real t274 = C[0] * t273;
-    const real t275 = t272 + t274;
-    const real t276 = t271 + t275;
-    const real t277 = t256 - t276;
-    U[37] = t277;
-    const real t278 = q_p[1] * t15;
-    const real t279 = q_p[0] * t30;
-    const real t280 = t278 + t279;
-    const real t281 = s[2] * t136;
-    const real t282 = s[2] * t131;
-    const real t283 = 2.0 * t282;
-    const real t284 = C[0] * t283;
-    const real t285 = t281 + t284;
-    const real t286 = t2 * t285;
-    const real t287 = s[2] * A[0];
-    const real t288 = s[2] * t132;
-    const real t289 = t287 - t288;
-    const real t290 = t0 * t289;
-    const real t291 = t286 + t290;
-    const real t292 = t291 * t9;
-    const real t293 = t0 * t285;
-    const real t294 = t2 * t289;
-    const real t295 = t293 - t294;
-    const real t296 = t295 * t56;
-    const real t297 = t292 + t296;
-    const real t298 = t280 + t297;
-    const real t299 = M_f[5] * t110;
-    const real t300 = t131 * t299;
-    const real t301 = 2.0 * t300;
-    const real t302 = M_f[4] * t118;
-    const real t303 = t131 * t302;
-    const real t304 = 2.0 * t303;
-    const real t305 = M_f[2] * t114;
-    const real t306 = t131 * t305;
-    const real t307 = 2.0 * t306;
-    const real t308 = t136 * t111;
-    const real t309 = s[2] * t84;
-    const real t310 = t308 - t309;
-    const real t311 = t307 + t310;
-    const real t312 = t304 + t311;
-    const real t313 = t301 + t312;
-    const real t314 = S_c[2] * A[0];
-    const real t315 = t131 * t111;
-    const real t316 = C[0] * t315;
-    const real t317 = t314 + t316;
-    const real t318 = t313 + t317;
-    const real t319 = t298 - t318;
-    U[38] = t319;
-    const real t320 = t131 * t112;
-    const real t321 = t131 * t120;
-    const real t322 = t131 * t116;
-    const real t323 = S_0[0] * t80;
-    const real t324 = t136 * t107;
-    const real t325 = S_c[2] * t160;
-    const real t326 = S_c[0] * t166;
-    const real t327 = S_c[1] * t163;
-    const real t328 = t326 + t327;
-    const real t329 = t325 + t328;
-    const real t330 = t324 + t329;
-    const real t331 = t84 * t44;
-    const real t332 = t330 - t331;
-    const real t333 = t323 + t332;
-    const real t334 = t322 + t333;
-    const real t335 = t321 + t334;
-    const real t336 = t320 + t335;
-    const real t337 = t336 - f_m[0];
-    const real t338 = r_p[0] * t49;
-    const real t339 = t69 - t68;
-    const real t340 = r_p[1] * t339;
-    const real t341 = t338 - t340;
-    const real t342 = t124 - t86;
-    const real t343 = theta_p[0] * t342;
-    const real t344 = t341 - t343;
-    const real t345 = eta_p[0] * t234;
-    const real t346 = t344 - t345;
-    const real t347 = eta_p[1] * t276;
-    const real t348 = t346 - t347;
-    const real t349 = eta_p[2] * t318;
-    const real t350 = t348 - t349;
-    const real t351 = t337 + t350;
-    const real t352 = q_p[1] * t26;
-    const real t353 = q_p[0] * t37;
-    const real t354 = t352 + t353;
-    const real t355 = t2 * t150;
-    const real t356 = t0 * t174;
-    const real t357 = t355 - t356;
-    const real t358 = t357 - f_r[0];
-    const real t359 = eta_p[0] * t207;
-    const real t360 = r_p[0] * t60;
-    const real t361 = r_p[1] * t55;
-    const real t362 = t360 + t361;
-    const real t363 = t184 - t157;
-    const real t364 = theta_p[0] * t363;
-    const real t365 = t362 + t364;
-    const real t366 = t359 - t365;
-    const real t367 = eta_p[1] * t249;
-    const real t368 = t366 + t367;
-    const real t369 = eta_p[2] * t291;
-    const real t370 = t368 + t369;
-    const real t371 = t358 + t370;
-    const real t372 = t371 * t9;
-    const real t373 = t0 * t150;
-    const real t374 = t2 * t174;
-    const real t375 = t373 + t374;
-    const real t376 = t375 - f_r[1];
-    const real t377 = r_p[0] * t55;
-    const real t378 = r_p[1] * t60;
-    const real t379 = t377 - t378;
-    const real t380 = theta_p[0] * t189;
-    const real t381 = t379 - t380;
-    const real t382 = t210 - t209;
-    const real t383 = eta_p[0] * t382;
-    const real t384 = t381 - t383;
-    const real t385 = t252 - t251;
-    const real t386 = eta_p[1] * t385;
-    const real t387 = t384 - t386;
-    const real t388 = t294 - t293;
-    const real t389 = eta_p[2] * t388;
-    const real t390 = t387 - t389;
-    const real t391 = t376 + t390;
-    const real t392 = t391 * t56;
-    const real t393 = t372 + t392;
-    const real t394 = t354 + t393;
-    const real t395 = t351 + t394;
-    const real t396 = -t395;
-    U[39] = t396;
-    const real t397 = -t60;
-    U[40] = t397;
-    U[41] = t64;
-    U[42] = t185;
-    U[43] = 0.0;
-    U[44] = 1.0;
-    U[45] = 0.0;
-    U[46] = t207;
-    U[47] = t249;
-    U[48] = t291;
-    const real t398 = -t371;
-    U[49] = t398;
-    U[50] = t55;
-    U[51] = t397;
-    const real t399 = -t189;
-    U[52] = t399;
-    U[53] = 0.0;
-    U[54] = 0.0;
-    U[55] = 1.0;
-    U[56] = t211;
-    U[57] = t253;
-    U[58] = t295;
-    const real t400 = -t391;
-    U[59] = t400;
-    U[60] = 0.0;
-    U[61] = 0.0;
-    U[62] = 0.0;
-    U[63] = 0.0;
-    U[64] = 0.0;
-    U[65] = 0.0;
-    U[66] = 1.0;
-    U[67] = 0.0;
-    U[68] = 0.0;
-    U[69] = 0.0;
-    U[70] = 0.0;
-    U[71] = 0.0;
-    U[72] = 0.0;
-    U[73] = 0.0;
-    U[74] = 0.0;
-    U[75] = 0.0;
-    U[76] = 0.0;
-    U[77] = 1.0;
-    U[78] = 0.0;
-    U[79] = 0.0;
-    U[80] = 0.0;
-    U[81] = 0.0;
-    U[82] = 0.0;
-    U[83] = 0.0;
-    U[84] = 0.0;
-    U[85] = 0.0;
-    U[86] = 0.0;
-    U[87] = 0.0;
-    U[88] = 1.0;
-    U[89] = 0.0;
-    U[90] = 0.0;
-    U[91] = 0.0;
-    U[92] = 0.0;
-    U[93] = 0.0;
-    U[94] = 0.0;
-    U[95] = 0.0;
-    U[96] = 0.0;
-    U[97] = 0.0;
-    U[98] = 0.0;
-    U[99] = 1.0;
-    const real t401 = t60 * t11;
-    const real t402 = t55 * t28;
-    const real t403 = t401 + t402;
-    const real t404 = Theta_O[0] * t63;
-    const real t405 = t403 + t404;
-    const real t406 = t0 * t203;
-    const real t407 = t405 - t406;
-    W[0] = t407;
-    const real t408 = t2 * t203;
-    const real t409 = Theta_O[0] * t71;
-    const real t410 = t11 * t64;
-    const real t411 = t60 * t28;
-    const real t412 = t410 + t411;
-    const real t413 = t409 - t412;
-    const real t414 = t408 + t413;
-    W[1] = t414;
-    const real t415 = t230 - t232;
-    const real t416 = t415 - t225;
-    const real t417 = Theta_O[0] * t193;
-    const real t418 = q_p[1] + t185;
-    const real t419 = t11 * t418;
-    const real t420 = q_p[0] + t189;
-    const real t421 = t28 * t420;
-    const real t422 = t419 + t421;
-    const real t423 = t417 - t422;
-    const real t424 = t416 + t423;
-    W[2] = t424;
-    const real t425 = Theta_O[0] - Theta_I[0];
-    W[3] = t425;
-    const real t426 = Theta_O[0] * t9;
-    const real t427 = t426 - t11;
-    W[4] = t427;
-    const real t428 = Theta_O[0] * t56;
-    const real t429 = t28 + t428;
-    W[5] = t429;
-    const real t430 = M_f[0] * t132;
-    const real t431 = K_f[0] - t430;
-    const real t432 = M_f[0] * A[0];
-    const real t433 = D_f[0] * C[0];
-    const real t434 = t432 + t433;
-    const real t435 = t431 + t434;
-    const real t436 = t28 * t211;
-    const real t437 = t207 * t11;
-    const real t438 = t436 - t437;
-    const real t439 = Theta_O[0] * t235;
-    const real t440 = t438 + t439;
-    const real t441 = t435 + t440;
-    W[6] = t441;
-    const real t442 = M_f[1] * t132;
-    const real t443 = K_f[1] - t442;
-    const real t444 = M_f[1] * A[0];
-    const real t445 = D_f[1] * C[0];
-    const real t446 = t444 + t445;
-    const real t447 = t443 + t446;
-    const real t448 = t28 * t253;
-    const real t449 = t249 * t11;
-    const real t450 = t448 - t449;
-    const real t451 = Theta_O[0] * t277;
-    const real t452 = t450 + t451;
-    const real t453 = t447 + t452;
-    W[7] = t453;
-    const real t454 = M_f[2] * t132;
-    const real t455 = K_f[2] - t454;
-    const real t456 = M_f[2] * A[0];
-    const real t457 = D_f[2] * C[0];
-    const real t458 = t456 + t457;
-    const real t459 = t455 + t458;
-    const real t460 = t28 * t295;
-    const real t461 = t291 * t11;
-    const real t462 = t460 - t461;
-    const real t463 = Theta_O[0] * t319;
-    const real t464 = t462 + t463;
-    const real t465 = t459 + t464;
-    W[8] = t465;
-    const real t466 = s[0] * t80;
-    const real t467 = M_f[2] * t160;
-    const real t468 = M_f[1] * t163;
-    const real t469 = M_f[0] * t166;
-    const real t470 = K_f[2] * eta_p[2];
-    const real t471 = K_f[1] * eta_p[1];
-    const real t472 = K_f[0] * eta_p[0];
-    const real t473 = S_c[0] * t136;
-    const real t474 = D_f[2] * t110;
-    const real t475 = D_f[0] * t114;
-    const real t476 = D_f[1] * t118;
-    const real t477 = t475 + t476;
-    const real t478 = t474 + t477;
-    const real t479 = t473 + t478;
-    const real t480 = t115 * t132;
-    const real t481 = t480 * 0.5;
-    const real t482 = t479 - t481;
-    const real t483 = t472 + t482;
-    const real t484 = t471 + t483;
-    const real t485 = t470 + t484;
-    const real t486 = t469 + t485;
-    const real t487 = t468 + t486;
-    const real t488 = t467 + t487;
-    const real t489 = t466 + t488;
-    const real t490 = t489 - f_eta[0];
-    const real t491 = r_p[0] * t406;
-    const real t492 = r_p[1] * t408;
-    const real t493 = t491 - t492;
-    const real t494 = theta_p[0] * t416;
-    const real t495 = t493 - t494;
-    const real t496 = eta_p[0] * t435;
-    const real t497 = t495 - t496;
-    const real t498 = eta_p[1] * t447;
-    const real t499 = t497 - t498;
-    const real t500 = eta_p[2] * t459;
-    const real t501 = t499 - t500;
-    const real t502 = t490 + t501;
-    const real t503 = theta_p[0] * q_p[1];
-    const real t504 = t371 + t503;
-    const real t505 = t11 * t504;
-    const real t506 = theta_p[0] * q_p[0];
-    const real t507 = t506 - t391;
-    const real t508 = t28 * t507;
-    const real t509 = t505 + t508;
-    const real t510 = Theta_O[0] * t395;
-    const real t511 = t509 - t510;
-    const real t512 = t502 + t511;
-    W[9] = t512;
-    const real t513 = t60 * t13;
-    const real t514 = t55 * t29;
-    const real t515 = t513 + t514;
-    const real t516 = Theta_O[1] * t63;
-    const real t517 = t515 + t516;
-    const real t518 = t0 * t245;
-    const real t519 = t517 - t518;
-    W[10] = t519;
-    const real t520 = t2 * t245;
-    const real t521 = Theta_O[1] * t71;
-    const real t522 = t13 * t64;
-    const real t523 = t60 * t29;
-    const real t524 = t522 + t523;
-    const real t525 = t521 - t524;
-    const real t526 = t520 + t525;
-    W[11] = t526;
-    const real t527 = t272 - t274;
-    const real t528 = t527 - t267;
-    const real t529 = Theta_O[1] * t193;
-    const real t530 = t13 * t418;
-    const real t531 = t29 * t420;
-    const real t532 = t530 + t531;
-    const real t533 = t529 - t532;
-    const real t534 = t528 + t533;
-    W[12] = t534;
-    const real t535 = Theta_O[1] - Theta_I[1];
-    W[13] = t535;
-    const real t536 = Theta_O[1] * t9;
-    const real t537 = t536 - t13;
-    W[14] = t537;
-    const real t538 = Theta_O[1] * t56;
-    const real t539 = t29 + t538;
-    W[15] = t539;
-    const real t540 = t29 * t211;
-    const real t541 = t207 * t13;
-    const real t542 = t540 - t541;
-    const real t543 = Theta_O[1] * t235;
-    const real t544 = t542 + t543;
-    const real t545 = t447 + t544;
-    W[16] = t545;
-    const real t546 = M_f[3] * t132;
-    const real t547 = K_f[3] - t546;
-    const real t548 = M_f[3] * A[0];
-    const real t549 = D_f[3] * C[0];
-    const real t550 = t548 + t549;
-    const real t551 = t547 + t550;
-    const real t552 = t29 * t253;
-    const real t553 = t249 * t13;
-    const real t554 = t552 - t553;
-    const real t555 = Theta_O[1] * t277;
-    const real t556 = t554 + t555;
-    const real t557 = t551 + t556;
-    W[17] = t557;
-    const real t558 = M_f[4] * t132;
-    const real t559 = K_f[4] - t558;
-    const real t560 = M_f[4] * A[0];
-    const real t561 = D_f[4] * C[0];
-    const real t562 = t560 + t561;
-    const real t563 = t559 + t562;
-    const real t564 = t29 * t295;
-    const real t565 = t291 * t13;
-    const real t566 = t564 - t565;
-    const real t567 = Theta_O[1] * t319;
-    const real t568 = t566 + t567;
-    const real t569 = t563 + t568;
-    W[18] = t569;
-    const real t570 = s[1] * t80;
-    const real t571 = M_f[4] * t160;
-    const real t572 = M_f[3] * t163;
-    const real t573 = M_f[1] * t166;
-    const real t574 = K_f[4] * eta_p[2];
-    const real t575 = K_f[3] * eta_p[1];
-    const real t576 = K_f[1] * eta_p[0];
-    const real t577 = S_c[1] * t136;
-    const real t578 = D_f[4] * t110;
-    const real t579 = D_f[1] * t114;
-    const real t580 = D_f[3] * t118;
-    const real t581 = t579 + t580;
-    const real t582 = t578 + t581;
-    const real t583 = t577 + t582;
-    const real t584 = t119 * t132;
-    const real t585 = 0.5 * t584;
-    const real t586 = t583 - t585;
-    const real t587 = t576 + t586;
-    const real t588 = t575 + t587;
-    const real t589 = t574 + t588;
-    const real t590 = t573 + t589;
-    const real t591 = t572 + t590;
-    const real t592 = t571 + t591;
-    const real t593 = t570 + t592;
-    const real t594 = t593 - f_eta[1];
-    const real t595 = r_p[0] * t518;
-    const real t596 = r_p[1] * t520;
-    const real t597 = t595 - t596;
-    const real t598 = theta_p[0] * t528;
-    const real t599 = t597 - t598;
-    const real t600 = eta_p[0] * t447;
-    const real t601 = t599 - t600;
-    const real t602 = eta_p[1] * t551;
-    const real t603 = t601 - t602;
-    const real t604 = eta_p[2] * t563;
-    const real t605 = t603 - t604;
-    const real t606 = t594 + t605;
-    const real t607 = t13 * t504;
-    const real t608 = t29 * t507;
-    const real t609 = t607 + t608;
-    const real t610 = Theta_O[1] * t395;
-    const real t611 = t609 - t610;
-    const real t612 = t606 + t611;
-    W[19] = t612;
-    const real t613 = t60 * t15;
-    const real t614 = t55 * t30;
-    const real t615 = t613 + t614;
-    const real t616 = Theta_O[2] * t63;
-    const real t617 = t615 + t616;
-    const real t618 = t0 * t287;
-    const real t619 = t617 - t618;
-    W[20] = t619;
-    const real t620 = t2 * t287;
-    const real t621 = Theta_O[2] * t71;
-    const real t622 = t15 * t64;
-    const real t623 = t60 * t30;
-    const real t624 = t622 + t623;
-    const real t625 = t621 - t624;
-    const real t626 = t620 + t625;
-    W[21] = t626;
-    const real t627 = t314 - t316;
-    const real t628 = t627 - t309;
-    const real t629 = Theta_O[2] * t193;
-    const real t630 = t15 * t418;
-    const real t631 = t30 * t420;
-    const real t632 = t630 + t631;
-    const real t633 = t629 - t632;
-    const real t634 = t628 + t633;
-    W[22] = t634;
-    const real t635 = Theta_O[2] - Theta_I[2];
-    W[23] = t635;
-    const real t636 = Theta_O[2] * t9;
-    const real t637 = t636 - t15;
-    W[24] = t637;
-    const real t638 = Theta_O[2] * t56;
-    const real t639 = t30 + t638;
-    W[25] = t639;
-    const real t640 = t30 * t211;
-    const real t641 = t207 * t15;
-    const real t642 = t640 - t641;
-    const real t643 = Theta_O[2] * t235;
-    const real t644 = t642 + t643;
-    const real t645 = t459 + t644;
-    W[26] = t645;
-    const real t646 = t30 * t253;
-    const real t647 = t249 * t15;
-    const real t648 = t646 - t647;
-    const real t649 = Theta_O[2] * t277;
-    const real t650 = t648 + t649;
-    const real t651 = t563 + t650;
-    W[27] = t651;
-    const real t652 = M_f[5] * t132;
-    const real t653 = K_f[5] - t652;
-    const real t654 = M_f[5] * A[0];
-    const real t655 = D_f[5] * C[0];
-    const real t656 = t654 + t655;
-    const real t657 = t653 + t656;
-    const real t658 = t30 * t295;
-    const real t659 = t291 * t15;
-    const real t660 = t658 - t659;
-    const real t661 = Theta_O[2] * t319;
-    const real t662 = t660 + t661;
-    const real t663 = t657 + t662;
-    W[28] = t663;
-    const real t664 = s[2] * t80;
-    const real t665 = M_f[5] * t160;
-    const real t666 = M_f[4] * t163;
-    const real t667 = M_f[2] * t166;
-    const real t668 = K_f[5] * eta_p[2];
-    const real t669 = K_f[4] * eta_p[1];
-    const real t670 = K_f[2] * eta_p[0];
-    const real t671 = S_c[2] * t136;
-    const real t672 = D_f[5] * t110;
-    const real t673 = D_f[2] * t114;
-    const real t674 = D_f[4] * t118;
-    const real t675 = t673 + t674;
-    const real t676 = t672 + t675;
-    const real t677 = t671 + t676;
-    const real t678 = t111 * t132;
-    const real t679 = 0.5 * t678;
-    const real t680 = t677 - t679;
-    const real t681 = t670 + t680;
-    const real t682 = t669 + t681;
-    const real t683 = t668 + t682;
-    const real t684 = t667 + t683;
-    const real t685 = t666 + t684;
-    const real t686 = t665 + t685;
-    const real t687 = t664 + t686;
-    const real t688 = t687 - f_eta[2];
-    const real t689 = r_p[0] * t618;
-    const real t690 = r_p[1] * t620;
-    const real t691 = t689 - t690;
-    const real t692 = theta_p[0] * t628;
-    const real t693 = t691 - t692;
-    const real t694 = eta_p[0] * t459;
-    const real t695 = t693 - t694;
-    const real t696 = eta_p[1] * t563;
-    const real t697 = t695 - t696;
-    const real t698 = eta_p[2] * t657;
-    const real t699 = t697 - t698;
-    const real t700 = t688 + t699;
-    const real t701 = t15 * t504;
-    const real t702 = t30 * t507;
-    const real t703 = t701 + t702;
-    const real t704 = Theta_O[2] * t395;
-    const real t705 = t703 - t704;
-    const real t706 = t700 + t705;
-    W[29] = t706;
-    return 0;
+  U[0] = 1.0;
+  U[1] = 0.0;
+  real t0 = sin(theta_p[0]);
+  real t2 = cos(theta_p[0]);
+  real t7 = phi_O[0] * eta_p[0] + phi_O[1] * eta_p[1] + phi_O[2] * eta_p[2];
+  real t9 = L[0] * t0 + t2 * t7;
+  U[2] = -t9;
+  U[3] = U[4] = U[5] = 0.0;
+  real t11 = phi_O[0] * t0;
+  U[6] = -t11;
+  real t13 = phi_O[1] * t0;
+  U[7] = -t13;
+  real t15 = phi_O[2] * t0;
+  U[8] = -t15;
+  real t17 = L[0] * t2;
+  real t18 = t0 * t7;
+  real t19 = t17 - t18;
+  real t26 = eta_p[0] * t11 + eta_p[1] * t13 + eta_p[2] * t15 + theta_p[0] * t9;
+  U[9] = t19 + t26;
+  U[10] = 0.0;
+  U[11] = 1.0;
+  U[12] = t19;
+  U[13] = U[14] = U[15] = 0.0;
+  real t28 = phi_O[0] * t2;
+  U[16] = t28;
+  real t29 = phi_O[1] * t2;
+  U[17] = t29;
+  real t30 = phi_O[2] * t2;
+  U[18] = t30;
+  real t37 = eta_p[0] * t28 + eta_p[1] * t29 + eta_p[2] * t30 + theta_p[0] * t19;
+  U[19] = t9 - t37;
+  U[20] = U[21] = 0.0;
+  U[22] = 1.0;
+  U[23] = U[24] = U[25] = U[26] = U[27] = U[28] = U[29] = 0.0;
+  real t44 = S_0[1] + (s[2] * eta_p[2] + (s[0] * eta_p[0] + s[1] * eta_p[1]));
+  real t45 = A[0] * t44;
+  real t47 = S_0[0] * A[0];
+  real t49 = t2 * t45 + t0 * t47;
+  real t50 = m[0] * A[0];
+  real t51 = t2 * t50;
+  real t52 = t0 * t51;
+  real t53 = t0 * t50;
+  real t54 = t2 * t53;
+  real t55 = t52 - t54;
+  real t56 = t18 - t17;
+  real t60 = t2 * t51 + t0 * t53;
+  real t63 = t49 + (t55 * t56 - t60 * t9);
+  U[30] = t63;
+  real t64 = t54 - t52;
+  real t68 = t0 * t45;
+  real t69 = t2 * t47;
+  real t71 = t9 * t64 - t60 * t56 + (t68 - t69);
+  U[31] = t71;
+  real t74 = B_r[1] + (A[0] * r_p[1] - g[1]);
+  real t78 = B_r[0] + (A[0] * r_p[0] - g[0]);
+  real t80 = t2 * t74 - t0 * t78;
+  real t84 = t2 * t78 + t0 * t74;
+  real t86 = t80 * t44 + S_0[0] * t84;
+  real t91 = M_f[5] * eta_p[2] + (M_f[2] * eta_p[0] + M_f[4] * eta_p[1]);
+  real t97 = M_f[2] * eta_p[2] + (M_f[0] * eta_p[0] + M_f[1] * eta_p[1]);
+  real t103 = M_f[4] * eta_p[2] + (M_f[1] * eta_p[0] + M_f[3] * eta_p[1]);
+  real t107 = I_0[0] + (eta_p[2] * t91 + (eta_p[0] * t97 + eta_p[1] * t103));
+  real t110 = D_eta[2] + C[0] * eta_p[2];
+  real t111 = t91 * 2.0;
+  real t112 = t110 * t111;
+  real t114 = D_eta[0] + C[0] * eta_p[0];
+  real t115 = t97 * 2.0;
+  real t116 = t114 * t115;
+  real t118 = D_eta[1] + C[0] * eta_p[1];
+  real t119 = t103 * 2.0;
+  real t120 = t118 * t119;
+  real t124 = A[0] * t107 + C[0] * (t112 + (t116 + t120));
+  real t129 = m[0] * t84;
+  real t131 = D_theta[0] + C[0] * theta_p[0];
+  real t132 = t131 * t131;
+  real t136 = B_theta[0] + A[0] * theta_p[0];
+  real t139 = s[0] * t114;
+  real t143 = s[1] * t118;
+  real t147 = s[2] * t110;
+  real t150 = t129 - S_0[0] * t132 - t136 * t44 - 2.0 * (t131 * t139) - 2.0 * (t131 * t143) - 2.0 *
+    (t131 * t147);
+  real t156 = t150 - t129 + (t47 - C[0] * (2.0 * (t131 * t44)));
+  real t157 = t0 * t156;
+  real t158 = m[0] * t80;
+  real t160 = B_eta[2] + A[0] * eta_p[2];
+  real t163 = B_eta[1] + A[0] * eta_p[1];
+  real t166 = B_eta[0] + A[0] * eta_p[0];
+  real t174 = s[2] * t160 + (s[1] * t163 + (s[0] * t166 + (t158 + S_0[0] * t136 - t44 * t132)));
+  real t183 = t158 - t174 - (t45 + C[0] * (2.0 * (t147 + (t143 + (t139 + S_0[0] * t131)))));
+  real t184 = t2 * t183;
+  real t185 = t157 - t184;
+  real t189 = t0 * t183 + t2 * t156;
+  real t193 = t86 - t124 + (q_p[1] * t9 + q_p[0] * t19 + (t9 * t185 - t189 * t56));
+  U[32] = t193;
+  U[33] = 1.0;
+  U[34] = t9;
+  U[35] = t56;
+  real t201 = s[0] * t136 + C[0] * (2.0 * (s[0] * t131));
+  real t203 = s[0] * A[0];
+  real t205 = t203 - s[0] * t132;
+  real t207 = t2 * t201 + t0 * t205;
+  real t209 = t0 * t201;
+  real t210 = t2 * t205;
+  real t211 = t209 - t210;
+  real t225 = s[0] * t84;
+  real t230 = S_c[0] * A[0];
+  real t232 = C[0] * (t131 * t115);
+  real t234 = 2.0 * (t131 * (M_f[2] * t110)) + (2.0 * (t131 * (M_f[1] * t118)) + (2.0 * (t131 *
+    (M_f[0] * t114)) + (t136 * t115 - t225))) + (t230 + t232);
+  real t235 = q_p[1] * t11 + q_p[0] * t28 + (t207 * t9 + t211 * t56) - t234;
+  U[36] = t235;
+  real t243 = s[1] * t136 + C[0] * (2.0 * (s[1] * t131));
+  real t245 = s[1] * A[0];
+  real t247 = t245 - s[1] * t132;
+  real t249 = t2 * t243 + t0 * t247;
+  real t251 = t0 * t243;
+  real t252 = t2 * t247;
+  real t253 = t251 - t252;
+  real t267 = s[1] * t84;
+  real t272 = S_c[1] * A[0];
+  real t274 = C[0] * (t131 * t119);
+  real t276 = 2.0 * (t131 * (M_f[4] * t110)) + (2.0 * (t131 * (M_f[3] * t118)) + (2.0 * (t131 *
+    (M_f[1] * t114)) + (t136 * t119 - t267))) + (t272 + t274);
+  real t277 = q_p[1] * t13 + q_p[0] * t29 + (t249 * t9 + t253 * t56) - t276;
+  U[37] = t277;
+  real t285 = s[2] * t136 + C[0] * (2.0 * (s[2] * t131));
+  real t287 = s[2] * A[0];
+  real t289 = t287 - s[2] * t132;
+  real t291 = t2 * t285 + t0 * t289;
+  real t293 = t0 * t285;
+  real t294 = t2 * t289;
+  real t295 = t293 - t294;
+  real t309 = s[2] * t84;
+  real t314 = S_c[2] * A[0];
+  real t316 = C[0] * (t131 * t111);
+  real t318 = 2.0 * (t131 * (M_f[5] * t110)) + (2.0 * (t131 * (M_f[4] * t118)) + (2.0 * (t131 *
+    (M_f[2] * t114)) + (t136 * t111 - t309))) + (t314 + t316);
+  real t319 = q_p[1] * t15 + q_p[0] * t30 + (t291 * t9 + t295 * t56) - t318;
+  U[38] = t319;
+  real t371 = t2 * t150 - t0 * t174 - f_r[0] + (eta_p[0] * t207 - (r_p[0] * t60 + r_p[1] * t55 +
+    theta_p[0] * (t184 - t157)) + eta_p[1] * t249 + eta_p[2] * t291);
+  real t391 = t0 * t150 + t2 * t174 - f_r[1] + (r_p[0] * t55 - r_p[1] * t60 - theta_p[0] * t189 -
+    eta_p[0] * (t210 - t209) - eta_p[1] * (t252 - t251) - eta_p[2] * (t294 - t293));
+  real t395 = t131 * t112 + (t131 * t120 + (t131 * t116 + (S_0[0] * t80 + (t136 * t107 + (S_c[2] *
+    t160 + (S_c[0] * t166 + S_c[1] * t163)) - t84 * t44)))) - f_m[0] + (r_p[0] * t49 - r_p[1] * (t69
+    - t68) - theta_p[0] * (t124 - t86) - eta_p[0] * t234 - eta_p[1] * t276 - eta_p[2] * t318) +
+    (q_p[1] * t26 + q_p[0] * t37 + (t371 * t9 + t391 * t56));
+  U[39] = -t395;
+  real t397 = -t60;
+  U[40] = t397;
+  U[41] = t64;
+  U[42] = t185;
+  U[43] = 0.0;
+  U[44] = 1.0;
+  U[45] = 0.0;
+  U[46] = t207;
+  U[47] = t249;
+  U[48] = t291;
+  U[49] = -t371;
+  U[50] = t55;
+  U[51] = t397;
+  U[52] = -t189;
+  U[53] = U[54] = 0.0;
+  U[55] = 1.0;
+  U[56] = t211;
+  U[57] = t253;
+  U[58] = t295;
+  U[59] = -t391;
+  U[60] = U[61] = U[62] = U[63] = U[64] = U[65] = 0.0;
+  U[66] = 1.0;
+  U[67] = U[68] = U[69] = U[70] = U[71] = U[72] = U[73] = U[74] = U[75] = U[76] = 0.0;
+  U[77] = 1.0;
+  U[78] = U[79] = U[80] = U[81] = U[82] = U[83] = U[84] = U[85] = U[86] = U[87] = 0.0;
+  U[88] = 1.0;
+  U[89] = U[90] = U[91] = U[92] = U[93] = U[94] = U[95] = U[96] = U[97] = U[98] = 0.0;
+  U[99] = 1.0;
+  real t406 = t0 * t203;
+  W[0] = t60 * t11 + t55 * t28 + Theta_O[0] * t63 - t406;
+  real t408 = t2 * t203;
+  W[1] = t408 + (Theta_O[0] * t71 - (t11 * t64 + t60 * t28));
+  real t416 = t230 - t232 - t225;
+  real t418 = q_p[1] + t185;
+  real t420 = q_p[0] + t189;
+  W[2] = t416 + (Theta_O[0] * t193 - (t11 * t418 + t28 * t420));
+  W[3] = Theta_O[0] - Theta_I[0];
+  W[4] = Theta_O[0] * t9 - t11;
+  W[5] = t28 + Theta_O[0] * t56;
+  real t435 = K_f[0] - M_f[0] * t132 + (M_f[0] * A[0] + D_f[0] * C[0]);
+  W[6] = t435 + (t28 * t211 - t207 * t11 + Theta_O[0] * t235);
+  real t447 = K_f[1] - M_f[1] * t132 + (M_f[1] * A[0] + D_f[1] * C[0]);
+  W[7] = t447 + (t28 * t253 - t249 * t11 + Theta_O[0] * t277);
+  real t459 = K_f[2] - M_f[2] * t132 + (M_f[2] * A[0] + D_f[2] * C[0]);
+  W[8] = t459 + (t28 * t295 - t291 * t11 + Theta_O[0] * t319);
+  real t504 = t371 + theta_p[0] * q_p[1];
+  real t507 = theta_p[0] * q_p[0] - t391;
+  W[9] = s[0] * t80 + (M_f[2] * t160 + (M_f[1] * t163 + (M_f[0] * t166 + (K_f[2] * eta_p[2] +
+    (K_f[1] * eta_p[1] + (K_f[0] * eta_p[0] + (S_c[0] * t136 + (D_f[2] * t110 + (D_f[0] * t114 +
+    D_f[1] * t118)) - t115 * t132 * 0.5))))))) - f_eta[0] + (r_p[0] * t406 - r_p[1] * t408 -
+    theta_p[0] * t416 - eta_p[0] * t435 - eta_p[1] * t447 - eta_p[2] * t459) + (t11 * t504 + t28 *
+    t507 - Theta_O[0] * t395);
+  real t518 = t0 * t245;
+  W[10] = t60 * t13 + t55 * t29 + Theta_O[1] * t63 - t518;
+  real t520 = t2 * t245;
+  W[11] = t520 + (Theta_O[1] * t71 - (t13 * t64 + t60 * t29));
+  real t528 = t272 - t274 - t267;
+  W[12] = t528 + (Theta_O[1] * t193 - (t13 * t418 + t29 * t420));
+  W[13] = Theta_O[1] - Theta_I[1];
+  W[14] = Theta_O[1] * t9 - t13;
+  W[15] = t29 + Theta_O[1] * t56;
+  W[16] = t447 + (t29 * t211 - t207 * t13 + Theta_O[1] * t235);
+  real t551 = K_f[3] - M_f[3] * t132 + (M_f[3] * A[0] + D_f[3] * C[0]);
+  W[17] = t551 + (t29 * t253 - t249 * t13 + Theta_O[1] * t277);
+  real t563 = K_f[4] - M_f[4] * t132 + (M_f[4] * A[0] + D_f[4] * C[0]);
+  W[18] = t563 + (t29 * t295 - t291 * t13 + Theta_O[1] * t319);
+  W[19] = s[1] * t80 + (M_f[4] * t160 + (M_f[3] * t163 + (M_f[1] * t166 + (K_f[4] * eta_p[2] +
+    (K_f[3] * eta_p[1] + (K_f[1] * eta_p[0] + (S_c[1] * t136 + (D_f[4] * t110 + (D_f[1] * t114 +
+    D_f[3] * t118)) - 0.5 * (t119 * t132)))))))) - f_eta[1] + (r_p[0] * t518 - r_p[1] * t520 -
+    theta_p[0] * t528 - eta_p[0] * t447 - eta_p[1] * t551 - eta_p[2] * t563) + (t13 * t504 + t29 *
+    t507 - Theta_O[1] * t395);
+  real t618 = t0 * t287;
+  W[20] = t60 * t15 + t55 * t30 + Theta_O[2] * t63 - t618;
+  real t620 = t2 * t287;
+  W[21] = t620 + (Theta_O[2] * t71 - (t15 * t64 + t60 * t30));
+  real t628 = t314 - t316 - t309;
+  W[22] = t628 + (Theta_O[2] * t193 - (t15 * t418 + t30 * t420));
+  W[23] = Theta_O[2] - Theta_I[2];
+  W[24] = Theta_O[2] * t9 - t15;
+  W[25] = t30 + Theta_O[2] * t56;
+  W[26] = t459 + (t30 * t211 - t207 * t15 + Theta_O[2] * t235);
+  W[27] = t563 + (t30 * t253 - t249 * t15 + Theta_O[2] * t277);
+  real t657 = K_f[5] - M_f[5] * t132 + (M_f[5] * A[0] + D_f[5] * C[0]);
+  W[28] = t657 + (t30 * t295 - t291 * t15 + Theta_O[2] * t319);
+  W[29] = s[2] * t80 + (M_f[5] * t160 + (M_f[4] * t163 + (M_f[2] * t166 + (K_f[5] * eta_p[2] +
+    (K_f[4] * eta_p[1] + (K_f[2] * eta_p[0] + (S_c[2] * t136 + (D_f[5] * t110 + (D_f[2] * t114 +
+    D_f[4] * t118)) - 0.5 * (t111 * t132)))))))) - f_eta[2] + (r_p[0] * t618 - r_p[1] * t620 -
+    theta_p[0] * t628 - eta_p[0] * t459 - eta_p[1] * t563 - eta_p[2] * t657) + (t15 * t504 + t30 *
+    t507 - Theta_O[2] * t395);
+  return 0;
 }
 
-static int mstmm_classical_beam_planar_discrete_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_beam_planar_discrete_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_classical_beam_planar_discrete_transfer_inputs[] = {
-    {"m", 1, "kg", 0, 0},
-    {"S_0", 2, "kg*m", 0, 0},
-    {"I_0", 1, "kg*m2", 0, 0},
-    {"s", 3, "kg", 0, 0},
-    {"S_c", 3, "kg*m", 0, 0},
-    {"M_f", 6, "kg", 0, 0},
-    {"K_f", 6, "N/m", 0, 0},
-    {"D_f", 6, "N*s/m", 0, 0},
-    {"L", 1, "m", 0, 0},
-    {"phi_O", 3, "1", 0, 0},
-    {"Theta_O", 3, "1/m", 0, 0},
-    {"Theta_I", 3, "1/m", 0, 0},
-    {"A", 1, "1/s2", 0, 0},
-    {"C", 1, "1/s", 0, 0},
-    {"B_r", 2, "m/s2", 0, 0},
-    {"B_theta", 1, "rad/s2", 0, 0},
-    {"D_theta", 1, "rad/s", 0, 0},
-    {"B_eta", 3, "m/s2", 0, 0},
-    {"D_eta", 3, "m/s", 0, 0},
-    {"r_p", 2, "m", 0, 0},
-    {"theta_p", 1, "rad", 0, 0},
-    {"eta_p", 3, "m", 0, 0},
-    {"q_p", 2, "N", 0, 0},
-    {"g", 2, "m/s2", 0, 0},
-    {"f_r", 2, "N", 0, 0},
-    {"f_m", 1, "N*m", 0, 0},
-    {"f_eta", 3, "N", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_beam_planar_discrete_transfer_outputs[] = {
-    {"U", 100, "[m, rad, N*m, N, m, 1]", 0, 0},
-    {"W", 30, "N", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_beam_planar_discrete_transfer, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17],
+  in[18], in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], out[0], out[1]))
 
 static const mstmm_kernel mstmm_classical_beam_planar_discrete_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_beam_planar_discrete_transfer,
-        .call = mstmm_classical_beam_planar_discrete_transfer_call,
-        .n_inputs = 27,
-        .n_outputs = 2,
-        .inputs = mstmm_classical_beam_planar_discrete_transfer_inputs,
-        .outputs = mstmm_classical_beam_planar_discrete_transfer_outputs,
-        .ir_hash = "492776652625551c1a3129603a2cbd891d47e4ab8f8ee1c244e2e4fcd6caf374",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_beam_planar_discrete_transfer), 27, 2, (const
+    mstmm_port[]){{"m", 1, "kg", 0, 0}, {"S_0", 2, "kg*m", 0, 0}, {"I_0", 1, "kg*m2", 0, 0}, {"s",
+    3, "kg", 0, 0}, {"S_c", 3, "kg*m", 0, 0}, {"M_f", 6, "kg", 0, 0}, {"K_f", 6, "N/m", 0, 0},
+    {"D_f", 6, "N*s/m", 0, 0}, {"L", 1, "m", 0, 0}, {"phi_O", 3, "1", 0, 0}, {"Theta_O", 3, "1/m",
+    0, 0}, {"Theta_I", 3, "1/m", 0, 0}, {"A", 1, "1/s2", 0, 0}, {"C", 1, "1/s", 0, 0}, {"B_r", 2,
+    "m/s2", 0, 0}, {"B_theta", 1, "rad/s2", 0, 0}, {"D_theta", 1, "rad/s", 0, 0}, {"B_eta", 3,
+    "m/s2", 0, 0}, {"D_eta", 3, "m/s", 0, 0}, {"r_p", 2, "m", 0, 0}, {"theta_p", 1, "rad", 0, 0},
+    {"eta_p", 3, "m", 0, 0}, {"q_p", 2, "N", 0, 0}, {"g", 2, "m/s2", 0, 0}, {"f_r", 2, "N", 0, 0},
+    {"f_m", 1, "N*m", 0, 0}, {"f_eta", 3, "N", 0, 0}}, (const mstmm_port[]){{"U", 100,
+    "[m, rad, N*m, N, m, 1]", 0, 0}, {"W", 30, "N", 0, 0}},
+    "d8d79bd523eaeaa9fee5a6fd1bf68181d6b2802c44bc9989f47bc855be3a68d7", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_beam_planar_discrete = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "beam_planar_discrete",
-    .hash = "4fd9b0521fcea60158958d9351d61161ade93fcca7970677d1718f731c012d6a",
+    .hash = "9814de38fc26152b068d2af49a0af342a75182ef21e869acb63d99c1f04134d2",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,16 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_body_planar_discrete;
-int mstmm_classical_body_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict I_0, const real *restrict r_e, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
-    const real *restrict D_theta, const real *restrict r_p, const real *restrict theta_p,
-    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
-    const real *restrict f_m, real *restrict U);
-
 /* planar rigid body, discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, ch. 7 with (8.63), (8.65)
  * in  m[1] (kg) mass
  * in  S_0[2] (kg*m) first moments at rest, frame axes
  * in  I_0[1] (kg*m2) moment of inertia at rest about the input end
@@ -35,258 +26,114 @@ int mstmm_classical_body_planar_discrete_transfer(const real *restrict m, const 
  * in  f_m[1] (N*m) external moment about the input end
  * out U[7][7] ([m, rad, N*m, N, 1]) matrix, z_O = U z_I
  */
-int mstmm_classical_body_planar_discrete_transfer(const real *restrict m, const real *restrict S_0,
-    const real *restrict I_0, const real *restrict r_e, const real *restrict A,
-    const real *restrict C, const real *restrict B_r, const real *restrict B_theta,
-    const real *restrict D_theta, const real *restrict r_p, const real *restrict theta_p,
-    const real *restrict q_p, const real *restrict g, const real *restrict f_r,
-    const real *restrict f_m, real *restrict U)
+int mstmm_classical_body_planar_discrete_transfer(in_t m, in_t S_0, in_t I_0, in_t r_e, in_t A,
+    in_t C, in_t B_r, in_t B_theta, in_t D_theta, in_t r_p, in_t theta_p, in_t q_p, in_t g,
+    in_t f_r, in_t f_m, out_t U)
 {
-    U[0] = 1.0;
-    U[1] = 0.0;
-    const real t0 = sin(theta_p[0]);
-    const real t1 = r_e[0] * t0;
-    const real t2 = cos(theta_p[0]);
-    const real t3 = r_e[1] * t2;
-    const real t4 = t1 + t3;
-    const real t5 = -t4;
-    U[2] = t5;
-    U[3] = 0.0;
-    U[4] = 0.0;
-    U[5] = 0.0;
-    const real t6 = r_e[0] * t2;
-    const real t7 = r_e[1] * t0;
-    const real t8 = t6 - t7;
-    const real t9 = theta_p[0] * t4;
-    const real t10 = t8 + t9;
-    U[6] = t10;
-    U[7] = 0.0;
-    U[8] = 1.0;
-    U[9] = t8;
-    U[10] = 0.0;
-    U[11] = 0.0;
-    U[12] = 0.0;
-    const real t11 = theta_p[0] * t8;
-    const real t12 = t4 - t11;
-    U[13] = t12;
-    U[14] = 0.0;
-    U[15] = 0.0;
-    U[16] = 1.0;
-    U[17] = 0.0;
-    U[18] = 0.0;
-    U[19] = 0.0;
-    U[20] = 0.0;
-    const real t13 = S_0[1] * A[0];
-    const real t14 = t2 * t13;
-    const real t15 = S_0[0] * A[0];
-    const real t16 = t0 * t15;
-    const real t17 = t14 + t16;
-    const real t18 = m[0] * A[0];
-    const real t19 = t2 * t18;
-    const real t20 = t0 * t19;
-    const real t21 = t0 * t18;
-    const real t22 = t2 * t21;
-    const real t23 = t20 - t22;
-    const real t24 = t7 - t6;
-    const real t25 = t23 * t24;
-    const real t26 = t2 * t19;
-    const real t27 = t0 * t21;
-    const real t28 = t26 + t27;
-    const real t29 = t28 * t4;
-    const real t30 = t25 - t29;
-    const real t31 = t17 + t30;
-    U[21] = t31;
-    const real t32 = t22 - t20;
-    const real t33 = t4 * t32;
-    const real t34 = t28 * t24;
-    const real t35 = t33 - t34;
-    const real t36 = t0 * t13;
-    const real t37 = t2 * t15;
-    const real t38 = t36 - t37;
-    const real t39 = t35 + t38;
-    U[22] = t39;
-    const real t40 = A[0] * r_p[1];
-    const real t41 = t40 - g[1];
-    const real t42 = B_r[1] + t41;
-    const real t43 = t2 * t42;
-    const real t44 = A[0] * r_p[0];
-    const real t45 = t44 - g[0];
-    const real t46 = B_r[0] + t45;
-    const real t47 = t0 * t46;
-    const real t48 = t43 - t47;
-    const real t49 = S_0[1] * t48;
-    const real t50 = t2 * t46;
-    const real t51 = t0 * t42;
-    const real t52 = t50 + t51;
-    const real t53 = S_0[0] * t52;
-    const real t54 = t49 + t53;
-    const real t55 = I_0[0] * A[0];
-    const real t56 = t54 - t55;
-    const real t57 = q_p[1] * t4;
-    const real t58 = q_p[0] * t8;
-    const real t59 = t57 + t58;
-    const real t60 = m[0] * t52;
-    const real t61 = C[0] * theta_p[0];
-    const real t62 = D_theta[0] + t61;
-    const real t63 = t62 * t62;
-    const real t64 = S_0[0] * t63;
-    const real t65 = t60 - t64;
-    const real t66 = A[0] * theta_p[0];
-    const real t67 = B_theta[0] + t66;
-    const real t68 = S_0[1] * t67;
-    const real t69 = t65 - t68;
-    const real t70 = t69 - t60;
-    const real t71 = S_0[1] * t62;
-    const real t72 = 2.0 * t71;
-    const real t73 = C[0] * t72;
-    const real t74 = t15 - t73;
-    const real t75 = t70 + t74;
-    const real t76 = t0 * t75;
-    const real t77 = m[0] * t48;
-    const real t78 = S_0[1] * t63;
-    const real t79 = S_0[0] * t67;
-    const real t80 = t77 + t79;
-    const real t81 = t78 - t80;
-    const real t82 = t77 + t81;
-    const real t83 = S_0[0] * t62;
-    const real t84 = 2.0 * t83;
-    const real t85 = C[0] * t84;
-    const real t86 = t13 + t85;
-    const real t87 = t82 - t86;
-    const real t88 = t2 * t87;
-    const real t89 = t76 - t88;
-    const real t90 = t4 * t89;
-    const real t91 = t0 * t87;
-    const real t92 = t2 * t75;
-    const real t93 = t91 + t92;
-    const real t94 = t93 * t24;
-    const real t95 = t90 - t94;
-    const real t96 = t59 + t95;
-    const real t97 = t56 + t96;
-    U[23] = t97;
-    U[24] = 1.0;
-    U[25] = t4;
-    U[26] = t24;
-    const real t98 = r_p[0] * t28;
-    const real t99 = r_p[1] * t23;
-    const real t100 = t98 + t99;
-    const real t101 = t88 - t76;
-    const real t102 = theta_p[0] * t101;
-    const real t103 = t100 + t102;
-    const real t104 = t2 * t69;
-    const real t105 = t80 - t78;
-    const real t106 = t0 * t105;
-    const real t107 = t104 - t106;
-    const real t108 = t107 - f_r[0];
-    const real t109 = t103 - t108;
-    const real t110 = t4 * t109;
-    const real t111 = t0 * t69;
-    const real t112 = t2 * t105;
-    const real t113 = t111 + t112;
-    const real t114 = t113 - f_r[1];
-    const real t115 = r_p[0] * t23;
-    const real t116 = r_p[1] * t28;
-    const real t117 = t115 - t116;
-    const real t118 = theta_p[0] * t93;
-    const real t119 = t117 - t118;
-    const real t120 = t114 + t119;
-    const real t121 = t120 * t24;
-    const real t122 = t110 - t121;
-    const real t123 = q_p[1] * t9;
-    const real t124 = q_p[0] * t11;
-    const real t125 = t123 + t124;
-    const real t126 = t122 - t125;
-    const real t127 = S_0[0] * t48;
-    const real t128 = I_0[0] * t67;
-    const real t129 = S_0[1] * t52;
-    const real t130 = t128 - t129;
-    const real t131 = t127 + t130;
-    const real t132 = t131 - f_m[0];
-    const real t133 = r_p[0] * t17;
-    const real t134 = t37 - t36;
-    const real t135 = r_p[1] * t134;
-    const real t136 = t133 - t135;
-    const real t137 = t55 - t54;
-    const real t138 = theta_p[0] * t137;
-    const real t139 = t136 - t138;
-    const real t140 = t132 + t139;
-    const real t141 = t126 - t140;
-    U[27] = t141;
-    const real t142 = -t28;
-    U[28] = t142;
-    U[29] = t32;
-    U[30] = t89;
-    U[31] = 0.0;
-    U[32] = 1.0;
-    U[33] = 0.0;
-    U[34] = t109;
-    U[35] = t23;
-    U[36] = t142;
-    const real t143 = -t93;
-    U[37] = t143;
-    U[38] = 0.0;
-    U[39] = 0.0;
-    U[40] = 1.0;
-    const real t144 = -t120;
-    U[41] = t144;
-    U[42] = 0.0;
-    U[43] = 0.0;
-    U[44] = 0.0;
-    U[45] = 0.0;
-    U[46] = 0.0;
-    U[47] = 0.0;
-    U[48] = 1.0;
-    return 0;
+  U[0] = 1.0;
+  U[1] = 0.0;
+  real t0 = sin(theta_p[0]);
+  real t2 = cos(theta_p[0]);
+  real t4 = r_e[0] * t0 + r_e[1] * t2;
+  U[2] = -t4;
+  U[3] = U[4] = U[5] = 0.0;
+  real t6 = r_e[0] * t2;
+  real t7 = r_e[1] * t0;
+  real t8 = t6 - t7;
+  real t9 = theta_p[0] * t4;
+  U[6] = t8 + t9;
+  U[7] = 0.0;
+  U[8] = 1.0;
+  U[9] = t8;
+  U[10] = U[11] = U[12] = 0.0;
+  real t11 = theta_p[0] * t8;
+  U[13] = t4 - t11;
+  U[14] = U[15] = 0.0;
+  U[16] = 1.0;
+  U[17] = U[18] = U[19] = U[20] = 0.0;
+  real t13 = S_0[1] * A[0];
+  real t15 = S_0[0] * A[0];
+  real t17 = t2 * t13 + t0 * t15;
+  real t18 = m[0] * A[0];
+  real t19 = t2 * t18;
+  real t20 = t0 * t19;
+  real t21 = t0 * t18;
+  real t22 = t2 * t21;
+  real t23 = t20 - t22;
+  real t24 = t7 - t6;
+  real t28 = t2 * t19 + t0 * t21;
+  U[21] = t17 + (t23 * t24 - t28 * t4);
+  real t32 = t22 - t20;
+  real t36 = t0 * t13;
+  real t37 = t2 * t15;
+  U[22] = t4 * t32 - t28 * t24 + (t36 - t37);
+  real t42 = B_r[1] + (A[0] * r_p[1] - g[1]);
+  real t46 = B_r[0] + (A[0] * r_p[0] - g[0]);
+  real t48 = t2 * t42 - t0 * t46;
+  real t52 = t2 * t46 + t0 * t42;
+  real t54 = S_0[1] * t48 + S_0[0] * t52;
+  real t55 = I_0[0] * A[0];
+  real t60 = m[0] * t52;
+  real t62 = D_theta[0] + C[0] * theta_p[0];
+  real t63 = t62 * t62;
+  real t67 = B_theta[0] + A[0] * theta_p[0];
+  real t69 = t60 - S_0[0] * t63 - S_0[1] * t67;
+  real t75 = t69 - t60 + (t15 - C[0] * (2.0 * (S_0[1] * t62)));
+  real t76 = t0 * t75;
+  real t77 = m[0] * t48;
+  real t78 = S_0[1] * t63;
+  real t80 = t77 + S_0[0] * t67;
+  real t87 = t77 + (t78 - t80) - (t13 + C[0] * (2.0 * (S_0[0] * t62)));
+  real t88 = t2 * t87;
+  real t89 = t76 - t88;
+  real t93 = t0 * t87 + t2 * t75;
+  U[23] = t54 - t55 + (q_p[1] * t4 + q_p[0] * t8 + (t4 * t89 - t93 * t24));
+  U[24] = 1.0;
+  U[25] = t4;
+  U[26] = t24;
+  real t105 = t80 - t78;
+  real t109 = r_p[0] * t28 + r_p[1] * t23 + theta_p[0] * (t88 - t76) - (t2 * t69 - t0 * t105 -
+    f_r[0]);
+  real t120 = t0 * t69 + t2 * t105 - f_r[1] + (r_p[0] * t23 - r_p[1] * t28 - theta_p[0] * t93);
+  U[27] = t4 * t109 - t120 * t24 - (q_p[1] * t9 + q_p[0] * t11) - (S_0[0] * t48 + (I_0[0] * t67 -
+    S_0[1] * t52) - f_m[0] + (r_p[0] * t17 - r_p[1] * (t37 - t36) - theta_p[0] * (t55 - t54)));
+  real t142 = -t28;
+  U[28] = t142;
+  U[29] = t32;
+  U[30] = t89;
+  U[31] = 0.0;
+  U[32] = 1.0;
+  U[33] = 0.0;
+  U[34] = t109;
+  U[35] = t23;
+  U[36] = t142;
+  U[37] = -t93;
+  U[38] = U[39] = 0.0;
+  U[40] = 1.0;
+  U[41] = -t120;
+  U[42] = U[43] = U[44] = U[45] = U[46] = U[47] = 0.0;
+  U[48] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_body_planar_discrete_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_body_planar_discrete_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0]);
-}
-
-static const mstmm_port mstmm_classical_body_planar_discrete_transfer_inputs[] = {
-    {"m", 1, "kg", 0, 0},
-    {"S_0", 2, "kg*m", 0, 0},
-    {"I_0", 1, "kg*m2", 0, 0},
-    {"r_e", 2, "m", 0, 0},
-    {"A", 1, "1/s2", 0, 0},
-    {"C", 1, "1/s", 0, 0},
-    {"B_r", 2, "m/s2", 0, 0},
-    {"B_theta", 1, "rad/s2", 0, 0},
-    {"D_theta", 1, "rad/s", 0, 0},
-    {"r_p", 2, "m", 0, 0},
-    {"theta_p", 1, "rad", 0, 0},
-    {"q_p", 2, "N", 0, 0},
-    {"g", 2, "m/s2", 0, 0},
-    {"f_r", 2, "N", 0, 0},
-    {"f_m", 1, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_body_planar_discrete_transfer_outputs[] = {
-    {"U", 49, "[m, rad, N*m, N, 1]", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_body_planar_discrete_transfer, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0]))
 
 static const mstmm_kernel mstmm_classical_body_planar_discrete_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_body_planar_discrete_transfer,
-        .call = mstmm_classical_body_planar_discrete_transfer_call,
-        .n_inputs = 15,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_body_planar_discrete_transfer_inputs,
-        .outputs = mstmm_classical_body_planar_discrete_transfer_outputs,
-        .ir_hash = "31a957dacdfad0d768afd4370abcd43309ccf5be52bea1c3b52cb4cf017a7248",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_body_planar_discrete_transfer), 15, 1, (const
+    mstmm_port[]){{"m", 1, "kg", 0, 0}, {"S_0", 2, "kg*m", 0, 0}, {"I_0", 1, "kg*m2", 0, 0}, {"r_e",
+    2, "m", 0, 0}, {"A", 1, "1/s2", 0, 0}, {"C", 1, "1/s", 0, 0}, {"B_r", 2, "m/s2", 0, 0},
+    {"B_theta", 1, "rad/s2", 0, 0}, {"D_theta", 1, "rad/s", 0, 0}, {"r_p", 2, "m", 0, 0},
+    {"theta_p", 1, "rad", 0, 0}, {"q_p", 2, "N", 0, 0}, {"g", 2, "m/s2", 0, 0}, {"f_r", 2, "N", 0,
+    0}, {"f_m", 1, "N*m", 0, 0}}, (const mstmm_port[]){{"U", 49, "[m, rad, N*m, N, 1]", 0, 0}},
+    "ed29a69b06b0d0d3017ab9ffa83460fa8f64120365f86c3384f30c7bd03028a3", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_body_planar_discrete = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "body_planar_discrete",
-    .hash = "472bfccd5c1a1651742721c675cff77fc6386b599f7bc40850df483f96c0ce7b",
+    .hash = "19c11b7ea87100a641f4bc2da0431b53afcbff92c8d3f496c5db499dc4285271",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,13 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_body_spatial;
-int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *restrict r_IO,
-    const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
-    const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale);
-
 /* spatial rigid body, classical transfer matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 5, (5.19) to (5.27)
  * in  M[1] (kg) mass
  * in  r_IO[3] (m) output end O from input end I, inertial axes
  * in  r_IC[3] (m) mass centre C from I, inertial axes
@@ -25,447 +19,204 @@ int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *re
  * out U[13][13] ([m/s2, rad/s2, N*m, N, 1]) transfer matrix, z_O = U z_I
  * out F_scale[6][6] (kg*m, kg*m2; kg, kg*m) magnitude of the terms of d(m, q)_O / d(rdd, wd)_I
  */
-int mstmm_classical_body_spatial_transfer(const real *restrict M, const real *restrict r_IO,
-    const real *restrict r_IC, const real *restrict J_I, const real *restrict omega,
-    const real *restrict f_C, const real *restrict m_C, real *restrict U, real *restrict F_scale)
+int mstmm_classical_body_spatial_transfer(in_t M, in_t r_IO, in_t r_IC, in_t J_I, in_t omega,
+    in_t f_C, in_t m_C, out_t U, out_t F_scale)
 {
-    U[0] = 1.0;
-    U[1] = 0.0;
-    U[2] = 0.0;
-    U[3] = 0.0;
-    U[4] = r_IO[2];
-    const real t0 = -r_IO[1];
-    U[5] = t0;
-    U[6] = 0.0;
-    U[7] = 0.0;
-    U[8] = 0.0;
-    U[9] = 0.0;
-    U[10] = 0.0;
-    U[11] = 0.0;
-    const real t1 = r_IO[1] * omega[0];
-    const real t2 = r_IO[0] * omega[1];
-    const real t3 = t1 - t2;
-    const real t4 = omega[1] * t3;
-    const real t5 = r_IO[0] * omega[2];
-    const real t6 = r_IO[2] * omega[0];
-    const real t7 = t5 - t6;
-    const real t8 = omega[2] * t7;
-    const real t9 = t4 - t8;
-    U[12] = t9;
-    U[13] = 0.0;
-    U[14] = 1.0;
-    U[15] = 0.0;
-    const real t10 = -r_IO[2];
-    U[16] = t10;
-    U[17] = 0.0;
-    U[18] = r_IO[0];
-    U[19] = 0.0;
-    U[20] = 0.0;
-    U[21] = 0.0;
-    U[22] = 0.0;
-    U[23] = 0.0;
-    U[24] = 0.0;
-    const real t11 = r_IO[2] * omega[1];
-    const real t12 = r_IO[1] * omega[2];
-    const real t13 = t11 - t12;
-    const real t14 = omega[2] * t13;
-    const real t15 = omega[0] * t3;
-    const real t16 = t14 - t15;
-    U[25] = t16;
-    U[26] = 0.0;
-    U[27] = 0.0;
-    U[28] = 1.0;
-    U[29] = r_IO[1];
-    const real t17 = -r_IO[0];
-    U[30] = t17;
-    U[31] = 0.0;
-    U[32] = 0.0;
-    U[33] = 0.0;
-    U[34] = 0.0;
-    U[35] = 0.0;
-    U[36] = 0.0;
-    U[37] = 0.0;
-    const real t18 = omega[0] * t7;
-    const real t19 = omega[1] * t13;
-    const real t20 = t18 - t19;
-    U[38] = t20;
-    U[39] = 0.0;
-    U[40] = 0.0;
-    U[41] = 0.0;
-    U[42] = 1.0;
-    U[43] = 0.0;
-    U[44] = 0.0;
-    U[45] = 0.0;
-    U[46] = 0.0;
-    U[47] = 0.0;
-    U[48] = 0.0;
-    U[49] = 0.0;
-    U[50] = 0.0;
-    U[51] = 0.0;
-    U[52] = 0.0;
-    U[53] = 0.0;
-    U[54] = 0.0;
+  U[0] = 1.0;
+  U[1] = U[2] = U[3] = 0.0;
+  U[4] = r_IO[2];
+  real t0 = -r_IO[1];
+  U[5] = t0;
+  U[6] = U[7] = U[8] = U[9] = U[10] = U[11] = 0.0;
+  real t3 = r_IO[1] * omega[0] - r_IO[0] * omega[1];
+  real t7 = r_IO[0] * omega[2] - r_IO[2] * omega[0];
+  U[12] = omega[1] * t3 - omega[2] * t7;
+  U[13] = 0.0;
+  U[14] = 1.0;
+  U[15] = 0.0;
+  real t10 = -r_IO[2];
+  U[16] = t10;
+  U[17] = 0.0;
+  U[18] = r_IO[0];
+  U[19] = U[20] = U[21] = U[22] = U[23] = U[24] = 0.0;
+  real t13 = r_IO[2] * omega[1] - r_IO[1] * omega[2];
+  U[25] = omega[2] * t13 - omega[0] * t3;
+  U[26] = U[27] = 0.0;
+  U[28] = 1.0;
+  U[29] = r_IO[1];
+  real t17 = -r_IO[0];
+  U[30] = t17;
+  U[31] = U[32] = U[33] = U[34] = U[35] = U[36] = U[37] = 0.0;
+  U[38] = omega[0] * t7 - omega[1] * t13;
+  U[39] = U[40] = U[41] = 0.0;
+  U[42] = 1.0;
+  U[43] = U[44] = U[45] = U[46] = U[47] = U[48] = U[49] = U[50] = U[51] = U[52] = U[53] = U[54] =
     U[55] = 0.0;
-    U[56] = 1.0;
-    U[57] = 0.0;
-    U[58] = 0.0;
-    U[59] = 0.0;
-    U[60] = 0.0;
-    U[61] = 0.0;
-    U[62] = 0.0;
-    U[63] = 0.0;
-    U[64] = 0.0;
-    U[65] = 0.0;
-    U[66] = 0.0;
-    U[67] = 0.0;
-    U[68] = 0.0;
+  U[56] = 1.0;
+  U[57] = U[58] = U[59] = U[60] = U[61] = U[62] = U[63] = U[64] = U[65] = U[66] = U[67] = U[68] =
     U[69] = 0.0;
-    U[70] = 1.0;
-    U[71] = 0.0;
-    U[72] = 0.0;
-    U[73] = 0.0;
-    U[74] = 0.0;
-    U[75] = 0.0;
-    U[76] = 0.0;
-    U[77] = 0.0;
-    U[78] = 0.0;
-    const real t21 = M[0] * r_IC[2];
-    const real t22 = M[0] * r_IO[2];
-    const real t23 = t21 - t22;
-    U[79] = t23;
-    const real t24 = M[0] * r_IO[1];
-    const real t25 = M[0] * r_IC[1];
-    const real t26 = t24 - t25;
-    U[80] = t26;
-    const real t27 = r_IO[1] * t25;
-    const real t28 = r_IO[2] * t21;
-    const real t29 = t27 + t28;
-    const real t30 = t29 - J_I[0];
-    U[81] = t30;
-    const real t31 = M[0] * r_IC[0];
-    const real t32 = r_IO[1] * t31;
-    const real t33 = J_I[1] + t32;
-    const real t34 = -t33;
-    U[82] = t34;
-    const real t35 = r_IO[2] * t31;
-    const real t36 = J_I[2] + t35;
-    const real t37 = -t36;
-    U[83] = t37;
-    U[84] = 1.0;
-    U[85] = 0.0;
-    U[86] = 0.0;
-    U[87] = 0.0;
-    U[88] = r_IO[2];
-    U[89] = t0;
-    const real t38 = J_I[4] * omega[2];
-    const real t39 = J_I[1] * omega[0];
-    const real t40 = J_I[3] * omega[1];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = omega[2] * t42;
-    const real t44 = J_I[5] * omega[2];
-    const real t45 = J_I[2] * omega[0];
-    const real t46 = J_I[4] * omega[1];
-    const real t47 = t45 + t46;
-    const real t48 = t44 + t47;
-    const real t49 = omega[1] * t48;
-    const real t50 = t43 - t49;
-    const real t51 = r_IC[0] * omega[2];
-    const real t52 = r_IC[2] * omega[0];
-    const real t53 = t51 - t52;
-    const real t54 = omega[0] * t53;
-    const real t55 = r_IC[2] * omega[1];
-    const real t56 = r_IC[1] * omega[2];
-    const real t57 = t55 - t56;
-    const real t58 = omega[1] * t57;
-    const real t59 = t54 - t58;
-    const real t60 = M[0] * t59;
-    const real t61 = r_IO[1] * t60;
-    const real t62 = r_IC[1] * f_C[2];
-    const real t63 = r_IO[2] * f_C[1];
-    const real t64 = r_IC[2] * f_C[1];
-    const real t65 = t63 - t64;
-    const real t66 = t62 + t65;
-    const real t67 = r_IO[1] * f_C[2];
-    const real t68 = t66 - t67;
-    const real t69 = omega[2] * t57;
-    const real t70 = r_IC[1] * omega[0];
-    const real t71 = r_IC[0] * omega[1];
-    const real t72 = t70 - t71;
-    const real t73 = omega[0] * t72;
-    const real t74 = t69 - t73;
-    const real t75 = M[0] * t74;
-    const real t76 = r_IO[2] * t75;
-    const real t77 = t68 - t76;
-    const real t78 = t61 + t77;
-    const real t79 = t50 + t78;
-    const real t80 = m_C[0] + t79;
-    U[90] = t80;
-    const real t81 = -t23;
-    U[91] = t81;
-    U[92] = 0.0;
-    const real t82 = M[0] * r_IO[0];
-    const real t83 = t31 - t82;
-    U[93] = t83;
-    const real t84 = r_IO[0] * t25;
-    const real t85 = J_I[1] + t84;
-    const real t86 = -t85;
-    U[94] = t86;
-    const real t87 = r_IO[0] * t31;
-    const real t88 = t28 + t87;
-    const real t89 = t88 - J_I[3];
-    U[95] = t89;
-    const real t90 = r_IO[2] * t25;
-    const real t91 = J_I[4] + t90;
-    const real t92 = -t91;
-    U[96] = t92;
-    U[97] = 0.0;
-    U[98] = 1.0;
-    U[99] = 0.0;
-    U[100] = t10;
-    U[101] = 0.0;
-    U[102] = r_IO[0];
-    const real t93 = omega[0] * t48;
-    const real t94 = J_I[2] * omega[2];
-    const real t95 = J_I[0] * omega[0];
-    const real t96 = J_I[1] * omega[1];
-    const real t97 = t95 + t96;
-    const real t98 = t94 + t97;
-    const real t99 = omega[2] * t98;
-    const real t100 = t93 - t99;
-    const real t101 = omega[1] * t72;
-    const real t102 = omega[2] * t53;
-    const real t103 = t101 - t102;
-    const real t104 = M[0] * t103;
-    const real t105 = r_IO[2] * t104;
-    const real t106 = r_IO[0] * f_C[2];
-    const real t107 = r_IC[2] * f_C[0];
-    const real t108 = r_IO[2] * f_C[0];
-    const real t109 = t107 - t108;
-    const real t110 = r_IC[0] * f_C[2];
-    const real t111 = t109 - t110;
-    const real t112 = t106 + t111;
-    const real t113 = t105 + t112;
-    const real t114 = r_IO[0] * t60;
-    const real t115 = t113 - t114;
-    const real t116 = t100 + t115;
-    const real t117 = m_C[1] + t116;
-    U[103] = t117;
-    const real t118 = -t26;
-    U[104] = t118;
-    const real t119 = -t83;
-    U[105] = t119;
-    U[106] = 0.0;
-    const real t120 = r_IO[0] * t21;
-    const real t121 = J_I[2] + t120;
-    const real t122 = -t121;
-    U[107] = t122;
-    const real t123 = r_IO[1] * t21;
-    const real t124 = J_I[4] + t123;
-    const real t125 = -t124;
-    U[108] = t125;
-    const real t126 = t27 + t87;
-    const real t127 = t126 - J_I[5];
-    U[109] = t127;
-    U[110] = 0.0;
-    U[111] = 0.0;
-    U[112] = 1.0;
-    U[113] = r_IO[1];
-    U[114] = t17;
-    U[115] = 0.0;
-    const real t128 = omega[1] * t98;
-    const real t129 = omega[0] * t42;
-    const real t130 = t128 - t129;
-    const real t131 = r_IO[0] * t75;
-    const real t132 = r_IC[0] * f_C[1];
-    const real t133 = r_IO[1] * f_C[0];
-    const real t134 = r_IC[1] * f_C[0];
-    const real t135 = t133 - t134;
-    const real t136 = t132 + t135;
-    const real t137 = r_IO[0] * f_C[1];
-    const real t138 = t136 - t137;
-    const real t139 = r_IO[1] * t104;
-    const real t140 = t138 - t139;
-    const real t141 = t131 + t140;
-    const real t142 = t130 + t141;
-    const real t143 = m_C[2] + t142;
-    U[116] = t143;
-    const real t144 = -M[0];
-    U[117] = t144;
-    U[118] = 0.0;
-    U[119] = 0.0;
-    U[120] = 0.0;
-    const real t145 = -t21;
-    U[121] = t145;
-    U[122] = t25;
-    U[123] = 0.0;
-    U[124] = 0.0;
-    U[125] = 0.0;
-    U[126] = 1.0;
-    U[127] = 0.0;
-    U[128] = 0.0;
-    const real t146 = f_C[0] - t104;
-    U[129] = t146;
-    U[130] = 0.0;
-    U[131] = t144;
-    U[132] = 0.0;
-    U[133] = t21;
-    U[134] = 0.0;
-    const real t147 = -t31;
-    U[135] = t147;
-    U[136] = 0.0;
-    U[137] = 0.0;
-    U[138] = 0.0;
-    U[139] = 0.0;
-    U[140] = 1.0;
-    U[141] = 0.0;
-    const real t148 = f_C[1] - t75;
-    U[142] = t148;
-    U[143] = 0.0;
-    U[144] = 0.0;
-    U[145] = t144;
-    const real t149 = -t25;
-    U[146] = t149;
-    U[147] = t31;
-    U[148] = 0.0;
-    U[149] = 0.0;
-    U[150] = 0.0;
-    U[151] = 0.0;
-    U[152] = 0.0;
-    U[153] = 0.0;
-    U[154] = 1.0;
-    const real t150 = f_C[2] - t60;
-    U[155] = t150;
-    U[156] = 0.0;
-    U[157] = 0.0;
-    U[158] = 0.0;
-    U[159] = 0.0;
-    U[160] = 0.0;
-    U[161] = 0.0;
-    U[162] = 0.0;
-    U[163] = 0.0;
-    U[164] = 0.0;
-    U[165] = 0.0;
-    U[166] = 0.0;
+  U[70] = 1.0;
+  U[71] = U[72] = U[73] = U[74] = U[75] = U[76] = U[77] = U[78] = 0.0;
+  real t21 = M[0] * r_IC[2];
+  real t22 = M[0] * r_IO[2];
+  real t23 = t21 - t22;
+  U[79] = t23;
+  real t24 = M[0] * r_IO[1];
+  real t25 = M[0] * r_IC[1];
+  real t26 = t24 - t25;
+  U[80] = t26;
+  real t27 = r_IO[1] * t25;
+  real t28 = r_IO[2] * t21;
+  U[81] = t27 + t28 - J_I[0];
+  real t31 = M[0] * r_IC[0];
+  real t32 = r_IO[1] * t31;
+  U[82] = -(J_I[1] + t32);
+  real t35 = r_IO[2] * t31;
+  U[83] = -(J_I[2] + t35);
+  U[84] = 1.0;
+  U[85] = U[86] = U[87] = 0.0;
+  U[88] = r_IO[2];
+  U[89] = t0;
+  real t42 = J_I[4] * omega[2] + (J_I[1] * omega[0] + J_I[3] * omega[1]);
+  real t48 = J_I[5] * omega[2] + (J_I[2] * omega[0] + J_I[4] * omega[1]);
+  real t53 = r_IC[0] * omega[2] - r_IC[2] * omega[0];
+  real t57 = r_IC[2] * omega[1] - r_IC[1] * omega[2];
+  real t60 = M[0] * (omega[0] * t53 - omega[1] * t57);
+  real t72 = r_IC[1] * omega[0] - r_IC[0] * omega[1];
+  real t75 = M[0] * (omega[2] * t57 - omega[0] * t72);
+  U[90] = m_C[0] + (omega[2] * t42 - omega[1] * t48 + (r_IO[1] * t60 + (r_IC[1] * f_C[2] + (r_IO[2]
+    * f_C[1] - r_IC[2] * f_C[1]) - r_IO[1] * f_C[2] - r_IO[2] * t75)));
+  U[91] = -t23;
+  U[92] = 0.0;
+  real t82 = M[0] * r_IO[0];
+  real t83 = t31 - t82;
+  U[93] = t83;
+  real t84 = r_IO[0] * t25;
+  U[94] = -(J_I[1] + t84);
+  real t87 = r_IO[0] * t31;
+  U[95] = t28 + t87 - J_I[3];
+  real t90 = r_IO[2] * t25;
+  U[96] = -(J_I[4] + t90);
+  U[97] = 0.0;
+  U[98] = 1.0;
+  U[99] = 0.0;
+  U[100] = t10;
+  U[101] = 0.0;
+  U[102] = r_IO[0];
+  real t98 = J_I[2] * omega[2] + (J_I[0] * omega[0] + J_I[1] * omega[1]);
+  real t104 = M[0] * (omega[1] * t72 - omega[2] * t53);
+  U[103] = m_C[1] + (omega[0] * t48 - omega[2] * t98 + (r_IO[2] * t104 + (r_IO[0] * f_C[2] +
+    (r_IC[2] * f_C[0] - r_IO[2] * f_C[0] - r_IC[0] * f_C[2])) - r_IO[0] * t60));
+  U[104] = -t26;
+  U[105] = -t83;
+  U[106] = 0.0;
+  real t120 = r_IO[0] * t21;
+  U[107] = -(J_I[2] + t120);
+  real t123 = r_IO[1] * t21;
+  U[108] = -(J_I[4] + t123);
+  U[109] = t27 + t87 - J_I[5];
+  U[110] = U[111] = 0.0;
+  U[112] = 1.0;
+  U[113] = r_IO[1];
+  U[114] = t17;
+  U[115] = 0.0;
+  U[116] = m_C[2] + (omega[1] * t98 - omega[0] * t42 + (r_IO[0] * t75 + (r_IC[0] * f_C[1] + (r_IO[1]
+    * f_C[0] - r_IC[1] * f_C[0]) - r_IO[0] * f_C[1] - r_IO[1] * t104)));
+  real t144 = -M[0];
+  U[117] = t144;
+  U[118] = U[119] = U[120] = 0.0;
+  U[121] = -t21;
+  U[122] = t25;
+  U[123] = U[124] = U[125] = 0.0;
+  U[126] = 1.0;
+  U[127] = U[128] = 0.0;
+  U[129] = f_C[0] - t104;
+  U[130] = 0.0;
+  U[131] = t144;
+  U[132] = 0.0;
+  U[133] = t21;
+  U[134] = 0.0;
+  U[135] = -t31;
+  U[136] = U[137] = U[138] = U[139] = 0.0;
+  U[140] = 1.0;
+  U[141] = 0.0;
+  U[142] = f_C[1] - t75;
+  U[143] = U[144] = 0.0;
+  U[145] = t144;
+  U[146] = -t25;
+  U[147] = t31;
+  U[148] = U[149] = U[150] = U[151] = U[152] = U[153] = 0.0;
+  U[154] = 1.0;
+  U[155] = f_C[2] - t60;
+  U[156] = U[157] = U[158] = U[159] = U[160] = U[161] = U[162] = U[163] = U[164] = U[165] = U[166] =
     U[167] = 0.0;
-    U[168] = 1.0;
-    F_scale[0] = 0.0;
-    const real t151 = fabs(t21);
-    const real t152 = fabs(t22);
-    const real t153 = t151 + t152;
-    F_scale[1] = t153;
-    const real t154 = fabs(t25);
-    const real t155 = fabs(t24);
-    const real t156 = t154 + t155;
-    F_scale[2] = t156;
-    const real t157 = fabs(J_I[0]);
-    const real t158 = fabs(t27);
-    const real t159 = fabs(t28);
-    const real t160 = t158 + t159;
-    const real t161 = t157 + t160;
-    F_scale[3] = t161;
-    const real t162 = fabs(t32);
-    const real t163 = fabs(J_I[1]);
-    const real t164 = t162 + t163;
-    F_scale[4] = t164;
-    const real t165 = fabs(t35);
-    const real t166 = fabs(J_I[2]);
-    const real t167 = t165 + t166;
-    F_scale[5] = t167;
-    F_scale[6] = t153;
-    F_scale[7] = 0.0;
-    const real t168 = fabs(t31);
-    const real t169 = fabs(t82);
-    const real t170 = t168 + t169;
-    F_scale[8] = t170;
-    const real t171 = fabs(t84);
-    const real t172 = t163 + t171;
-    F_scale[9] = t172;
-    const real t173 = fabs(J_I[3]);
-    const real t174 = fabs(t87);
-    const real t175 = t159 + t174;
-    const real t176 = t173 + t175;
-    F_scale[10] = t176;
-    const real t177 = fabs(t90);
-    const real t178 = fabs(J_I[4]);
-    const real t179 = t177 + t178;
-    F_scale[11] = t179;
-    F_scale[12] = t156;
-    F_scale[13] = t170;
-    F_scale[14] = 0.0;
-    const real t180 = fabs(t120);
-    const real t181 = t166 + t180;
-    F_scale[15] = t181;
-    const real t182 = fabs(t123);
-    const real t183 = t178 + t182;
-    F_scale[16] = t183;
-    const real t184 = fabs(J_I[5]);
-    const real t185 = t158 + t174;
-    const real t186 = t184 + t185;
-    F_scale[17] = t186;
-    const real t187 = fabs(M[0]);
-    F_scale[18] = t187;
-    F_scale[19] = 0.0;
-    F_scale[20] = 0.0;
-    F_scale[21] = 0.0;
-    F_scale[22] = t151;
-    F_scale[23] = t154;
-    F_scale[24] = 0.0;
-    F_scale[25] = t187;
-    F_scale[26] = 0.0;
-    F_scale[27] = t151;
-    F_scale[28] = 0.0;
-    F_scale[29] = t168;
-    F_scale[30] = 0.0;
-    F_scale[31] = 0.0;
-    F_scale[32] = t187;
-    F_scale[33] = t154;
-    F_scale[34] = t168;
-    F_scale[35] = 0.0;
-    return 0;
+  U[168] = 1.0;
+  F_scale[0] = 0.0;
+  real t151 = fabs(t21);
+  real t153 = t151 + (fabs(t22));
+  F_scale[1] = t153;
+  real t154 = fabs(t25);
+  real t156 = t154 + (fabs(t24));
+  F_scale[2] = t156;
+  real t158 = fabs(t27);
+  real t159 = fabs(t28);
+  F_scale[3] = (fabs(J_I[0])) + (t158 + t159);
+  real t163 = fabs(J_I[1]);
+  F_scale[4] = (fabs(t32)) + t163;
+  real t166 = fabs(J_I[2]);
+  F_scale[5] = (fabs(t35)) + t166;
+  F_scale[6] = t153;
+  F_scale[7] = 0.0;
+  real t168 = fabs(t31);
+  real t170 = t168 + (fabs(t82));
+  F_scale[8] = t170;
+  F_scale[9] = t163 + (fabs(t84));
+  real t174 = fabs(t87);
+  F_scale[10] = (fabs(J_I[3])) + (t159 + t174);
+  real t178 = fabs(J_I[4]);
+  F_scale[11] = (fabs(t90)) + t178;
+  F_scale[12] = t156;
+  F_scale[13] = t170;
+  F_scale[14] = 0.0;
+  F_scale[15] = t166 + (fabs(t120));
+  F_scale[16] = t178 + (fabs(t123));
+  F_scale[17] = (fabs(J_I[5])) + (t158 + t174);
+  real t187 = fabs(M[0]);
+  F_scale[18] = t187;
+  F_scale[19] = F_scale[20] = F_scale[21] = 0.0;
+  F_scale[22] = t151;
+  F_scale[23] = t154;
+  F_scale[24] = 0.0;
+  F_scale[25] = t187;
+  F_scale[26] = 0.0;
+  F_scale[27] = t151;
+  F_scale[28] = 0.0;
+  F_scale[29] = t168;
+  F_scale[30] = F_scale[31] = 0.0;
+  F_scale[32] = t187;
+  F_scale[33] = t154;
+  F_scale[34] = t168;
+  F_scale[35] = 0.0;
+  return 0;
 }
 
-static int mstmm_classical_body_spatial_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_body_spatial_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_classical_body_spatial_transfer_inputs[] = {
-    {"M", 1, "kg", 0, 0},
-    {"r_IO", 3, "m", 0, 0},
-    {"r_IC", 3, "m", 0, 0},
-    {"J_I", 6, "kg*m2", 0, 0},
-    {"omega", 3, "rad/s", 0, 0},
-    {"f_C", 3, "N", 0, 0},
-    {"m_C", 3, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_body_spatial_transfer_outputs[] = {
-    {"U", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0},
-    {"F_scale", 36, "kg*m, kg*m2; kg, kg*m", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_body_spatial_transfer, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 static const mstmm_kernel mstmm_classical_body_spatial_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_body_spatial_transfer,
-        .call = mstmm_classical_body_spatial_transfer_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_classical_body_spatial_transfer_inputs,
-        .outputs = mstmm_classical_body_spatial_transfer_outputs,
-        .ir_hash = "087752c9ee79082c7756ed6070c01b3f2ccc9ac55e92ce0b43c814ce3ccc54da",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_body_spatial_transfer), 7, 2, (const
+    mstmm_port[]){{"M", 1, "kg", 0, 0}, {"r_IO", 3, "m", 0, 0}, {"r_IC", 3, "m", 0, 0}, {"J_I", 6,
+    "kg*m2", 0, 0}, {"omega", 3, "rad/s", 0, 0}, {"f_C", 3, "N", 0, 0}, {"m_C", 3, "N*m", 0, 0}},
+    (const mstmm_port[]){{"U", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0}, {"F_scale", 36,
+    "kg*m, kg*m2; kg, kg*m", 0, 0}},
+    "361e639531b7ac2f5916e6f8ff52a6e4ac619c85da1153e17c49a5c13cbb3cd8", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_body_spatial = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "body_spatial",
-    .hash = "39d4421a5ef9f61cccf6952e4848399b01b8ef7803674fb64b39c288a4a146c8",
+    .hash = "e835a381dd7c66d1785d224e7dc0507ae9db6b36a6aee77d66a6369824e15b44",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,127 +8,52 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_beam_rigid;
-int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(const real *restrict Theta_I,
-    const real *restrict gamma, real *restrict U_h);
-
 /* fixed hinge (planar), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.7, (8.138), (8.139)
  * in  Theta_I[1][3] (1/m) section rotation per mode at the inboard side of the hinge
  * in  gamma[1] (rad) angle of the outboard from the inboard section
  * out U_h[7][10] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(const real *restrict Theta_I,
-    const real *restrict gamma, real *restrict U_h)
+int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(in_t Theta_I, in_t gamma, out_t U_h)
 {
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 1.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 0.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 1.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = Theta_I[0];
-    U_h[27] = Theta_I[1];
-    U_h[28] = Theta_I[2];
-    U_h[29] = gamma[0];
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 1.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 0.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 1.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 0.0;
-    U_h[49] = 0.0;
-    U_h[50] = 0.0;
-    U_h[51] = 0.0;
-    U_h[52] = 0.0;
-    U_h[53] = 0.0;
-    U_h[54] = 0.0;
-    U_h[55] = 1.0;
-    U_h[56] = 0.0;
-    U_h[57] = 0.0;
-    U_h[58] = 0.0;
-    U_h[59] = 0.0;
-    U_h[60] = 0.0;
-    U_h[61] = 0.0;
-    U_h[62] = 0.0;
-    U_h[63] = 0.0;
-    U_h[64] = 0.0;
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 1.0;
-    return 0;
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = 0.0;
+  U_h[11] = 1.0;
+  U_h[12] = U_h[13] = U_h[14] = U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21]
+    = 0.0;
+  U_h[22] = 1.0;
+  U_h[23] = U_h[24] = U_h[25] = 0.0;
+  U_h[26] = Theta_I[0];
+  U_h[27] = Theta_I[1];
+  U_h[28] = Theta_I[2];
+  U_h[29] = gamma[0];
+  U_h[30] = U_h[31] = U_h[32] = 0.0;
+  U_h[33] = 1.0;
+  U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = U_h[40] = U_h[41] = U_h[42] = U_h[43]
+    = 0.0;
+  U_h[44] = 1.0;
+  U_h[45] = U_h[46] = U_h[47] = U_h[48] = U_h[49] = U_h[50] = U_h[51] = U_h[52] = U_h[53] = U_h[54]
+    = 0.0;
+  U_h[55] = 1.0;
+  U_h[56] = U_h[57] = U_h[58] = U_h[59] = U_h[60] = U_h[61] = U_h[62] = U_h[63] = U_h[64] = U_h[65]
+    = U_h[66] = U_h[67] = U_h[68] = 0.0;
+  U_h[69] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_planar_beam_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_planar_beam_rigid_transfer_inputs[] = {
-    {"Theta_I", 3, "1/m", 0, 0},
-    {"gamma", 1, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_planar_beam_rigid_transfer_outputs[] = {
-    {"U_h", 70, "[m, rad, N*m, N, 1]", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_planar_beam_rigid_transfer, (in[0], in[1], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_planar_beam_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_planar_beam_rigid_transfer,
-        .call = mstmm_classical_hinge_fixed_planar_beam_rigid_transfer_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_planar_beam_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_planar_beam_rigid_transfer_outputs,
-        .ir_hash = "36aead21812d16e0630f60a2ffd5e1b680f8d3bb386a843940558612ba4510eb",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_planar_beam_rigid_transfer), 2, 1, (const
+    mstmm_port[]){{"Theta_I", 3, "1/m", 0, 0}, {"gamma", 1, "rad", 0, 0}}, (const
+    mstmm_port[]){{"U_h", 70, "[m, rad, N*m, N, 1]", 0, 0}},
+    "f0f01f6b39c4ac581aa9e718a3ae2f9b4341853a43a36642625c7253be4644fb", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_planar_beam_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_planar_beam_rigid",
-    .hash = "dce9518c3ac0c2e74093a138bbbd0b396b999a0302e1fce2df27d71146145b6c",
+    .hash = "a33cdf770c8d2b510b4969b5b3ff8f67359076898e1e8c5bb3c82064e676fe70",
     .nq = 0,
     .nu = 0,
     .np = 0,

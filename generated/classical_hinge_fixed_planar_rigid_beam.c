@@ -8,435 +8,178 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_beam;
-int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(const real *restrict W,
-    const real *restrict Theta_O, const real *restrict gamma, real *restrict U_h);
-
 /* fixed hinge (planar), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.7, (8.130) to (8.137)
  * in  W[3][10] (N) modal rows of the outboard body
  * in  Theta_O[1][3] (1/m) section rotation per mode at the outboard side of the hinge
  * in  gamma[1] (rad) angle of the outboard from the inboard section
  * out U_h[10][7] ([m, rad, N*m, N, m, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(const real *restrict W,
-    const real *restrict Theta_O, const real *restrict gamma, real *restrict U_h)
+int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(in_t W, in_t Theta_O, in_t gamma,
+    out_t U_h)
 {
-    const real t0 = W[2] * Theta_O[0];
-    const real t1 = W[6] - t0;
-    const real t2 = fabs(t1);
-    const real t3 = W[12] * Theta_O[0];
-    const real t4 = W[16] - t3;
-    const real t5 = fabs(t4);
-    const real t6 = t2 < t5;
-    const real t7 = t6 != 0 ? t4 : t1;
-    const real t8 = fabs(t7);
-    const real t9 = W[22] * Theta_O[0];
-    const real t10 = W[26] - t9;
-    const real t11 = fabs(t10);
-    const real t12 = t8 < t11;
-    const real t13 = W[22] * Theta_O[1];
-    const real t14 = W[27] - t13;
-    const real t15 = fabs(t14);
-    const real t16 = t11 + t15;
-    const real t17 = W[22] * Theta_O[2];
-    const real t18 = W[28] - t17;
-    const real t19 = fabs(t18);
-    const real t20 = t16 + t19;
-    const real t21 = W[12] * Theta_O[1];
-    const real t22 = W[17] - t21;
-    const real t23 = fabs(t22);
-    const real t24 = t5 + t23;
-    const real t25 = W[12] * Theta_O[2];
-    const real t26 = W[18] - t25;
-    const real t27 = fabs(t26);
-    const real t28 = t24 + t27;
-    const real t29 = W[2] * Theta_O[1];
-    const real t30 = W[7] - t29;
-    const real t31 = fabs(t30);
-    const real t32 = t2 + t31;
-    const real t33 = W[2] * Theta_O[2];
-    const real t34 = W[8] - t33;
-    const real t35 = fabs(t34);
-    const real t36 = t32 + t35;
-    const real t37 = t6 != 0 ? t28 : t36;
-    const real t38 = t12 != 0 ? t20 : t37;
-    const real t39 = t38 * ((real)1 / (real)10000000000000);
-    const real t40 = t12 != 0 ? t10 : t7;
-    const real t41 = fabs(t40);
-    const real t42 = t39 < t41;
-    if (!(t42 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t43 = t6 != 0 ? t30 : t22;
-    const real t44 = t6 != 0 ? t22 : t30;
-    const real t45 = t12 != 0 ? t14 : t44;
-    const real t46 = t6 != 0 ? t1 : t4;
-    const real t47 = 1.0 / t40;
-    const real t48 = t46 * t47;
-    const real t49 = t45 * t48;
-    const real t50 = t43 - t49;
-    const real t51 = fabs(t50);
-    const real t52 = t12 != 0 ? t44 : t14;
-    const real t53 = t12 != 0 ? t7 : t10;
-    const real t54 = t53 * t47;
-    const real t55 = t45 * t54;
-    const real t56 = t52 - t55;
-    const real t57 = fabs(t56);
-    const real t58 = t51 < t57;
-    const real t59 = t12 != 0 ? t37 : t20;
-    const real t60 = t6 != 0 ? t36 : t28;
-    const real t61 = t58 != 0 ? t59 : t60;
-    const real t62 = ((real)1 / (real)10000000000000) * t61;
-    const real t63 = t58 != 0 ? t56 : t50;
-    const real t64 = fabs(t63);
-    const real t65 = t62 < t64;
-    if (!(t65 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t66 = t58 != 0 ? t60 : t59;
-    const real t67 = ((real)1 / (real)10000000000000) * t66;
-    const real t68 = t6 != 0 ? t34 : t26;
-    const real t69 = t6 != 0 ? t26 : t34;
-    const real t70 = t12 != 0 ? t18 : t69;
-    const real t71 = t70 * t48;
-    const real t72 = t68 - t71;
-    const real t73 = t12 != 0 ? t69 : t18;
-    const real t74 = t70 * t54;
-    const real t75 = t73 - t74;
-    const real t76 = t58 != 0 ? t72 : t75;
-    const real t77 = t58 != 0 ? t75 : t72;
-    const real t78 = t58 != 0 ? t50 : t56;
-    const real t79 = 1.0 / t63;
-    const real t80 = t78 * t79;
-    const real t81 = t77 * t80;
-    const real t82 = t76 - t81;
-    const real t83 = fabs(t82);
-    const real t84 = t67 < t83;
-    if (!(t84 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 1.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    const real t85 = t6 != 0 ? W[10] : W[0];
-    const real t86 = t12 != 0 ? W[20] : t85;
-    const real t87 = t12 != 0 ? t85 : W[20];
-    const real t88 = t86 * t54;
-    const real t89 = t87 - t88;
-    const real t90 = t6 != 0 ? W[0] : W[10];
-    const real t91 = t86 * t48;
-    const real t92 = t90 - t91;
-    const real t93 = t58 != 0 ? t89 : t92;
-    const real t94 = t58 != 0 ? t92 : t89;
-    const real t95 = t93 * t80;
-    const real t96 = t94 - t95;
-    const real t97 = 1.0 / t82;
-    const real t98 = t96 * t97;
-    const real t99 = t77 * t98;
-    const real t100 = t93 - t99;
-    const real t101 = t79 * t100;
-    const real t102 = t45 * t101;
-    const real t103 = t86 - t102;
-    const real t104 = t70 * t98;
-    const real t105 = t103 - t104;
-    const real t106 = t47 * t105;
-    const real t107 = Theta_O[0] * t106;
-    const real t108 = Theta_O[1] * t101;
-    const real t109 = t107 + t108;
-    const real t110 = Theta_O[2] * t98;
-    const real t111 = t109 + t110;
-    U_h[14] = t111;
-    const real t112 = t6 != 0 ? W[11] : W[1];
-    const real t113 = t12 != 0 ? W[21] : t112;
-    const real t114 = t12 != 0 ? t112 : W[21];
-    const real t115 = t113 * t54;
-    const real t116 = t114 - t115;
-    const real t117 = t6 != 0 ? W[1] : W[11];
-    const real t118 = t113 * t48;
-    const real t119 = t117 - t118;
-    const real t120 = t58 != 0 ? t116 : t119;
-    const real t121 = t58 != 0 ? t119 : t116;
-    const real t122 = t120 * t80;
-    const real t123 = t121 - t122;
-    const real t124 = t123 * t97;
-    const real t125 = t77 * t124;
-    const real t126 = t120 - t125;
-    const real t127 = t79 * t126;
-    const real t128 = t45 * t127;
-    const real t129 = t113 - t128;
-    const real t130 = t70 * t124;
-    const real t131 = t129 - t130;
-    const real t132 = t47 * t131;
-    const real t133 = Theta_O[0] * t132;
-    const real t134 = Theta_O[1] * t127;
-    const real t135 = t133 + t134;
-    const real t136 = Theta_O[2] * t124;
-    const real t137 = t135 + t136;
-    U_h[15] = t137;
-    const real t138 = t6 != 0 ? W[12] : W[2];
-    const real t139 = t12 != 0 ? W[22] : t138;
-    const real t140 = t12 != 0 ? t138 : W[22];
-    const real t141 = t139 * t54;
-    const real t142 = t140 - t141;
-    const real t143 = t6 != 0 ? W[2] : W[12];
-    const real t144 = t139 * t48;
-    const real t145 = t143 - t144;
-    const real t146 = t58 != 0 ? t142 : t145;
-    const real t147 = t58 != 0 ? t145 : t142;
-    const real t148 = t146 * t80;
-    const real t149 = t147 - t148;
-    const real t150 = t149 * t97;
-    const real t151 = t77 * t150;
-    const real t152 = t146 - t151;
-    const real t153 = t79 * t152;
-    const real t154 = t45 * t153;
-    const real t155 = t139 - t154;
-    const real t156 = t70 * t150;
-    const real t157 = t155 - t156;
-    const real t158 = t47 * t157;
-    const real t159 = Theta_O[0] * t158;
-    const real t160 = Theta_O[1] * t153;
-    const real t161 = t159 + t160;
-    const real t162 = Theta_O[2] * t150;
-    const real t163 = t161 + t162;
-    const real t164 = 1.0 + t163;
-    U_h[16] = t164;
-    const real t165 = t6 != 0 ? W[13] : W[3];
-    const real t166 = t12 != 0 ? W[23] : t165;
-    const real t167 = t12 != 0 ? t165 : W[23];
-    const real t168 = t166 * t54;
-    const real t169 = t167 - t168;
-    const real t170 = t6 != 0 ? W[3] : W[13];
-    const real t171 = t166 * t48;
-    const real t172 = t170 - t171;
-    const real t173 = t58 != 0 ? t169 : t172;
-    const real t174 = t58 != 0 ? t172 : t169;
-    const real t175 = t173 * t80;
-    const real t176 = t174 - t175;
-    const real t177 = t176 * t97;
-    const real t178 = t77 * t177;
-    const real t179 = t173 - t178;
-    const real t180 = t79 * t179;
-    const real t181 = t45 * t180;
-    const real t182 = t166 - t181;
-    const real t183 = t70 * t177;
-    const real t184 = t182 - t183;
-    const real t185 = t47 * t184;
-    const real t186 = Theta_O[0] * t185;
-    const real t187 = Theta_O[1] * t180;
-    const real t188 = t186 + t187;
-    const real t189 = Theta_O[2] * t177;
-    const real t190 = t188 + t189;
-    U_h[17] = t190;
-    const real t191 = t6 != 0 ? W[14] : W[4];
-    const real t192 = t12 != 0 ? W[24] : t191;
-    const real t193 = t12 != 0 ? t191 : W[24];
-    const real t194 = t192 * t54;
-    const real t195 = t193 - t194;
-    const real t196 = t6 != 0 ? W[4] : W[14];
-    const real t197 = t192 * t48;
-    const real t198 = t196 - t197;
-    const real t199 = t58 != 0 ? t195 : t198;
-    const real t200 = t58 != 0 ? t198 : t195;
-    const real t201 = t199 * t80;
-    const real t202 = t200 - t201;
-    const real t203 = t202 * t97;
-    const real t204 = t77 * t203;
-    const real t205 = t199 - t204;
-    const real t206 = t79 * t205;
-    const real t207 = t45 * t206;
-    const real t208 = t192 - t207;
-    const real t209 = t70 * t203;
-    const real t210 = t208 - t209;
-    const real t211 = t47 * t210;
-    const real t212 = Theta_O[0] * t211;
-    const real t213 = Theta_O[1] * t206;
-    const real t214 = t212 + t213;
-    const real t215 = Theta_O[2] * t203;
-    const real t216 = t214 + t215;
-    U_h[18] = t216;
-    const real t217 = t6 != 0 ? W[15] : W[5];
-    const real t218 = t12 != 0 ? W[25] : t217;
-    const real t219 = t12 != 0 ? t217 : W[25];
-    const real t220 = t218 * t54;
-    const real t221 = t219 - t220;
-    const real t222 = t6 != 0 ? W[5] : W[15];
-    const real t223 = t218 * t48;
-    const real t224 = t222 - t223;
-    const real t225 = t58 != 0 ? t221 : t224;
-    const real t226 = t58 != 0 ? t224 : t221;
-    const real t227 = t225 * t80;
-    const real t228 = t226 - t227;
-    const real t229 = t228 * t97;
-    const real t230 = t77 * t229;
-    const real t231 = t225 - t230;
-    const real t232 = t79 * t231;
-    const real t233 = t45 * t232;
-    const real t234 = t218 - t233;
-    const real t235 = t70 * t229;
-    const real t236 = t234 - t235;
-    const real t237 = t47 * t236;
-    const real t238 = Theta_O[0] * t237;
-    const real t239 = Theta_O[1] * t232;
-    const real t240 = t238 + t239;
-    const real t241 = Theta_O[2] * t229;
-    const real t242 = t240 + t241;
-    U_h[19] = t242;
-    const real t243 = W[22] * gamma[0];
-    const real t244 = W[29] + t243;
-    const real t245 = W[12] * gamma[0];
-    const real t246 = W[19] + t245;
-    const real t247 = W[2] * gamma[0];
-    const real t248 = W[9] + t247;
-    const real t249 = t6 != 0 ? t246 : t248;
-    const real t250 = t12 != 0 ? t244 : t249;
-    const real t251 = t12 != 0 ? t249 : t244;
-    const real t252 = t250 * t54;
-    const real t253 = t251 - t252;
-    const real t254 = t6 != 0 ? t248 : t246;
-    const real t255 = t250 * t48;
-    const real t256 = t254 - t255;
-    const real t257 = t58 != 0 ? t253 : t256;
-    const real t258 = t58 != 0 ? t256 : t253;
-    const real t259 = t257 * t80;
-    const real t260 = t258 - t259;
-    const real t261 = t260 * t97;
-    const real t262 = t77 * t261;
-    const real t263 = t257 - t262;
-    const real t264 = t79 * t263;
-    const real t265 = t45 * t264;
-    const real t266 = t250 - t265;
-    const real t267 = t70 * t261;
-    const real t268 = t266 - t267;
-    const real t269 = t47 * t268;
-    const real t270 = Theta_O[0] * t269;
-    const real t271 = Theta_O[1] * t264;
-    const real t272 = t270 + t271;
-    const real t273 = Theta_O[2] * t261;
-    const real t274 = t272 + t273;
-    const real t275 = gamma[0] + t274;
-    U_h[20] = t275;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 1.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 0.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 1.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 1.0;
-    U_h[41] = 0.0;
-    const real t276 = -t106;
-    U_h[42] = t276;
-    const real t277 = -t132;
-    U_h[43] = t277;
-    const real t278 = -t158;
-    U_h[44] = t278;
-    const real t279 = -t185;
-    U_h[45] = t279;
-    const real t280 = -t211;
-    U_h[46] = t280;
-    const real t281 = -t237;
-    U_h[47] = t281;
-    const real t282 = -t269;
-    U_h[48] = t282;
-    const real t283 = -t101;
-    U_h[49] = t283;
-    const real t284 = -t127;
-    U_h[50] = t284;
-    const real t285 = -t153;
-    U_h[51] = t285;
-    const real t286 = -t180;
-    U_h[52] = t286;
-    const real t287 = -t206;
-    U_h[53] = t287;
-    const real t288 = -t232;
-    U_h[54] = t288;
-    const real t289 = -t264;
-    U_h[55] = t289;
-    const real t290 = -t98;
-    U_h[56] = t290;
-    const real t291 = -t124;
-    U_h[57] = t291;
-    const real t292 = -t150;
-    U_h[58] = t292;
-    const real t293 = -t177;
-    U_h[59] = t293;
-    const real t294 = -t203;
-    U_h[60] = t294;
-    const real t295 = -t229;
-    U_h[61] = t295;
-    const real t296 = -t261;
-    U_h[62] = t296;
-    U_h[63] = 0.0;
-    U_h[64] = 0.0;
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 1.0;
-    return 0;
+  real t1 = W[6] - W[2] * Theta_O[0];
+  real t2 = fabs(t1);
+  real t4 = W[16] - W[12] * Theta_O[0];
+  real t5 = fabs(t4);
+  real t6 = t2 < t5;
+  real t7 = t6 != 0 ? t4 : t1;
+  real t10 = W[26] - W[22] * Theta_O[0];
+  real t11 = fabs(t10);
+  real t12 = (fabs(t7)) < t11;
+  real t14 = W[27] - W[22] * Theta_O[1];
+  real t18 = W[28] - W[22] * Theta_O[2];
+  real t20 = t11 + (fabs(t14)) + (fabs(t18));
+  real t22 = W[17] - W[12] * Theta_O[1];
+  real t26 = W[18] - W[12] * Theta_O[2];
+  real t28 = t5 + (fabs(t22)) + (fabs(t26));
+  real t30 = W[7] - W[2] * Theta_O[1];
+  real t34 = W[8] - W[2] * Theta_O[2];
+  real t36 = t2 + (fabs(t30)) + (fabs(t34));
+  real t37 = t6 != 0 ? t28 : t36;
+  real t40 = t12 != 0 ? t10 : t7;
+  if (!(((t12 != 0 ? t20 : t37) * ((real)1 / (real)10000000000000) < (fabs(t40))))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t44 = t6 != 0 ? t22 : t30;
+  real t45 = t12 != 0 ? t14 : t44;
+  real t47 = 1.0 / t40;
+  real t48 = (t6 != 0 ? t1 : t4) * t47;
+  real t50 = (t6 != 0 ? t30 : t22) - t45 * t48;
+  real t54 = (t12 != 0 ? t7 : t10) * t47;
+  real t56 = (t12 != 0 ? t44 : t14) - t45 * t54;
+  real t58 = (fabs(t50)) < (fabs(t56));
+  real t59 = t12 != 0 ? t37 : t20;
+  real t60 = t6 != 0 ? t36 : t28;
+  real t63 = t58 != 0 ? t56 : t50;
+  if (!((((real)1 / (real)10000000000000) * (t58 != 0 ? t59 : t60) < (fabs(t63))))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t69 = t6 != 0 ? t26 : t34;
+  real t70 = t12 != 0 ? t18 : t69;
+  real t72 = (t6 != 0 ? t34 : t26) - t70 * t48;
+  real t75 = (t12 != 0 ? t69 : t18) - t70 * t54;
+  real t77 = t58 != 0 ? t75 : t72;
+  real t79 = 1.0 / t63;
+  real t80 = (t58 != 0 ? t50 : t56) * t79;
+  real t82 = (t58 != 0 ? t72 : t75) - t77 * t80;
+  if (!((((real)1 / (real)10000000000000) * (t58 != 0 ? t60 : t59) < (fabs(t82))))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = 0.0;
+  U_h[8] = 1.0;
+  U_h[9] = U_h[10] = U_h[11] = U_h[12] = U_h[13] = 0.0;
+  real t85 = t6 != 0 ? W[10] : W[0];
+  real t86 = t12 != 0 ? W[20] : t85;
+  real t89 = (t12 != 0 ? t85 : W[20]) - t86 * t54;
+  real t92 = (t6 != 0 ? W[0] : W[10]) - t86 * t48;
+  real t93 = t58 != 0 ? t89 : t92;
+  real t97 = 1.0 / t82;
+  real t98 = ((t58 != 0 ? t92 : t89) - t93 * t80) * t97;
+  real t101 = t79 * (t93 - t77 * t98);
+  real t106 = t47 * (t86 - t45 * t101 - t70 * t98);
+  U_h[14] = Theta_O[0] * t106 + Theta_O[1] * t101 + Theta_O[2] * t98;
+  real t112 = t6 != 0 ? W[11] : W[1];
+  real t113 = t12 != 0 ? W[21] : t112;
+  real t116 = (t12 != 0 ? t112 : W[21]) - t113 * t54;
+  real t119 = (t6 != 0 ? W[1] : W[11]) - t113 * t48;
+  real t120 = t58 != 0 ? t116 : t119;
+  real t124 = ((t58 != 0 ? t119 : t116) - t120 * t80) * t97;
+  real t127 = t79 * (t120 - t77 * t124);
+  real t132 = t47 * (t113 - t45 * t127 - t70 * t124);
+  U_h[15] = Theta_O[0] * t132 + Theta_O[1] * t127 + Theta_O[2] * t124;
+  real t138 = t6 != 0 ? W[12] : W[2];
+  real t139 = t12 != 0 ? W[22] : t138;
+  real t142 = (t12 != 0 ? t138 : W[22]) - t139 * t54;
+  real t145 = (t6 != 0 ? W[2] : W[12]) - t139 * t48;
+  real t146 = t58 != 0 ? t142 : t145;
+  real t150 = ((t58 != 0 ? t145 : t142) - t146 * t80) * t97;
+  real t153 = t79 * (t146 - t77 * t150);
+  real t158 = t47 * (t139 - t45 * t153 - t70 * t150);
+  U_h[16] = 1.0 + (Theta_O[0] * t158 + Theta_O[1] * t153 + Theta_O[2] * t150);
+  real t165 = t6 != 0 ? W[13] : W[3];
+  real t166 = t12 != 0 ? W[23] : t165;
+  real t169 = (t12 != 0 ? t165 : W[23]) - t166 * t54;
+  real t172 = (t6 != 0 ? W[3] : W[13]) - t166 * t48;
+  real t173 = t58 != 0 ? t169 : t172;
+  real t177 = ((t58 != 0 ? t172 : t169) - t173 * t80) * t97;
+  real t180 = t79 * (t173 - t77 * t177);
+  real t185 = t47 * (t166 - t45 * t180 - t70 * t177);
+  U_h[17] = Theta_O[0] * t185 + Theta_O[1] * t180 + Theta_O[2] * t177;
+  real t191 = t6 != 0 ? W[14] : W[4];
+  real t192 = t12 != 0 ? W[24] : t191;
+  real t195 = (t12 != 0 ? t191 : W[24]) - t192 * t54;
+  real t198 = (t6 != 0 ? W[4] : W[14]) - t192 * t48;
+  real t199 = t58 != 0 ? t195 : t198;
+  real t203 = ((t58 != 0 ? t198 : t195) - t199 * t80) * t97;
+  real t206 = t79 * (t199 - t77 * t203);
+  real t211 = t47 * (t192 - t45 * t206 - t70 * t203);
+  U_h[18] = Theta_O[0] * t211 + Theta_O[1] * t206 + Theta_O[2] * t203;
+  real t217 = t6 != 0 ? W[15] : W[5];
+  real t218 = t12 != 0 ? W[25] : t217;
+  real t221 = (t12 != 0 ? t217 : W[25]) - t218 * t54;
+  real t224 = (t6 != 0 ? W[5] : W[15]) - t218 * t48;
+  real t225 = t58 != 0 ? t221 : t224;
+  real t229 = ((t58 != 0 ? t224 : t221) - t225 * t80) * t97;
+  real t232 = t79 * (t225 - t77 * t229);
+  real t237 = t47 * (t218 - t45 * t232 - t70 * t229);
+  U_h[19] = Theta_O[0] * t237 + Theta_O[1] * t232 + Theta_O[2] * t229;
+  real t244 = W[29] + W[22] * gamma[0];
+  real t246 = W[19] + W[12] * gamma[0];
+  real t248 = W[9] + W[2] * gamma[0];
+  real t249 = t6 != 0 ? t246 : t248;
+  real t250 = t12 != 0 ? t244 : t249;
+  real t253 = (t12 != 0 ? t249 : t244) - t250 * t54;
+  real t256 = (t6 != 0 ? t248 : t246) - t250 * t48;
+  real t257 = t58 != 0 ? t253 : t256;
+  real t261 = ((t58 != 0 ? t256 : t253) - t257 * t80) * t97;
+  real t264 = t79 * (t257 - t77 * t261);
+  real t269 = t47 * (t250 - t45 * t264 - t70 * t261);
+  U_h[20] = gamma[0] + (Theta_O[0] * t269 + Theta_O[1] * t264 + Theta_O[2] * t261);
+  U_h[21] = U_h[22] = U_h[23] = 0.0;
+  U_h[24] = 1.0;
+  U_h[25] = U_h[26] = U_h[27] = U_h[28] = U_h[29] = U_h[30] = U_h[31] = 0.0;
+  U_h[32] = 1.0;
+  U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = 0.0;
+  U_h[40] = 1.0;
+  U_h[41] = 0.0;
+  U_h[42] = -t106;
+  U_h[43] = -t132;
+  U_h[44] = -t158;
+  U_h[45] = -t185;
+  U_h[46] = -t211;
+  U_h[47] = -t237;
+  U_h[48] = -t269;
+  U_h[49] = -t101;
+  U_h[50] = -t127;
+  U_h[51] = -t153;
+  U_h[52] = -t180;
+  U_h[53] = -t206;
+  U_h[54] = -t232;
+  U_h[55] = -t264;
+  U_h[56] = -t98;
+  U_h[57] = -t124;
+  U_h[58] = -t150;
+  U_h[59] = -t177;
+  U_h[60] = -t203;
+  U_h[61] = -t229;
+  U_h[62] = -t261;
+  U_h[63] = U_h[64] = U_h[65] = U_h[66] = U_h[67] = U_h[68] = 0.0;
+  U_h[69] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_inputs[] = {
-    {"W", 30, "N", 0, 0},
-    {"Theta_O", 3, "1/m", 0, 0},
-    {"gamma", 1, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_outputs[] = {
-    {"U_h", 70, "[m, rad, N*m, N, m, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_planar_rigid_beam_transfer, (in[0], in[1], in[2], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_planar_rigid_beam_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_planar_rigid_beam_transfer,
-        .call = mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_outputs,
-        .ir_hash = "26e35afb7417e9d2fd3f05ce4e3be5969725030c38e67a472d6266abdc23c7f1",
-        .n_guards = 3,
-        .guards = mstmm_classical_hinge_fixed_planar_rigid_beam_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_planar_rigid_beam_transfer), 3, 1, (const
+    mstmm_port[]){{"W", 30, "N", 0, 0}, {"Theta_O", 3, "1/m", 0, 0}, {"gamma", 1, "rad", 0, 0}},
+    (const mstmm_port[]){{"U_h", 70, "[m, rad, N*m, N, m, 1]", 0, 0}},
+    "778fcd864baccdba55c74468c51586b1303037d0f1bcea411e5fa76ebf09065d", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_beam = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_planar_rigid_beam",
-    .hash = "7bd15c333c3eecce8a8d53867b9bebfc302275c710949e0be27db2ceba42e941",
+    .hash = "7ab51d96a24e0cc77b39b9f4adc989bbac8e0e0974b430a75dbd348092aca69b",
     .nq = 0,
     .nu = 0,
     .np = 0,

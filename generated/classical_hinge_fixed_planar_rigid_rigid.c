@@ -8,104 +8,44 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_rigid;
-int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(const real *restrict gamma,
-    real *restrict U_h);
-
 /* fixed hinge (planar), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.7
  * in  gamma[1] (rad) angle of the outboard from the inboard section
  * out U_h[7][7] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(const real *restrict gamma,
-    real *restrict U_h)
+int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(in_t gamma, out_t U_h)
 {
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 1.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 0.0;
-    U_h[15] = 0.0;
-    U_h[16] = 1.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = gamma[0];
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 1.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 0.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 1.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 1.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 0.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 1.0;
-    return 0;
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = 0.0;
+  U_h[8] = 1.0;
+  U_h[9] = U_h[10] = U_h[11] = U_h[12] = U_h[13] = U_h[14] = U_h[15] = 0.0;
+  U_h[16] = 1.0;
+  U_h[17] = U_h[18] = U_h[19] = 0.0;
+  U_h[20] = gamma[0];
+  U_h[21] = U_h[22] = U_h[23] = 0.0;
+  U_h[24] = 1.0;
+  U_h[25] = U_h[26] = U_h[27] = U_h[28] = U_h[29] = U_h[30] = U_h[31] = 0.0;
+  U_h[32] = 1.0;
+  U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = 0.0;
+  U_h[40] = 1.0;
+  U_h[41] = U_h[42] = U_h[43] = U_h[44] = U_h[45] = U_h[46] = U_h[47] = 0.0;
+  U_h[48] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer_inputs[] = {
-    {"gamma", 1, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer_outputs[] = {
-    {"U_h", 49, "[m, rad, N*m, N, 1]", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer, (in[0], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_planar_rigid_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer,
-        .call = mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer_outputs,
-        .ir_hash = "410ca0db9910538ee0d8e5f1a926d7608d5c2ab521fb19e38ffac922ee1c6983",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer), 1, 1,
+    (const mstmm_port[]){{"gamma", 1, "rad", 0, 0}}, (const mstmm_port[]){{"U_h", 49,
+    "[m, rad, N*m, N, 1]", 0, 0}},
+    "fe7de7531a6ad6246e4e1e150b9016a6f06a78980a1963010d48056d819d6c4d", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_planar_rigid_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_planar_rigid_rigid",
-    .hash = "7e0cd2c5563103fddfa10d00d9488eb43e36428b304d7d5dbb5cc294f931cb8a",
+    .hash = "6514164d6153330e94ab29af6db6e5ca0a10876cd0ec6a2d7a52edcb9adcd072",
     .nq = 0,
     .nu = 0,
     .np = 0,

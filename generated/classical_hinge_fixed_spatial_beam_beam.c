@@ -8,13 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_beam;
-int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(const real *restrict W,
-    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
-    const real *restrict eta_pO, const real *restrict beta, real *restrict U_h);
-
 /* fixed hinge (spatial), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.10, (8.194) to (8.199)
  * in  W[2][15] (N) modal rows of the outboard body
  * in  S_I[3][2] (1/m) section rotation per mode at the inboard side of the hinge, inertial axes
  * in  eta_pI[2] (m) predicted modal coordinates, inboard body
@@ -23,685 +17,209 @@ int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(const real *restrict 
  * in  beta[3] (rad) inboard less outboard section at the predictor (0 where the weld is closed)
  * out U_h[15][15] ([m, rad, N*m, N, m, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(const real *restrict W,
-    const real *restrict S_I, const real *restrict eta_pI, const real *restrict S_O,
-    const real *restrict eta_pO, const real *restrict beta, real *restrict U_h)
+int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(in_t W, in_t S_I, in_t eta_pI, in_t S_O,
+    in_t eta_pO, in_t beta, out_t U_h)
 {
-    const real t0 = W[3] * S_O[0];
-    const real t1 = W[4] * S_O[2];
-    const real t2 = t0 + t1;
-    const real t3 = W[5] * S_O[4];
-    const real t4 = t2 + t3;
-    const real t5 = W[12] - t4;
-    const real t6 = fabs(t5);
-    const real t7 = W[18] * S_O[0];
-    const real t8 = W[19] * S_O[2];
-    const real t9 = t7 + t8;
-    const real t10 = W[20] * S_O[4];
-    const real t11 = t9 + t10;
-    const real t12 = W[27] - t11;
-    const real t13 = fabs(t12);
-    const real t14 = t6 < t13;
-    const real t15 = W[18] * S_O[1];
-    const real t16 = W[19] * S_O[3];
-    const real t17 = t15 + t16;
-    const real t18 = W[20] * S_O[5];
-    const real t19 = t17 + t18;
-    const real t20 = W[28] - t19;
-    const real t21 = fabs(t20);
-    const real t22 = t13 + t21;
-    const real t23 = W[3] * S_O[1];
-    const real t24 = W[4] * S_O[3];
-    const real t25 = t23 + t24;
-    const real t26 = W[5] * S_O[5];
-    const real t27 = t25 + t26;
-    const real t28 = W[13] - t27;
-    const real t29 = fabs(t28);
-    const real t30 = t6 + t29;
-    const real t31 = t14 != 0 ? t22 : t30;
-    const real t32 = t31 * ((real)1 / (real)10000000000000);
-    const real t33 = t14 != 0 ? t12 : t5;
-    const real t34 = fabs(t33);
-    const real t35 = t32 < t34;
-    if (!(t35 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t36 = t14 != 0 ? t30 : t22;
-    const real t37 = t36 * ((real)1 / (real)10000000000000);
-    const real t38 = t14 != 0 ? t28 : t20;
-    const real t39 = t14 != 0 ? t20 : t28;
-    const real t40 = t14 != 0 ? t5 : t12;
-    const real t41 = 1.0 / t33;
-    const real t42 = t40 * t41;
-    const real t43 = t39 * t42;
-    const real t44 = t38 - t43;
-    const real t45 = fabs(t44);
-    const real t46 = t37 < t45;
-    if (!(t46 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 0.0;
-    U_h[15] = 0.0;
-    U_h[16] = 1.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 0.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 1.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 0.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 0.0;
-    const real t47 = t14 != 0 ? W[15] : W[0];
-    const real t48 = t14 != 0 ? W[0] : W[15];
-    const real t49 = t47 * t42;
-    const real t50 = t48 - t49;
-    const real t51 = 1.0 / t44;
-    const real t52 = t50 * t51;
-    const real t53 = t39 * t52;
-    const real t54 = t47 - t53;
-    const real t55 = t41 * t54;
-    const real t56 = S_O[0] * t55;
-    const real t57 = S_O[1] * t52;
-    const real t58 = t56 + t57;
-    U_h[45] = t58;
-    const real t59 = t14 != 0 ? W[16] : W[1];
-    const real t60 = t14 != 0 ? W[1] : W[16];
-    const real t61 = t59 * t42;
-    const real t62 = t60 - t61;
-    const real t63 = t62 * t51;
-    const real t64 = t39 * t63;
-    const real t65 = t59 - t64;
-    const real t66 = t41 * t65;
-    const real t67 = S_O[0] * t66;
-    const real t68 = S_O[1] * t63;
-    const real t69 = t67 + t68;
-    U_h[46] = t69;
-    const real t70 = t14 != 0 ? W[17] : W[2];
-    const real t71 = t14 != 0 ? W[2] : W[17];
-    const real t72 = t70 * t42;
-    const real t73 = t71 - t72;
-    const real t74 = t73 * t51;
-    const real t75 = t39 * t74;
-    const real t76 = t70 - t75;
-    const real t77 = t41 * t76;
-    const real t78 = S_O[0] * t77;
-    const real t79 = S_O[1] * t74;
-    const real t80 = t78 + t79;
-    U_h[47] = t80;
-    const real t81 = t14 != 0 ? W[18] : W[3];
-    const real t82 = t14 != 0 ? W[3] : W[18];
-    const real t83 = t81 * t42;
-    const real t84 = t82 - t83;
-    const real t85 = t84 * t51;
-    const real t86 = t39 * t85;
-    const real t87 = t81 - t86;
-    const real t88 = t41 * t87;
-    const real t89 = S_O[0] * t88;
-    const real t90 = S_O[1] * t85;
-    const real t91 = t89 + t90;
-    const real t92 = 1.0 + t91;
-    U_h[48] = t92;
-    const real t93 = t14 != 0 ? W[19] : W[4];
-    const real t94 = t14 != 0 ? W[4] : W[19];
-    const real t95 = t93 * t42;
-    const real t96 = t94 - t95;
-    const real t97 = t96 * t51;
-    const real t98 = t39 * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t41 * t99;
-    const real t101 = S_O[0] * t100;
-    const real t102 = S_O[1] * t97;
-    const real t103 = t101 + t102;
-    U_h[49] = t103;
-    const real t104 = t14 != 0 ? W[20] : W[5];
-    const real t105 = t14 != 0 ? W[5] : W[20];
-    const real t106 = t104 * t42;
-    const real t107 = t105 - t106;
-    const real t108 = t107 * t51;
-    const real t109 = t39 * t108;
-    const real t110 = t104 - t109;
-    const real t111 = t41 * t110;
-    const real t112 = S_O[0] * t111;
-    const real t113 = S_O[1] * t108;
-    const real t114 = t112 + t113;
-    U_h[50] = t114;
-    const real t115 = t14 != 0 ? W[21] : W[6];
-    const real t116 = t14 != 0 ? W[6] : W[21];
-    const real t117 = t115 * t42;
-    const real t118 = t116 - t117;
-    const real t119 = t118 * t51;
-    const real t120 = t39 * t119;
-    const real t121 = t115 - t120;
-    const real t122 = t41 * t121;
-    const real t123 = S_O[0] * t122;
-    const real t124 = S_O[1] * t119;
-    const real t125 = t123 + t124;
-    U_h[51] = t125;
-    const real t126 = t14 != 0 ? W[22] : W[7];
-    const real t127 = t14 != 0 ? W[7] : W[22];
-    const real t128 = t126 * t42;
-    const real t129 = t127 - t128;
-    const real t130 = t129 * t51;
-    const real t131 = t39 * t130;
-    const real t132 = t126 - t131;
-    const real t133 = t41 * t132;
-    const real t134 = S_O[0] * t133;
-    const real t135 = S_O[1] * t130;
-    const real t136 = t134 + t135;
-    U_h[52] = t136;
-    const real t137 = t14 != 0 ? W[23] : W[8];
-    const real t138 = t14 != 0 ? W[8] : W[23];
-    const real t139 = t137 * t42;
-    const real t140 = t138 - t139;
-    const real t141 = t140 * t51;
-    const real t142 = t39 * t141;
-    const real t143 = t137 - t142;
-    const real t144 = t41 * t143;
-    const real t145 = S_O[0] * t144;
-    const real t146 = S_O[1] * t141;
-    const real t147 = t145 + t146;
-    U_h[53] = t147;
-    const real t148 = t14 != 0 ? W[24] : W[9];
-    const real t149 = t14 != 0 ? W[9] : W[24];
-    const real t150 = t148 * t42;
-    const real t151 = t149 - t150;
-    const real t152 = t151 * t51;
-    const real t153 = t39 * t152;
-    const real t154 = t148 - t153;
-    const real t155 = t41 * t154;
-    const real t156 = S_O[0] * t155;
-    const real t157 = S_O[1] * t152;
-    const real t158 = t156 + t157;
-    U_h[54] = t158;
-    const real t159 = t14 != 0 ? W[25] : W[10];
-    const real t160 = t14 != 0 ? W[10] : W[25];
-    const real t161 = t159 * t42;
-    const real t162 = t160 - t161;
-    const real t163 = t162 * t51;
-    const real t164 = t39 * t163;
-    const real t165 = t159 - t164;
-    const real t166 = t41 * t165;
-    const real t167 = S_O[0] * t166;
-    const real t168 = S_O[1] * t163;
-    const real t169 = t167 + t168;
-    U_h[55] = t169;
-    const real t170 = t14 != 0 ? W[26] : W[11];
-    const real t171 = t14 != 0 ? W[11] : W[26];
-    const real t172 = t170 * t42;
-    const real t173 = t171 - t172;
-    const real t174 = t173 * t51;
-    const real t175 = t39 * t174;
-    const real t176 = t170 - t175;
-    const real t177 = t41 * t176;
-    const real t178 = S_O[0] * t177;
-    const real t179 = S_O[1] * t174;
-    const real t180 = t178 + t179;
-    U_h[56] = t180;
-    const real t181 = W[18] * S_I[0];
-    const real t182 = W[19] * S_I[2];
-    const real t183 = t181 + t182;
-    const real t184 = W[20] * S_I[4];
-    const real t185 = t183 + t184;
-    const real t186 = W[3] * S_I[0];
-    const real t187 = W[4] * S_I[2];
-    const real t188 = t186 + t187;
-    const real t189 = W[5] * S_I[4];
-    const real t190 = t188 + t189;
-    const real t191 = t14 != 0 ? t185 : t190;
-    const real t192 = t14 != 0 ? t190 : t185;
-    const real t193 = t191 * t42;
-    const real t194 = t192 - t193;
-    const real t195 = t194 * t51;
-    const real t196 = t39 * t195;
-    const real t197 = t191 - t196;
-    const real t198 = t41 * t197;
-    const real t199 = S_O[0] * t198;
-    const real t200 = S_O[1] * t195;
-    const real t201 = t199 + t200;
-    const real t202 = S_I[0] + t201;
-    U_h[57] = t202;
-    const real t203 = W[18] * S_I[1];
-    const real t204 = W[19] * S_I[3];
-    const real t205 = t203 + t204;
-    const real t206 = W[20] * S_I[5];
-    const real t207 = t205 + t206;
-    const real t208 = W[3] * S_I[1];
-    const real t209 = W[4] * S_I[3];
-    const real t210 = t208 + t209;
-    const real t211 = W[5] * S_I[5];
-    const real t212 = t210 + t211;
-    const real t213 = t14 != 0 ? t207 : t212;
-    const real t214 = t14 != 0 ? t212 : t207;
-    const real t215 = t213 * t42;
-    const real t216 = t214 - t215;
-    const real t217 = t216 * t51;
-    const real t218 = t39 * t217;
-    const real t219 = t213 - t218;
-    const real t220 = t41 * t219;
-    const real t221 = S_O[0] * t220;
-    const real t222 = S_O[1] * t217;
-    const real t223 = t221 + t222;
-    const real t224 = S_I[1] + t223;
-    U_h[58] = t224;
-    const real t225 = S_O[1] * eta_pO[1];
-    const real t226 = S_O[0] * eta_pO[0];
-    const real t227 = S_I[0] * eta_pI[0];
-    const real t228 = S_I[1] * eta_pI[1];
-    const real t229 = t227 + t228;
-    const real t230 = t226 - t229;
-    const real t231 = t225 + t230;
-    const real t232 = beta[0] + t231;
-    const real t233 = W[18] * t232;
-    const real t234 = S_O[3] * eta_pO[1];
-    const real t235 = S_O[2] * eta_pO[0];
-    const real t236 = S_I[2] * eta_pI[0];
-    const real t237 = S_I[3] * eta_pI[1];
-    const real t238 = t236 + t237;
-    const real t239 = t235 - t238;
-    const real t240 = t234 + t239;
-    const real t241 = beta[1] + t240;
-    const real t242 = W[19] * t241;
-    const real t243 = t233 + t242;
-    const real t244 = S_O[5] * eta_pO[1];
-    const real t245 = S_O[4] * eta_pO[0];
-    const real t246 = S_I[4] * eta_pI[0];
-    const real t247 = S_I[5] * eta_pI[1];
-    const real t248 = t246 + t247;
-    const real t249 = t245 - t248;
-    const real t250 = t244 + t249;
-    const real t251 = beta[2] + t250;
-    const real t252 = W[20] * t251;
-    const real t253 = t243 + t252;
-    const real t254 = W[29] + t253;
-    const real t255 = W[3] * t232;
-    const real t256 = W[4] * t241;
-    const real t257 = t255 + t256;
-    const real t258 = W[5] * t251;
-    const real t259 = t257 + t258;
-    const real t260 = W[14] + t259;
-    const real t261 = t14 != 0 ? t254 : t260;
-    const real t262 = t14 != 0 ? t260 : t254;
-    const real t263 = t261 * t42;
-    const real t264 = t262 - t263;
-    const real t265 = t264 * t51;
-    const real t266 = t39 * t265;
-    const real t267 = t261 - t266;
-    const real t268 = t41 * t267;
-    const real t269 = S_O[0] * t268;
-    const real t270 = S_O[1] * t265;
-    const real t271 = t269 + t270;
-    const real t272 = t232 + t271;
-    U_h[59] = t272;
-    const real t273 = S_O[2] * t55;
-    const real t274 = S_O[3] * t52;
-    const real t275 = t273 + t274;
-    U_h[60] = t275;
-    const real t276 = S_O[2] * t66;
-    const real t277 = S_O[3] * t63;
-    const real t278 = t276 + t277;
-    U_h[61] = t278;
-    const real t279 = S_O[2] * t77;
-    const real t280 = S_O[3] * t74;
-    const real t281 = t279 + t280;
-    U_h[62] = t281;
-    const real t282 = S_O[2] * t88;
-    const real t283 = S_O[3] * t85;
-    const real t284 = t282 + t283;
-    U_h[63] = t284;
-    const real t285 = S_O[2] * t100;
-    const real t286 = S_O[3] * t97;
-    const real t287 = t285 + t286;
-    const real t288 = 1.0 + t287;
-    U_h[64] = t288;
-    const real t289 = S_O[2] * t111;
-    const real t290 = S_O[3] * t108;
-    const real t291 = t289 + t290;
-    U_h[65] = t291;
-    const real t292 = S_O[2] * t122;
-    const real t293 = S_O[3] * t119;
-    const real t294 = t292 + t293;
-    U_h[66] = t294;
-    const real t295 = S_O[2] * t133;
-    const real t296 = S_O[3] * t130;
-    const real t297 = t295 + t296;
-    U_h[67] = t297;
-    const real t298 = S_O[2] * t144;
-    const real t299 = S_O[3] * t141;
-    const real t300 = t298 + t299;
-    U_h[68] = t300;
-    const real t301 = S_O[2] * t155;
-    const real t302 = S_O[3] * t152;
-    const real t303 = t301 + t302;
-    U_h[69] = t303;
-    const real t304 = S_O[2] * t166;
-    const real t305 = S_O[3] * t163;
-    const real t306 = t304 + t305;
-    U_h[70] = t306;
-    const real t307 = S_O[2] * t177;
-    const real t308 = S_O[3] * t174;
-    const real t309 = t307 + t308;
-    U_h[71] = t309;
-    const real t310 = S_O[2] * t198;
-    const real t311 = S_O[3] * t195;
-    const real t312 = t310 + t311;
-    const real t313 = S_I[2] + t312;
-    U_h[72] = t313;
-    const real t314 = S_O[2] * t220;
-    const real t315 = S_O[3] * t217;
-    const real t316 = t314 + t315;
-    const real t317 = S_I[3] + t316;
-    U_h[73] = t317;
-    const real t318 = S_O[2] * t268;
-    const real t319 = S_O[3] * t265;
-    const real t320 = t318 + t319;
-    const real t321 = t241 + t320;
-    U_h[74] = t321;
-    const real t322 = S_O[4] * t55;
-    const real t323 = S_O[5] * t52;
-    const real t324 = t322 + t323;
-    U_h[75] = t324;
-    const real t325 = S_O[4] * t66;
-    const real t326 = S_O[5] * t63;
-    const real t327 = t325 + t326;
-    U_h[76] = t327;
-    const real t328 = S_O[4] * t77;
-    const real t329 = S_O[5] * t74;
-    const real t330 = t328 + t329;
-    U_h[77] = t330;
-    const real t331 = S_O[4] * t88;
-    const real t332 = S_O[5] * t85;
-    const real t333 = t331 + t332;
-    U_h[78] = t333;
-    const real t334 = S_O[4] * t100;
-    const real t335 = S_O[5] * t97;
-    const real t336 = t334 + t335;
-    U_h[79] = t336;
-    const real t337 = S_O[4] * t111;
-    const real t338 = S_O[5] * t108;
-    const real t339 = t337 + t338;
-    const real t340 = 1.0 + t339;
-    U_h[80] = t340;
-    const real t341 = S_O[4] * t122;
-    const real t342 = S_O[5] * t119;
-    const real t343 = t341 + t342;
-    U_h[81] = t343;
-    const real t344 = S_O[4] * t133;
-    const real t345 = S_O[5] * t130;
-    const real t346 = t344 + t345;
-    U_h[82] = t346;
-    const real t347 = S_O[4] * t144;
-    const real t348 = S_O[5] * t141;
-    const real t349 = t347 + t348;
-    U_h[83] = t349;
-    const real t350 = S_O[4] * t155;
-    const real t351 = S_O[5] * t152;
-    const real t352 = t350 + t351;
-    U_h[84] = t352;
-    const real t353 = S_O[4] * t166;
-    const real t354 = S_O[5] * t163;
-    const real t355 = t353 + t354;
-    U_h[85] = t355;
-    const real t356 = S_O[4] * t177;
-    const real t357 = S_O[5] * t174;
-    const real t358 = t356 + t357;
-    U_h[86] = t358;
-    const real t359 = S_O[4] * t198;
-    const real t360 = S_O[5] * t195;
-    const real t361 = t359 + t360;
-    const real t362 = S_I[4] + t361;
-    U_h[87] = t362;
-    const real t363 = S_O[4] * t220;
-    const real t364 = S_O[5] * t217;
-    const real t365 = t363 + t364;
-    const real t366 = S_I[5] + t365;
-    U_h[88] = t366;
-    const real t367 = S_O[4] * t268;
-    const real t368 = S_O[5] * t265;
-    const real t369 = t367 + t368;
-    const real t370 = t251 + t369;
-    U_h[89] = t370;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 1.0;
-    U_h[97] = 0.0;
-    U_h[98] = 0.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 0.0;
-    U_h[127] = 0.0;
-    U_h[128] = 1.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 0.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 1.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 0.0;
-    U_h[155] = 0.0;
-    U_h[156] = 0.0;
-    U_h[157] = 0.0;
-    U_h[158] = 0.0;
-    U_h[159] = 0.0;
-    U_h[160] = 1.0;
-    U_h[161] = 0.0;
-    U_h[162] = 0.0;
-    U_h[163] = 0.0;
-    U_h[164] = 0.0;
-    U_h[165] = 0.0;
-    U_h[166] = 0.0;
-    U_h[167] = 0.0;
-    U_h[168] = 0.0;
-    U_h[169] = 0.0;
-    U_h[170] = 0.0;
-    U_h[171] = 0.0;
-    U_h[172] = 0.0;
-    U_h[173] = 0.0;
-    U_h[174] = 0.0;
-    U_h[175] = 0.0;
-    U_h[176] = 1.0;
-    U_h[177] = 0.0;
-    U_h[178] = 0.0;
-    U_h[179] = 0.0;
-    const real t371 = -t55;
-    U_h[180] = t371;
-    const real t372 = -t66;
-    U_h[181] = t372;
-    const real t373 = -t77;
-    U_h[182] = t373;
-    const real t374 = -t88;
-    U_h[183] = t374;
-    const real t375 = -t100;
-    U_h[184] = t375;
-    const real t376 = -t111;
-    U_h[185] = t376;
-    const real t377 = -t122;
-    U_h[186] = t377;
-    const real t378 = -t133;
-    U_h[187] = t378;
-    const real t379 = -t144;
-    U_h[188] = t379;
-    const real t380 = -t155;
-    U_h[189] = t380;
-    const real t381 = -t166;
-    U_h[190] = t381;
-    const real t382 = -t177;
-    U_h[191] = t382;
-    const real t383 = -t198;
-    U_h[192] = t383;
-    const real t384 = -t220;
-    U_h[193] = t384;
-    const real t385 = -t268;
-    U_h[194] = t385;
-    const real t386 = -t52;
-    U_h[195] = t386;
-    const real t387 = -t63;
-    U_h[196] = t387;
-    const real t388 = -t74;
-    U_h[197] = t388;
-    const real t389 = -t85;
-    U_h[198] = t389;
-    const real t390 = -t97;
-    U_h[199] = t390;
-    const real t391 = -t108;
-    U_h[200] = t391;
-    const real t392 = -t119;
-    U_h[201] = t392;
-    const real t393 = -t130;
-    U_h[202] = t393;
-    const real t394 = -t141;
-    U_h[203] = t394;
-    const real t395 = -t152;
-    U_h[204] = t395;
-    const real t396 = -t163;
-    U_h[205] = t396;
-    const real t397 = -t174;
-    U_h[206] = t397;
-    const real t398 = -t195;
-    U_h[207] = t398;
-    const real t399 = -t217;
-    U_h[208] = t399;
-    const real t400 = -t265;
-    U_h[209] = t400;
-    U_h[210] = 0.0;
-    U_h[211] = 0.0;
-    U_h[212] = 0.0;
-    U_h[213] = 0.0;
-    U_h[214] = 0.0;
-    U_h[215] = 0.0;
-    U_h[216] = 0.0;
-    U_h[217] = 0.0;
-    U_h[218] = 0.0;
-    U_h[219] = 0.0;
-    U_h[220] = 0.0;
-    U_h[221] = 0.0;
-    U_h[222] = 0.0;
-    U_h[223] = 0.0;
-    U_h[224] = 1.0;
-    return 0;
+  real t5 = W[12] - (W[3] * S_O[0] + W[4] * S_O[2] + W[5] * S_O[4]);
+  real t6 = fabs(t5);
+  real t12 = W[27] - (W[18] * S_O[0] + W[19] * S_O[2] + W[20] * S_O[4]);
+  real t13 = fabs(t12);
+  real t14 = t6 < t13;
+  real t20 = W[28] - (W[18] * S_O[1] + W[19] * S_O[3] + W[20] * S_O[5]);
+  real t22 = t13 + (fabs(t20));
+  real t28 = W[13] - (W[3] * S_O[1] + W[4] * S_O[3] + W[5] * S_O[5]);
+  real t30 = t6 + (fabs(t28));
+  real t33 = t14 != 0 ? t12 : t5;
+  if (!(((t14 != 0 ? t22 : t30) * ((real)1 / (real)10000000000000) < (fabs(t33))))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t39 = t14 != 0 ? t20 : t28;
+  real t41 = 1.0 / t33;
+  real t42 = (t14 != 0 ? t5 : t12) * t41;
+  real t44 = (t14 != 0 ? t28 : t20) - t39 * t42;
+  if (!(((t14 != 0 ? t30 : t22) * ((real)1 / (real)10000000000000) < (fabs(t44))))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = U_h[14] = U_h[15] = 0.0;
+  U_h[16] = 1.0;
+  U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24] = U_h[25] = U_h[26]
+    = U_h[27] = U_h[28] = U_h[29] = U_h[30] = U_h[31] = 0.0;
+  U_h[32] = 1.0;
+  U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = U_h[40] = U_h[41] = U_h[42]
+    = U_h[43] = U_h[44] = 0.0;
+  real t47 = t14 != 0 ? W[15] : W[0];
+  real t51 = 1.0 / t44;
+  real t52 = ((t14 != 0 ? W[0] : W[15]) - t47 * t42) * t51;
+  real t55 = t41 * (t47 - t39 * t52);
+  U_h[45] = S_O[0] * t55 + S_O[1] * t52;
+  real t59 = t14 != 0 ? W[16] : W[1];
+  real t63 = ((t14 != 0 ? W[1] : W[16]) - t59 * t42) * t51;
+  real t66 = t41 * (t59 - t39 * t63);
+  U_h[46] = S_O[0] * t66 + S_O[1] * t63;
+  real t70 = t14 != 0 ? W[17] : W[2];
+  real t74 = ((t14 != 0 ? W[2] : W[17]) - t70 * t42) * t51;
+  real t77 = t41 * (t70 - t39 * t74);
+  U_h[47] = S_O[0] * t77 + S_O[1] * t74;
+  real t81 = t14 != 0 ? W[18] : W[3];
+  real t85 = ((t14 != 0 ? W[3] : W[18]) - t81 * t42) * t51;
+  real t88 = t41 * (t81 - t39 * t85);
+  U_h[48] = 1.0 + (S_O[0] * t88 + S_O[1] * t85);
+  real t93 = t14 != 0 ? W[19] : W[4];
+  real t97 = ((t14 != 0 ? W[4] : W[19]) - t93 * t42) * t51;
+  real t100 = t41 * (t93 - t39 * t97);
+  U_h[49] = S_O[0] * t100 + S_O[1] * t97;
+  real t104 = t14 != 0 ? W[20] : W[5];
+  real t108 = ((t14 != 0 ? W[5] : W[20]) - t104 * t42) * t51;
+  real t111 = t41 * (t104 - t39 * t108);
+  U_h[50] = S_O[0] * t111 + S_O[1] * t108;
+  real t115 = t14 != 0 ? W[21] : W[6];
+  real t119 = ((t14 != 0 ? W[6] : W[21]) - t115 * t42) * t51;
+  real t122 = t41 * (t115 - t39 * t119);
+  U_h[51] = S_O[0] * t122 + S_O[1] * t119;
+  real t126 = t14 != 0 ? W[22] : W[7];
+  real t130 = ((t14 != 0 ? W[7] : W[22]) - t126 * t42) * t51;
+  real t133 = t41 * (t126 - t39 * t130);
+  U_h[52] = S_O[0] * t133 + S_O[1] * t130;
+  real t137 = t14 != 0 ? W[23] : W[8];
+  real t141 = ((t14 != 0 ? W[8] : W[23]) - t137 * t42) * t51;
+  real t144 = t41 * (t137 - t39 * t141);
+  U_h[53] = S_O[0] * t144 + S_O[1] * t141;
+  real t148 = t14 != 0 ? W[24] : W[9];
+  real t152 = ((t14 != 0 ? W[9] : W[24]) - t148 * t42) * t51;
+  real t155 = t41 * (t148 - t39 * t152);
+  U_h[54] = S_O[0] * t155 + S_O[1] * t152;
+  real t159 = t14 != 0 ? W[25] : W[10];
+  real t163 = ((t14 != 0 ? W[10] : W[25]) - t159 * t42) * t51;
+  real t166 = t41 * (t159 - t39 * t163);
+  U_h[55] = S_O[0] * t166 + S_O[1] * t163;
+  real t170 = t14 != 0 ? W[26] : W[11];
+  real t174 = ((t14 != 0 ? W[11] : W[26]) - t170 * t42) * t51;
+  real t177 = t41 * (t170 - t39 * t174);
+  U_h[56] = S_O[0] * t177 + S_O[1] * t174;
+  real t185 = W[18] * S_I[0] + W[19] * S_I[2] + W[20] * S_I[4];
+  real t190 = W[3] * S_I[0] + W[4] * S_I[2] + W[5] * S_I[4];
+  real t191 = t14 != 0 ? t185 : t190;
+  real t195 = ((t14 != 0 ? t190 : t185) - t191 * t42) * t51;
+  real t198 = t41 * (t191 - t39 * t195);
+  U_h[57] = S_I[0] + (S_O[0] * t198 + S_O[1] * t195);
+  real t207 = W[18] * S_I[1] + W[19] * S_I[3] + W[20] * S_I[5];
+  real t212 = W[3] * S_I[1] + W[4] * S_I[3] + W[5] * S_I[5];
+  real t213 = t14 != 0 ? t207 : t212;
+  real t217 = ((t14 != 0 ? t212 : t207) - t213 * t42) * t51;
+  real t220 = t41 * (t213 - t39 * t217);
+  U_h[58] = S_I[1] + (S_O[0] * t220 + S_O[1] * t217);
+  real t232 = beta[0] + (S_O[1] * eta_pO[1] + (S_O[0] * eta_pO[0] - (S_I[0] * eta_pI[0] + S_I[1] *
+    eta_pI[1])));
+  real t241 = beta[1] + (S_O[3] * eta_pO[1] + (S_O[2] * eta_pO[0] - (S_I[2] * eta_pI[0] + S_I[3] *
+    eta_pI[1])));
+  real t251 = beta[2] + (S_O[5] * eta_pO[1] + (S_O[4] * eta_pO[0] - (S_I[4] * eta_pI[0] + S_I[5] *
+    eta_pI[1])));
+  real t254 = W[29] + (W[18] * t232 + W[19] * t241 + W[20] * t251);
+  real t260 = W[14] + (W[3] * t232 + W[4] * t241 + W[5] * t251);
+  real t261 = t14 != 0 ? t254 : t260;
+  real t265 = ((t14 != 0 ? t260 : t254) - t261 * t42) * t51;
+  real t268 = t41 * (t261 - t39 * t265);
+  U_h[59] = t232 + (S_O[0] * t268 + S_O[1] * t265);
+  U_h[60] = S_O[2] * t55 + S_O[3] * t52;
+  U_h[61] = S_O[2] * t66 + S_O[3] * t63;
+  U_h[62] = S_O[2] * t77 + S_O[3] * t74;
+  U_h[63] = S_O[2] * t88 + S_O[3] * t85;
+  U_h[64] = 1.0 + (S_O[2] * t100 + S_O[3] * t97);
+  U_h[65] = S_O[2] * t111 + S_O[3] * t108;
+  U_h[66] = S_O[2] * t122 + S_O[3] * t119;
+  U_h[67] = S_O[2] * t133 + S_O[3] * t130;
+  U_h[68] = S_O[2] * t144 + S_O[3] * t141;
+  U_h[69] = S_O[2] * t155 + S_O[3] * t152;
+  U_h[70] = S_O[2] * t166 + S_O[3] * t163;
+  U_h[71] = S_O[2] * t177 + S_O[3] * t174;
+  U_h[72] = S_I[2] + (S_O[2] * t198 + S_O[3] * t195);
+  U_h[73] = S_I[3] + (S_O[2] * t220 + S_O[3] * t217);
+  U_h[74] = t241 + (S_O[2] * t268 + S_O[3] * t265);
+  U_h[75] = S_O[4] * t55 + S_O[5] * t52;
+  U_h[76] = S_O[4] * t66 + S_O[5] * t63;
+  U_h[77] = S_O[4] * t77 + S_O[5] * t74;
+  U_h[78] = S_O[4] * t88 + S_O[5] * t85;
+  U_h[79] = S_O[4] * t100 + S_O[5] * t97;
+  U_h[80] = 1.0 + (S_O[4] * t111 + S_O[5] * t108);
+  U_h[81] = S_O[4] * t122 + S_O[5] * t119;
+  U_h[82] = S_O[4] * t133 + S_O[5] * t130;
+  U_h[83] = S_O[4] * t144 + S_O[5] * t141;
+  U_h[84] = S_O[4] * t155 + S_O[5] * t152;
+  U_h[85] = S_O[4] * t166 + S_O[5] * t163;
+  U_h[86] = S_O[4] * t177 + S_O[5] * t174;
+  U_h[87] = S_I[4] + (S_O[4] * t198 + S_O[5] * t195);
+  U_h[88] = S_I[5] + (S_O[4] * t220 + S_O[5] * t217);
+  U_h[89] = t251 + (S_O[4] * t268 + S_O[5] * t265);
+  U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94] = U_h[95] = 0.0;
+  U_h[96] = 1.0;
+  U_h[97] = U_h[98] = U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] =
+    U_h[106] = U_h[107] = U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = U_h[126] = U_h[127] = 0.0;
+  U_h[128] = 1.0;
+  U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] = U_h[136] = U_h[137] =
+    U_h[138] = U_h[139] = U_h[140] = U_h[141] = U_h[142] = U_h[143] = 0.0;
+  U_h[144] = 1.0;
+  U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] = U_h[150] = U_h[151] = U_h[152] = U_h[153] =
+    U_h[154] = U_h[155] = U_h[156] = U_h[157] = U_h[158] = U_h[159] = 0.0;
+  U_h[160] = 1.0;
+  U_h[161] = U_h[162] = U_h[163] = U_h[164] = U_h[165] = U_h[166] = U_h[167] = U_h[168] = U_h[169] =
+    U_h[170] = U_h[171] = U_h[172] = U_h[173] = U_h[174] = U_h[175] = 0.0;
+  U_h[176] = 1.0;
+  U_h[177] = U_h[178] = U_h[179] = 0.0;
+  U_h[180] = -t55;
+  U_h[181] = -t66;
+  U_h[182] = -t77;
+  U_h[183] = -t88;
+  U_h[184] = -t100;
+  U_h[185] = -t111;
+  U_h[186] = -t122;
+  U_h[187] = -t133;
+  U_h[188] = -t144;
+  U_h[189] = -t155;
+  U_h[190] = -t166;
+  U_h[191] = -t177;
+  U_h[192] = -t198;
+  U_h[193] = -t220;
+  U_h[194] = -t268;
+  U_h[195] = -t52;
+  U_h[196] = -t63;
+  U_h[197] = -t74;
+  U_h[198] = -t85;
+  U_h[199] = -t97;
+  U_h[200] = -t108;
+  U_h[201] = -t119;
+  U_h[202] = -t130;
+  U_h[203] = -t141;
+  U_h[204] = -t152;
+  U_h[205] = -t163;
+  U_h[206] = -t174;
+  U_h[207] = -t195;
+  U_h[208] = -t217;
+  U_h[209] = -t265;
+  U_h[210] = U_h[211] = U_h[212] = U_h[213] = U_h[214] = U_h[215] = U_h[216] = U_h[217] = U_h[218] =
+    U_h[219] = U_h[220] = U_h[221] = U_h[222] = U_h[223] = 0.0;
+  U_h[224] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_inputs[] = {
-    {"W", 30, "N", 0, 0},
-    {"S_I", 6, "1/m", 0, 0},
-    {"eta_pI", 2, "m", 0, 0},
-    {"S_O", 6, "1/m", 0, 0},
-    {"eta_pO", 2, "m", 0, 0},
-    {"beta", 3, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_outputs[] = {
-    {"U_h", 225, "[m, rad, N*m, N, m, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_spatial_beam_beam_transfer, (in[0], in[1], in[2], in[3],
+  in[4], in[5], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_spatial_beam_beam_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_spatial_beam_beam_transfer,
-        .call = mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_outputs,
-        .ir_hash = "9e38390024285a6783dab6807a2df675df05d2ad5884d01b7c97bb77edc57563",
-        .n_guards = 2,
-        .guards = mstmm_classical_hinge_fixed_spatial_beam_beam_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_spatial_beam_beam_transfer), 6, 1, (const
+    mstmm_port[]){{"W", 30, "N", 0, 0}, {"S_I", 6, "1/m", 0, 0}, {"eta_pI", 2, "m", 0, 0}, {"S_O",
+    6, "1/m", 0, 0}, {"eta_pO", 2, "m", 0, 0}, {"beta", 3, "rad", 0, 0}}, (const
+    mstmm_port[]){{"U_h", 225, "[m, rad, N*m, N, m, 1]", 0, 0}},
+    "3a911bad08d4ef987c637fbd8aa9b2a4ccdd3854290d8040663380f69a9895ec", 2, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_beam = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_spatial_beam_beam",
-    .hash = "5d033dc1c6b7823a744dcf9e9347d4172b95b0cb98ca08fec33dd4f62b500696",
+    .hash = "5b4b627996a90d52ef36be8a82aa01daa4293e744a0425b10cc6622249447d9d",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,266 +8,78 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_rigid;
-int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(const real *restrict S_I,
-    const real *restrict eta_pI, const real *restrict beta, real *restrict U_h);
-
 /* fixed hinge (spatial), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.10, (8.200), (8.201)
  * in  S_I[3][2] (1/m) section rotation per mode at the inboard side of the hinge, inertial axes
  * in  eta_pI[2] (m) predicted modal coordinates, inboard body
  * in  beta[3] (rad) inboard less outboard section at the predictor (0 where the weld is closed)
  * out U_h[13][15] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(const real *restrict S_I,
-    const real *restrict eta_pI, const real *restrict beta, real *restrict U_h)
+int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(in_t S_I, in_t eta_pI, in_t beta,
+    out_t U_h)
 {
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 0.0;
-    U_h[15] = 0.0;
-    U_h[16] = 1.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 0.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 1.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 0.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 0.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 1.0;
-    U_h[49] = 0.0;
-    U_h[50] = 0.0;
-    U_h[51] = 0.0;
-    U_h[52] = 0.0;
-    U_h[53] = 0.0;
-    U_h[54] = 0.0;
-    U_h[55] = 0.0;
-    U_h[56] = 0.0;
-    U_h[57] = S_I[0];
-    U_h[58] = S_I[1];
-    const real t0 = S_I[0] * eta_pI[0];
-    const real t1 = S_I[1] * eta_pI[1];
-    const real t2 = t0 + t1;
-    const real t3 = beta[0] - t2;
-    U_h[59] = t3;
-    U_h[60] = 0.0;
-    U_h[61] = 0.0;
-    U_h[62] = 0.0;
-    U_h[63] = 0.0;
-    U_h[64] = 1.0;
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 0.0;
-    U_h[70] = 0.0;
-    U_h[71] = 0.0;
-    U_h[72] = S_I[2];
-    U_h[73] = S_I[3];
-    const real t4 = S_I[2] * eta_pI[0];
-    const real t5 = S_I[3] * eta_pI[1];
-    const real t6 = t4 + t5;
-    const real t7 = beta[1] - t6;
-    U_h[74] = t7;
-    U_h[75] = 0.0;
-    U_h[76] = 0.0;
-    U_h[77] = 0.0;
-    U_h[78] = 0.0;
-    U_h[79] = 0.0;
-    U_h[80] = 1.0;
-    U_h[81] = 0.0;
-    U_h[82] = 0.0;
-    U_h[83] = 0.0;
-    U_h[84] = 0.0;
-    U_h[85] = 0.0;
-    U_h[86] = 0.0;
-    U_h[87] = S_I[4];
-    U_h[88] = S_I[5];
-    const real t8 = S_I[4] * eta_pI[0];
-    const real t9 = S_I[5] * eta_pI[1];
-    const real t10 = t8 + t9;
-    const real t11 = beta[2] - t10;
-    U_h[89] = t11;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 1.0;
-    U_h[97] = 0.0;
-    U_h[98] = 0.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 0.0;
-    U_h[127] = 0.0;
-    U_h[128] = 1.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 0.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 1.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 0.0;
-    U_h[155] = 0.0;
-    U_h[156] = 0.0;
-    U_h[157] = 0.0;
-    U_h[158] = 0.0;
-    U_h[159] = 0.0;
-    U_h[160] = 1.0;
-    U_h[161] = 0.0;
-    U_h[162] = 0.0;
-    U_h[163] = 0.0;
-    U_h[164] = 0.0;
-    U_h[165] = 0.0;
-    U_h[166] = 0.0;
-    U_h[167] = 0.0;
-    U_h[168] = 0.0;
-    U_h[169] = 0.0;
-    U_h[170] = 0.0;
-    U_h[171] = 0.0;
-    U_h[172] = 0.0;
-    U_h[173] = 0.0;
-    U_h[174] = 0.0;
-    U_h[175] = 0.0;
-    U_h[176] = 1.0;
-    U_h[177] = 0.0;
-    U_h[178] = 0.0;
-    U_h[179] = 0.0;
-    U_h[180] = 0.0;
-    U_h[181] = 0.0;
-    U_h[182] = 0.0;
-    U_h[183] = 0.0;
-    U_h[184] = 0.0;
-    U_h[185] = 0.0;
-    U_h[186] = 0.0;
-    U_h[187] = 0.0;
-    U_h[188] = 0.0;
-    U_h[189] = 0.0;
-    U_h[190] = 0.0;
-    U_h[191] = 0.0;
-    U_h[192] = 0.0;
-    U_h[193] = 0.0;
-    U_h[194] = 1.0;
-    return 0;
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = U_h[14] = U_h[15] = 0.0;
+  U_h[16] = 1.0;
+  U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24] = U_h[25] = U_h[26]
+    = U_h[27] = U_h[28] = U_h[29] = U_h[30] = U_h[31] = 0.0;
+  U_h[32] = 1.0;
+  U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = U_h[40] = U_h[41] = U_h[42]
+    = U_h[43] = U_h[44] = U_h[45] = U_h[46] = U_h[47] = 0.0;
+  U_h[48] = 1.0;
+  U_h[49] = U_h[50] = U_h[51] = U_h[52] = U_h[53] = U_h[54] = U_h[55] = U_h[56] = 0.0;
+  U_h[57] = S_I[0];
+  U_h[58] = S_I[1];
+  U_h[59] = beta[0] - (S_I[0] * eta_pI[0] + S_I[1] * eta_pI[1]);
+  U_h[60] = U_h[61] = U_h[62] = U_h[63] = 0.0;
+  U_h[64] = 1.0;
+  U_h[65] = U_h[66] = U_h[67] = U_h[68] = U_h[69] = U_h[70] = U_h[71] = 0.0;
+  U_h[72] = S_I[2];
+  U_h[73] = S_I[3];
+  U_h[74] = beta[1] - (S_I[2] * eta_pI[0] + S_I[3] * eta_pI[1]);
+  U_h[75] = U_h[76] = U_h[77] = U_h[78] = U_h[79] = 0.0;
+  U_h[80] = 1.0;
+  U_h[81] = U_h[82] = U_h[83] = U_h[84] = U_h[85] = U_h[86] = 0.0;
+  U_h[87] = S_I[4];
+  U_h[88] = S_I[5];
+  U_h[89] = beta[2] - (S_I[4] * eta_pI[0] + S_I[5] * eta_pI[1]);
+  U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94] = U_h[95] = 0.0;
+  U_h[96] = 1.0;
+  U_h[97] = U_h[98] = U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] =
+    U_h[106] = U_h[107] = U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = U_h[126] = U_h[127] = 0.0;
+  U_h[128] = 1.0;
+  U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] = U_h[136] = U_h[137] =
+    U_h[138] = U_h[139] = U_h[140] = U_h[141] = U_h[142] = U_h[143] = 0.0;
+  U_h[144] = 1.0;
+  U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] = U_h[150] = U_h[151] = U_h[152] = U_h[153] =
+    U_h[154] = U_h[155] = U_h[156] = U_h[157] = U_h[158] = U_h[159] = 0.0;
+  U_h[160] = 1.0;
+  U_h[161] = U_h[162] = U_h[163] = U_h[164] = U_h[165] = U_h[166] = U_h[167] = U_h[168] = U_h[169] =
+    U_h[170] = U_h[171] = U_h[172] = U_h[173] = U_h[174] = U_h[175] = 0.0;
+  U_h[176] = 1.0;
+  U_h[177] = U_h[178] = U_h[179] = U_h[180] = U_h[181] = U_h[182] = U_h[183] = U_h[184] = U_h[185] =
+    U_h[186] = U_h[187] = U_h[188] = U_h[189] = U_h[190] = U_h[191] = U_h[192] = U_h[193] = 0.0;
+  U_h[194] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer_inputs[] = {
-    {"S_I", 6, "1/m", 0, 0},
-    {"eta_pI", 2, "m", 0, 0},
-    {"beta", 3, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer_outputs[] = {
-    {"U_h", 195, "[m, rad, N*m, N, 1]", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer, (in[0], in[1], in[2], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_spatial_beam_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer,
-        .call = mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer_outputs,
-        .ir_hash = "f62e8610f9d91885d9afcb2245f92408d45545dcf50f4a94c3a8f9cc8f05ac9b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer), 3, 1,
+    (const mstmm_port[]){{"S_I", 6, "1/m", 0, 0}, {"eta_pI", 2, "m", 0, 0}, {"beta", 3, "rad", 0,
+    0}}, (const mstmm_port[]){{"U_h", 195, "[m, rad, N*m, N, 1]", 0, 0}},
+    "fcf7faeba23b62a9e7cf036f3c9577a0acaf4e877fdd1395ffd852702559209e", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_spatial_beam_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_spatial_beam_rigid",
-    .hash = "150733e0390a2803a5b4764ff0ca7ed7e0618036c3120c8939fea2fc8049c720",
+    .hash = "a64a523c4dc0d392969b08160a6d4331d451928cd11bb9c72f08ddb0b6d43cad",
     .nq = 0,
     .nu = 0,
     .np = 0,

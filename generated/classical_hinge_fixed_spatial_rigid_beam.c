@@ -8,590 +8,192 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_beam;
-int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(const real *restrict W,
-    const real *restrict S_O, const real *restrict eta_pO, const real *restrict beta,
-    real *restrict U_h);
-
 /* fixed hinge (spatial), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.10, (8.187) to (8.193)
  * in  W[2][15] (N) modal rows of the outboard body
  * in  S_O[3][2] (1/m) section rotation per mode at the outboard side of the hinge, inertial axes
  * in  eta_pO[2] (m) predicted modal coordinates, outboard body
  * in  beta[3] (rad) inboard less outboard section at the predictor (0 where the weld is closed)
  * out U_h[15][13] ([m, rad, N*m, N, m, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(const real *restrict W,
-    const real *restrict S_O, const real *restrict eta_pO, const real *restrict beta,
-    real *restrict U_h)
+int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(in_t W, in_t S_O, in_t eta_pO,
+    in_t beta, out_t U_h)
 {
-    const real t0 = W[3] * S_O[0];
-    const real t1 = W[4] * S_O[2];
-    const real t2 = t0 + t1;
-    const real t3 = W[5] * S_O[4];
-    const real t4 = t2 + t3;
-    const real t5 = W[12] - t4;
-    const real t6 = fabs(t5);
-    const real t7 = W[18] * S_O[0];
-    const real t8 = W[19] * S_O[2];
-    const real t9 = t7 + t8;
-    const real t10 = W[20] * S_O[4];
-    const real t11 = t9 + t10;
-    const real t12 = W[27] - t11;
-    const real t13 = fabs(t12);
-    const real t14 = t6 < t13;
-    const real t15 = W[18] * S_O[1];
-    const real t16 = W[19] * S_O[3];
-    const real t17 = t15 + t16;
-    const real t18 = W[20] * S_O[5];
-    const real t19 = t17 + t18;
-    const real t20 = W[28] - t19;
-    const real t21 = fabs(t20);
-    const real t22 = t13 + t21;
-    const real t23 = W[3] * S_O[1];
-    const real t24 = W[4] * S_O[3];
-    const real t25 = t23 + t24;
-    const real t26 = W[5] * S_O[5];
-    const real t27 = t25 + t26;
-    const real t28 = W[13] - t27;
-    const real t29 = fabs(t28);
-    const real t30 = t6 + t29;
-    const real t31 = t14 != 0 ? t22 : t30;
-    const real t32 = t31 * ((real)1 / (real)10000000000000);
-    const real t33 = t14 != 0 ? t12 : t5;
-    const real t34 = fabs(t33);
-    const real t35 = t32 < t34;
-    if (!(t35 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t36 = t14 != 0 ? t30 : t22;
-    const real t37 = t36 * ((real)1 / (real)10000000000000);
-    const real t38 = t14 != 0 ? t28 : t20;
-    const real t39 = t14 != 0 ? t20 : t28;
-    const real t40 = t14 != 0 ? t5 : t12;
-    const real t41 = 1.0 / t33;
-    const real t42 = t40 * t41;
-    const real t43 = t39 * t42;
-    const real t44 = t38 - t43;
-    const real t45 = fabs(t44);
-    const real t46 = t37 < t45;
-    if (!(t46 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 1.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 1.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    const real t47 = t14 != 0 ? W[15] : W[0];
-    const real t48 = t14 != 0 ? W[0] : W[15];
-    const real t49 = t47 * t42;
-    const real t50 = t48 - t49;
-    const real t51 = 1.0 / t44;
-    const real t52 = t50 * t51;
-    const real t53 = t39 * t52;
-    const real t54 = t47 - t53;
-    const real t55 = t41 * t54;
-    const real t56 = S_O[0] * t55;
-    const real t57 = S_O[1] * t52;
-    const real t58 = t56 + t57;
-    U_h[39] = t58;
-    const real t59 = t14 != 0 ? W[16] : W[1];
-    const real t60 = t14 != 0 ? W[1] : W[16];
-    const real t61 = t59 * t42;
-    const real t62 = t60 - t61;
-    const real t63 = t62 * t51;
-    const real t64 = t39 * t63;
-    const real t65 = t59 - t64;
-    const real t66 = t41 * t65;
-    const real t67 = S_O[0] * t66;
-    const real t68 = S_O[1] * t63;
-    const real t69 = t67 + t68;
-    U_h[40] = t69;
-    const real t70 = t14 != 0 ? W[17] : W[2];
-    const real t71 = t14 != 0 ? W[2] : W[17];
-    const real t72 = t70 * t42;
-    const real t73 = t71 - t72;
-    const real t74 = t73 * t51;
-    const real t75 = t39 * t74;
-    const real t76 = t70 - t75;
-    const real t77 = t41 * t76;
-    const real t78 = S_O[0] * t77;
-    const real t79 = S_O[1] * t74;
-    const real t80 = t78 + t79;
-    U_h[41] = t80;
-    const real t81 = t14 != 0 ? W[18] : W[3];
-    const real t82 = t14 != 0 ? W[3] : W[18];
-    const real t83 = t81 * t42;
-    const real t84 = t82 - t83;
-    const real t85 = t84 * t51;
-    const real t86 = t39 * t85;
-    const real t87 = t81 - t86;
-    const real t88 = t41 * t87;
-    const real t89 = S_O[0] * t88;
-    const real t90 = S_O[1] * t85;
-    const real t91 = t89 + t90;
-    const real t92 = 1.0 + t91;
-    U_h[42] = t92;
-    const real t93 = t14 != 0 ? W[19] : W[4];
-    const real t94 = t14 != 0 ? W[4] : W[19];
-    const real t95 = t93 * t42;
-    const real t96 = t94 - t95;
-    const real t97 = t96 * t51;
-    const real t98 = t39 * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t41 * t99;
-    const real t101 = S_O[0] * t100;
-    const real t102 = S_O[1] * t97;
-    const real t103 = t101 + t102;
-    U_h[43] = t103;
-    const real t104 = t14 != 0 ? W[20] : W[5];
-    const real t105 = t14 != 0 ? W[5] : W[20];
-    const real t106 = t104 * t42;
-    const real t107 = t105 - t106;
-    const real t108 = t107 * t51;
-    const real t109 = t39 * t108;
-    const real t110 = t104 - t109;
-    const real t111 = t41 * t110;
-    const real t112 = S_O[0] * t111;
-    const real t113 = S_O[1] * t108;
-    const real t114 = t112 + t113;
-    U_h[44] = t114;
-    const real t115 = t14 != 0 ? W[21] : W[6];
-    const real t116 = t14 != 0 ? W[6] : W[21];
-    const real t117 = t115 * t42;
-    const real t118 = t116 - t117;
-    const real t119 = t118 * t51;
-    const real t120 = t39 * t119;
-    const real t121 = t115 - t120;
-    const real t122 = t41 * t121;
-    const real t123 = S_O[0] * t122;
-    const real t124 = S_O[1] * t119;
-    const real t125 = t123 + t124;
-    U_h[45] = t125;
-    const real t126 = t14 != 0 ? W[22] : W[7];
-    const real t127 = t14 != 0 ? W[7] : W[22];
-    const real t128 = t126 * t42;
-    const real t129 = t127 - t128;
-    const real t130 = t129 * t51;
-    const real t131 = t39 * t130;
-    const real t132 = t126 - t131;
-    const real t133 = t41 * t132;
-    const real t134 = S_O[0] * t133;
-    const real t135 = S_O[1] * t130;
-    const real t136 = t134 + t135;
-    U_h[46] = t136;
-    const real t137 = t14 != 0 ? W[23] : W[8];
-    const real t138 = t14 != 0 ? W[8] : W[23];
-    const real t139 = t137 * t42;
-    const real t140 = t138 - t139;
-    const real t141 = t140 * t51;
-    const real t142 = t39 * t141;
-    const real t143 = t137 - t142;
-    const real t144 = t41 * t143;
-    const real t145 = S_O[0] * t144;
-    const real t146 = S_O[1] * t141;
-    const real t147 = t145 + t146;
-    U_h[47] = t147;
-    const real t148 = t14 != 0 ? W[24] : W[9];
-    const real t149 = t14 != 0 ? W[9] : W[24];
-    const real t150 = t148 * t42;
-    const real t151 = t149 - t150;
-    const real t152 = t151 * t51;
-    const real t153 = t39 * t152;
-    const real t154 = t148 - t153;
-    const real t155 = t41 * t154;
-    const real t156 = S_O[0] * t155;
-    const real t157 = S_O[1] * t152;
-    const real t158 = t156 + t157;
-    U_h[48] = t158;
-    const real t159 = t14 != 0 ? W[25] : W[10];
-    const real t160 = t14 != 0 ? W[10] : W[25];
-    const real t161 = t159 * t42;
-    const real t162 = t160 - t161;
-    const real t163 = t162 * t51;
-    const real t164 = t39 * t163;
-    const real t165 = t159 - t164;
-    const real t166 = t41 * t165;
-    const real t167 = S_O[0] * t166;
-    const real t168 = S_O[1] * t163;
-    const real t169 = t167 + t168;
-    U_h[49] = t169;
-    const real t170 = t14 != 0 ? W[26] : W[11];
-    const real t171 = t14 != 0 ? W[11] : W[26];
-    const real t172 = t170 * t42;
-    const real t173 = t171 - t172;
-    const real t174 = t173 * t51;
-    const real t175 = t39 * t174;
-    const real t176 = t170 - t175;
-    const real t177 = t41 * t176;
-    const real t178 = S_O[0] * t177;
-    const real t179 = S_O[1] * t174;
-    const real t180 = t178 + t179;
-    U_h[50] = t180;
-    const real t181 = S_O[0] * eta_pO[0];
-    const real t182 = S_O[1] * eta_pO[1];
-    const real t183 = t181 + t182;
-    const real t184 = beta[0] + t183;
-    const real t185 = W[18] * t184;
-    const real t186 = S_O[2] * eta_pO[0];
-    const real t187 = S_O[3] * eta_pO[1];
-    const real t188 = t186 + t187;
-    const real t189 = beta[1] + t188;
-    const real t190 = W[19] * t189;
-    const real t191 = t185 + t190;
-    const real t192 = S_O[4] * eta_pO[0];
-    const real t193 = S_O[5] * eta_pO[1];
-    const real t194 = t192 + t193;
-    const real t195 = beta[2] + t194;
-    const real t196 = W[20] * t195;
-    const real t197 = t191 + t196;
-    const real t198 = W[29] + t197;
-    const real t199 = W[3] * t184;
-    const real t200 = W[4] * t189;
-    const real t201 = t199 + t200;
-    const real t202 = W[5] * t195;
-    const real t203 = t201 + t202;
-    const real t204 = W[14] + t203;
-    const real t205 = t14 != 0 ? t198 : t204;
-    const real t206 = t14 != 0 ? t204 : t198;
-    const real t207 = t205 * t42;
-    const real t208 = t206 - t207;
-    const real t209 = t208 * t51;
-    const real t210 = t39 * t209;
-    const real t211 = t205 - t210;
-    const real t212 = t41 * t211;
-    const real t213 = S_O[0] * t212;
-    const real t214 = S_O[1] * t209;
-    const real t215 = t213 + t214;
-    const real t216 = t184 + t215;
-    U_h[51] = t216;
-    const real t217 = S_O[2] * t55;
-    const real t218 = S_O[3] * t52;
-    const real t219 = t217 + t218;
-    U_h[52] = t219;
-    const real t220 = S_O[2] * t66;
-    const real t221 = S_O[3] * t63;
-    const real t222 = t220 + t221;
-    U_h[53] = t222;
-    const real t223 = S_O[2] * t77;
-    const real t224 = S_O[3] * t74;
-    const real t225 = t223 + t224;
-    U_h[54] = t225;
-    const real t226 = S_O[2] * t88;
-    const real t227 = S_O[3] * t85;
-    const real t228 = t226 + t227;
-    U_h[55] = t228;
-    const real t229 = S_O[2] * t100;
-    const real t230 = S_O[3] * t97;
-    const real t231 = t229 + t230;
-    const real t232 = 1.0 + t231;
-    U_h[56] = t232;
-    const real t233 = S_O[2] * t111;
-    const real t234 = S_O[3] * t108;
-    const real t235 = t233 + t234;
-    U_h[57] = t235;
-    const real t236 = S_O[2] * t122;
-    const real t237 = S_O[3] * t119;
-    const real t238 = t236 + t237;
-    U_h[58] = t238;
-    const real t239 = S_O[2] * t133;
-    const real t240 = S_O[3] * t130;
-    const real t241 = t239 + t240;
-    U_h[59] = t241;
-    const real t242 = S_O[2] * t144;
-    const real t243 = S_O[3] * t141;
-    const real t244 = t242 + t243;
-    U_h[60] = t244;
-    const real t245 = S_O[2] * t155;
-    const real t246 = S_O[3] * t152;
-    const real t247 = t245 + t246;
-    U_h[61] = t247;
-    const real t248 = S_O[2] * t166;
-    const real t249 = S_O[3] * t163;
-    const real t250 = t248 + t249;
-    U_h[62] = t250;
-    const real t251 = S_O[2] * t177;
-    const real t252 = S_O[3] * t174;
-    const real t253 = t251 + t252;
-    U_h[63] = t253;
-    const real t254 = S_O[2] * t212;
-    const real t255 = S_O[3] * t209;
-    const real t256 = t254 + t255;
-    const real t257 = t189 + t256;
-    U_h[64] = t257;
-    const real t258 = S_O[4] * t55;
-    const real t259 = S_O[5] * t52;
-    const real t260 = t258 + t259;
-    U_h[65] = t260;
-    const real t261 = S_O[4] * t66;
-    const real t262 = S_O[5] * t63;
-    const real t263 = t261 + t262;
-    U_h[66] = t263;
-    const real t264 = S_O[4] * t77;
-    const real t265 = S_O[5] * t74;
-    const real t266 = t264 + t265;
-    U_h[67] = t266;
-    const real t267 = S_O[4] * t88;
-    const real t268 = S_O[5] * t85;
-    const real t269 = t267 + t268;
-    U_h[68] = t269;
-    const real t270 = S_O[4] * t100;
-    const real t271 = S_O[5] * t97;
-    const real t272 = t270 + t271;
-    U_h[69] = t272;
-    const real t273 = S_O[4] * t111;
-    const real t274 = S_O[5] * t108;
-    const real t275 = t273 + t274;
-    const real t276 = 1.0 + t275;
-    U_h[70] = t276;
-    const real t277 = S_O[4] * t122;
-    const real t278 = S_O[5] * t119;
-    const real t279 = t277 + t278;
-    U_h[71] = t279;
-    const real t280 = S_O[4] * t133;
-    const real t281 = S_O[5] * t130;
-    const real t282 = t280 + t281;
-    U_h[72] = t282;
-    const real t283 = S_O[4] * t144;
-    const real t284 = S_O[5] * t141;
-    const real t285 = t283 + t284;
-    U_h[73] = t285;
-    const real t286 = S_O[4] * t155;
-    const real t287 = S_O[5] * t152;
-    const real t288 = t286 + t287;
-    U_h[74] = t288;
-    const real t289 = S_O[4] * t166;
-    const real t290 = S_O[5] * t163;
-    const real t291 = t289 + t290;
-    U_h[75] = t291;
-    const real t292 = S_O[4] * t177;
-    const real t293 = S_O[5] * t174;
-    const real t294 = t292 + t293;
-    U_h[76] = t294;
-    const real t295 = S_O[4] * t212;
-    const real t296 = S_O[5] * t209;
-    const real t297 = t295 + t296;
-    const real t298 = t195 + t297;
-    U_h[77] = t298;
-    U_h[78] = 0.0;
-    U_h[79] = 0.0;
-    U_h[80] = 0.0;
-    U_h[81] = 0.0;
-    U_h[82] = 0.0;
-    U_h[83] = 0.0;
-    U_h[84] = 1.0;
-    U_h[85] = 0.0;
-    U_h[86] = 0.0;
-    U_h[87] = 0.0;
-    U_h[88] = 0.0;
-    U_h[89] = 0.0;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 0.0;
-    U_h[97] = 0.0;
-    U_h[98] = 1.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 1.0;
-    U_h[127] = 0.0;
-    U_h[128] = 0.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 1.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 0.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 1.0;
-    U_h[155] = 0.0;
-    const real t299 = -t55;
-    U_h[156] = t299;
-    const real t300 = -t66;
-    U_h[157] = t300;
-    const real t301 = -t77;
-    U_h[158] = t301;
-    const real t302 = -t88;
-    U_h[159] = t302;
-    const real t303 = -t100;
-    U_h[160] = t303;
-    const real t304 = -t111;
-    U_h[161] = t304;
-    const real t305 = -t122;
-    U_h[162] = t305;
-    const real t306 = -t133;
-    U_h[163] = t306;
-    const real t307 = -t144;
-    U_h[164] = t307;
-    const real t308 = -t155;
-    U_h[165] = t308;
-    const real t309 = -t166;
-    U_h[166] = t309;
-    const real t310 = -t177;
-    U_h[167] = t310;
-    const real t311 = -t212;
-    U_h[168] = t311;
-    const real t312 = -t52;
-    U_h[169] = t312;
-    const real t313 = -t63;
-    U_h[170] = t313;
-    const real t314 = -t74;
-    U_h[171] = t314;
-    const real t315 = -t85;
-    U_h[172] = t315;
-    const real t316 = -t97;
-    U_h[173] = t316;
-    const real t317 = -t108;
-    U_h[174] = t317;
-    const real t318 = -t119;
-    U_h[175] = t318;
-    const real t319 = -t130;
-    U_h[176] = t319;
-    const real t320 = -t141;
-    U_h[177] = t320;
-    const real t321 = -t152;
-    U_h[178] = t321;
-    const real t322 = -t163;
-    U_h[179] = t322;
-    const real t323 = -t174;
-    U_h[180] = t323;
-    const real t324 = -t209;
-    U_h[181] = t324;
-    U_h[182] = 0.0;
-    U_h[183] = 0.0;
-    U_h[184] = 0.0;
-    U_h[185] = 0.0;
-    U_h[186] = 0.0;
-    U_h[187] = 0.0;
-    U_h[188] = 0.0;
-    U_h[189] = 0.0;
-    U_h[190] = 0.0;
-    U_h[191] = 0.0;
-    U_h[192] = 0.0;
-    U_h[193] = 0.0;
-    U_h[194] = 1.0;
-    return 0;
+  real t5 = W[12] - (W[3] * S_O[0] + W[4] * S_O[2] + W[5] * S_O[4]);
+  real t6 = fabs(t5);
+  real t12 = W[27] - (W[18] * S_O[0] + W[19] * S_O[2] + W[20] * S_O[4]);
+  real t13 = fabs(t12);
+  real t14 = t6 < t13;
+  real t20 = W[28] - (W[18] * S_O[1] + W[19] * S_O[3] + W[20] * S_O[5]);
+  real t22 = t13 + (fabs(t20));
+  real t28 = W[13] - (W[3] * S_O[1] + W[4] * S_O[3] + W[5] * S_O[5]);
+  real t30 = t6 + (fabs(t28));
+  real t33 = t14 != 0 ? t12 : t5;
+  if (!(((t14 != 0 ? t22 : t30) * ((real)1 / (real)10000000000000) < (fabs(t33))))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t39 = t14 != 0 ? t20 : t28;
+  real t41 = 1.0 / t33;
+  real t42 = (t14 != 0 ? t5 : t12) * t41;
+  real t44 = (t14 != 0 ? t28 : t20) - t39 * t42;
+  if (!(((t14 != 0 ? t30 : t22) * ((real)1 / (real)10000000000000) < (fabs(t44))))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = 0.0;
+  U_h[14] = 1.0;
+  U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24]
+    = U_h[25] = U_h[26] = U_h[27] = 0.0;
+  U_h[28] = 1.0;
+  U_h[29] = U_h[30] = U_h[31] = U_h[32] = U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38]
+    = 0.0;
+  real t47 = t14 != 0 ? W[15] : W[0];
+  real t51 = 1.0 / t44;
+  real t52 = ((t14 != 0 ? W[0] : W[15]) - t47 * t42) * t51;
+  real t55 = t41 * (t47 - t39 * t52);
+  U_h[39] = S_O[0] * t55 + S_O[1] * t52;
+  real t59 = t14 != 0 ? W[16] : W[1];
+  real t63 = ((t14 != 0 ? W[1] : W[16]) - t59 * t42) * t51;
+  real t66 = t41 * (t59 - t39 * t63);
+  U_h[40] = S_O[0] * t66 + S_O[1] * t63;
+  real t70 = t14 != 0 ? W[17] : W[2];
+  real t74 = ((t14 != 0 ? W[2] : W[17]) - t70 * t42) * t51;
+  real t77 = t41 * (t70 - t39 * t74);
+  U_h[41] = S_O[0] * t77 + S_O[1] * t74;
+  real t81 = t14 != 0 ? W[18] : W[3];
+  real t85 = ((t14 != 0 ? W[3] : W[18]) - t81 * t42) * t51;
+  real t88 = t41 * (t81 - t39 * t85);
+  U_h[42] = 1.0 + (S_O[0] * t88 + S_O[1] * t85);
+  real t93 = t14 != 0 ? W[19] : W[4];
+  real t97 = ((t14 != 0 ? W[4] : W[19]) - t93 * t42) * t51;
+  real t100 = t41 * (t93 - t39 * t97);
+  U_h[43] = S_O[0] * t100 + S_O[1] * t97;
+  real t104 = t14 != 0 ? W[20] : W[5];
+  real t108 = ((t14 != 0 ? W[5] : W[20]) - t104 * t42) * t51;
+  real t111 = t41 * (t104 - t39 * t108);
+  U_h[44] = S_O[0] * t111 + S_O[1] * t108;
+  real t115 = t14 != 0 ? W[21] : W[6];
+  real t119 = ((t14 != 0 ? W[6] : W[21]) - t115 * t42) * t51;
+  real t122 = t41 * (t115 - t39 * t119);
+  U_h[45] = S_O[0] * t122 + S_O[1] * t119;
+  real t126 = t14 != 0 ? W[22] : W[7];
+  real t130 = ((t14 != 0 ? W[7] : W[22]) - t126 * t42) * t51;
+  real t133 = t41 * (t126 - t39 * t130);
+  U_h[46] = S_O[0] * t133 + S_O[1] * t130;
+  real t137 = t14 != 0 ? W[23] : W[8];
+  real t141 = ((t14 != 0 ? W[8] : W[23]) - t137 * t42) * t51;
+  real t144 = t41 * (t137 - t39 * t141);
+  U_h[47] = S_O[0] * t144 + S_O[1] * t141;
+  real t148 = t14 != 0 ? W[24] : W[9];
+  real t152 = ((t14 != 0 ? W[9] : W[24]) - t148 * t42) * t51;
+  real t155 = t41 * (t148 - t39 * t152);
+  U_h[48] = S_O[0] * t155 + S_O[1] * t152;
+  real t159 = t14 != 0 ? W[25] : W[10];
+  real t163 = ((t14 != 0 ? W[10] : W[25]) - t159 * t42) * t51;
+  real t166 = t41 * (t159 - t39 * t163);
+  U_h[49] = S_O[0] * t166 + S_O[1] * t163;
+  real t170 = t14 != 0 ? W[26] : W[11];
+  real t174 = ((t14 != 0 ? W[11] : W[26]) - t170 * t42) * t51;
+  real t177 = t41 * (t170 - t39 * t174);
+  U_h[50] = S_O[0] * t177 + S_O[1] * t174;
+  real t184 = beta[0] + (S_O[0] * eta_pO[0] + S_O[1] * eta_pO[1]);
+  real t189 = beta[1] + (S_O[2] * eta_pO[0] + S_O[3] * eta_pO[1]);
+  real t195 = beta[2] + (S_O[4] * eta_pO[0] + S_O[5] * eta_pO[1]);
+  real t198 = W[29] + (W[18] * t184 + W[19] * t189 + W[20] * t195);
+  real t204 = W[14] + (W[3] * t184 + W[4] * t189 + W[5] * t195);
+  real t205 = t14 != 0 ? t198 : t204;
+  real t209 = ((t14 != 0 ? t204 : t198) - t205 * t42) * t51;
+  real t212 = t41 * (t205 - t39 * t209);
+  U_h[51] = t184 + (S_O[0] * t212 + S_O[1] * t209);
+  U_h[52] = S_O[2] * t55 + S_O[3] * t52;
+  U_h[53] = S_O[2] * t66 + S_O[3] * t63;
+  U_h[54] = S_O[2] * t77 + S_O[3] * t74;
+  U_h[55] = S_O[2] * t88 + S_O[3] * t85;
+  U_h[56] = 1.0 + (S_O[2] * t100 + S_O[3] * t97);
+  U_h[57] = S_O[2] * t111 + S_O[3] * t108;
+  U_h[58] = S_O[2] * t122 + S_O[3] * t119;
+  U_h[59] = S_O[2] * t133 + S_O[3] * t130;
+  U_h[60] = S_O[2] * t144 + S_O[3] * t141;
+  U_h[61] = S_O[2] * t155 + S_O[3] * t152;
+  U_h[62] = S_O[2] * t166 + S_O[3] * t163;
+  U_h[63] = S_O[2] * t177 + S_O[3] * t174;
+  U_h[64] = t189 + (S_O[2] * t212 + S_O[3] * t209);
+  U_h[65] = S_O[4] * t55 + S_O[5] * t52;
+  U_h[66] = S_O[4] * t66 + S_O[5] * t63;
+  U_h[67] = S_O[4] * t77 + S_O[5] * t74;
+  U_h[68] = S_O[4] * t88 + S_O[5] * t85;
+  U_h[69] = S_O[4] * t100 + S_O[5] * t97;
+  U_h[70] = 1.0 + (S_O[4] * t111 + S_O[5] * t108);
+  U_h[71] = S_O[4] * t122 + S_O[5] * t119;
+  U_h[72] = S_O[4] * t133 + S_O[5] * t130;
+  U_h[73] = S_O[4] * t144 + S_O[5] * t141;
+  U_h[74] = S_O[4] * t155 + S_O[5] * t152;
+  U_h[75] = S_O[4] * t166 + S_O[5] * t163;
+  U_h[76] = S_O[4] * t177 + S_O[5] * t174;
+  U_h[77] = t195 + (S_O[4] * t212 + S_O[5] * t209);
+  U_h[78] = U_h[79] = U_h[80] = U_h[81] = U_h[82] = U_h[83] = 0.0;
+  U_h[84] = 1.0;
+  U_h[85] = U_h[86] = U_h[87] = U_h[88] = U_h[89] = U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94]
+    = U_h[95] = U_h[96] = U_h[97] = 0.0;
+  U_h[98] = 1.0;
+  U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] = U_h[106] = U_h[107] =
+    U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = 0.0;
+  U_h[126] = 1.0;
+  U_h[127] = U_h[128] = U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] =
+    U_h[136] = U_h[137] = U_h[138] = U_h[139] = 0.0;
+  U_h[140] = 1.0;
+  U_h[141] = U_h[142] = U_h[143] = U_h[144] = U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] =
+    U_h[150] = U_h[151] = U_h[152] = U_h[153] = 0.0;
+  U_h[154] = 1.0;
+  U_h[155] = 0.0;
+  U_h[156] = -t55;
+  U_h[157] = -t66;
+  U_h[158] = -t77;
+  U_h[159] = -t88;
+  U_h[160] = -t100;
+  U_h[161] = -t111;
+  U_h[162] = -t122;
+  U_h[163] = -t133;
+  U_h[164] = -t144;
+  U_h[165] = -t155;
+  U_h[166] = -t166;
+  U_h[167] = -t177;
+  U_h[168] = -t212;
+  U_h[169] = -t52;
+  U_h[170] = -t63;
+  U_h[171] = -t74;
+  U_h[172] = -t85;
+  U_h[173] = -t97;
+  U_h[174] = -t108;
+  U_h[175] = -t119;
+  U_h[176] = -t130;
+  U_h[177] = -t141;
+  U_h[178] = -t152;
+  U_h[179] = -t163;
+  U_h[180] = -t174;
+  U_h[181] = -t209;
+  U_h[182] = U_h[183] = U_h[184] = U_h[185] = U_h[186] = U_h[187] = U_h[188] = U_h[189] = U_h[190] =
+    U_h[191] = U_h[192] = U_h[193] = 0.0;
+  U_h[194] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_inputs[] = {
-    {"W", 30, "N", 0, 0},
-    {"S_O", 6, "1/m", 0, 0},
-    {"eta_pO", 2, "m", 0, 0},
-    {"beta", 3, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_outputs[] = {
-    {"U_h", 195, "[m, rad, N*m, N, m, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer, (in[0], in[1], in[2], in[3],
+  out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_spatial_rigid_beam_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer,
-        .call = mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_outputs,
-        .ir_hash = "5193e0d14b7977485ba4885bcb6b287f1d230dc5d454d00514bfd2b2c1033117",
-        .n_guards = 2,
-        .guards = mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer), 4, 1,
+    (const mstmm_port[]){{"W", 30, "N", 0, 0}, {"S_O", 6, "1/m", 0, 0}, {"eta_pO", 2, "m", 0, 0},
+    {"beta", 3, "rad", 0, 0}}, (const mstmm_port[]){{"U_h", 195, "[m, rad, N*m, N, m, 1]", 0, 0}},
+    "744f570b4a29d37266388ecd1f267b77715efeebfb9d1f977b4bbcb754cdb9a0", 2, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_beam = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_spatial_rigid_beam",
-    .hash = "d3e58f8d120b85ae8a4fe3d5c48b836edc791685b3f429f84275b3b85e46ab6d",
+    .hash = "976e628f2e40248a5f2d7089dc95563e40429dfdb14e6089d7e465ca5df4fe51",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,224 +8,69 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_rigid;
-int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(const real *restrict beta,
-    real *restrict U_h);
-
 /* fixed hinge (spatial), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.10
  * in  beta[3] (rad) inboard less outboard section at the predictor (0 where the weld is closed)
  * out U_h[13][13] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(const real *restrict beta,
-    real *restrict U_h)
+int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(in_t beta, out_t U_h)
 {
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 1.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 1.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 0.0;
-    U_h[41] = 0.0;
-    U_h[42] = 1.0;
-    U_h[43] = 0.0;
-    U_h[44] = 0.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 0.0;
-    U_h[49] = 0.0;
-    U_h[50] = 0.0;
-    U_h[51] = beta[0];
-    U_h[52] = 0.0;
-    U_h[53] = 0.0;
-    U_h[54] = 0.0;
-    U_h[55] = 0.0;
-    U_h[56] = 1.0;
-    U_h[57] = 0.0;
-    U_h[58] = 0.0;
-    U_h[59] = 0.0;
-    U_h[60] = 0.0;
-    U_h[61] = 0.0;
-    U_h[62] = 0.0;
-    U_h[63] = 0.0;
-    U_h[64] = beta[1];
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 0.0;
-    U_h[70] = 1.0;
-    U_h[71] = 0.0;
-    U_h[72] = 0.0;
-    U_h[73] = 0.0;
-    U_h[74] = 0.0;
-    U_h[75] = 0.0;
-    U_h[76] = 0.0;
-    U_h[77] = beta[2];
-    U_h[78] = 0.0;
-    U_h[79] = 0.0;
-    U_h[80] = 0.0;
-    U_h[81] = 0.0;
-    U_h[82] = 0.0;
-    U_h[83] = 0.0;
-    U_h[84] = 1.0;
-    U_h[85] = 0.0;
-    U_h[86] = 0.0;
-    U_h[87] = 0.0;
-    U_h[88] = 0.0;
-    U_h[89] = 0.0;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 0.0;
-    U_h[97] = 0.0;
-    U_h[98] = 1.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 1.0;
-    U_h[127] = 0.0;
-    U_h[128] = 0.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 1.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 0.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 1.0;
-    U_h[155] = 0.0;
-    U_h[156] = 0.0;
-    U_h[157] = 0.0;
-    U_h[158] = 0.0;
-    U_h[159] = 0.0;
-    U_h[160] = 0.0;
-    U_h[161] = 0.0;
-    U_h[162] = 0.0;
-    U_h[163] = 0.0;
-    U_h[164] = 0.0;
-    U_h[165] = 0.0;
-    U_h[166] = 0.0;
-    U_h[167] = 0.0;
-    U_h[168] = 1.0;
-    return 0;
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = 0.0;
+  U_h[14] = 1.0;
+  U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24]
+    = U_h[25] = U_h[26] = U_h[27] = 0.0;
+  U_h[28] = 1.0;
+  U_h[29] = U_h[30] = U_h[31] = U_h[32] = U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38]
+    = U_h[39] = U_h[40] = U_h[41] = 0.0;
+  U_h[42] = 1.0;
+  U_h[43] = U_h[44] = U_h[45] = U_h[46] = U_h[47] = U_h[48] = U_h[49] = U_h[50] = 0.0;
+  U_h[51] = beta[0];
+  U_h[52] = U_h[53] = U_h[54] = U_h[55] = 0.0;
+  U_h[56] = 1.0;
+  U_h[57] = U_h[58] = U_h[59] = U_h[60] = U_h[61] = U_h[62] = U_h[63] = 0.0;
+  U_h[64] = beta[1];
+  U_h[65] = U_h[66] = U_h[67] = U_h[68] = U_h[69] = 0.0;
+  U_h[70] = 1.0;
+  U_h[71] = U_h[72] = U_h[73] = U_h[74] = U_h[75] = U_h[76] = 0.0;
+  U_h[77] = beta[2];
+  U_h[78] = U_h[79] = U_h[80] = U_h[81] = U_h[82] = U_h[83] = 0.0;
+  U_h[84] = 1.0;
+  U_h[85] = U_h[86] = U_h[87] = U_h[88] = U_h[89] = U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94]
+    = U_h[95] = U_h[96] = U_h[97] = 0.0;
+  U_h[98] = 1.0;
+  U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] = U_h[106] = U_h[107] =
+    U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = 0.0;
+  U_h[126] = 1.0;
+  U_h[127] = U_h[128] = U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] =
+    U_h[136] = U_h[137] = U_h[138] = U_h[139] = 0.0;
+  U_h[140] = 1.0;
+  U_h[141] = U_h[142] = U_h[143] = U_h[144] = U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] =
+    U_h[150] = U_h[151] = U_h[152] = U_h[153] = 0.0;
+  U_h[154] = 1.0;
+  U_h[155] = U_h[156] = U_h[157] = U_h[158] = U_h[159] = U_h[160] = U_h[161] = U_h[162] = U_h[163] =
+    U_h[164] = U_h[165] = U_h[166] = U_h[167] = 0.0;
+  U_h[168] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer_inputs[] = {
-    {"beta", 3, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer_outputs[] = {
-    {"U_h", 169, "[m, rad, N*m, N, 1]", 0, 0},
-};
+MSTMM_CALL(mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer, (in[0], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_fixed_spatial_rigid_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer,
-        .call = mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer_outputs,
-        .ir_hash = "014a6ea4c8a83287985d661a434d7f9bc0879abccf0b9966ace3e89909b35307",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer), 1, 1,
+    (const mstmm_port[]){{"beta", 3, "rad", 0, 0}}, (const mstmm_port[]){{"U_h", 169,
+    "[m, rad, N*m, N, 1]", 0, 0}},
+    "68563baf0368ab23e1f9aab8b087b85da8d6275b2756701ee46c00a72e9c034d", 0, NULL},
 };
 
 const mstmm_element mstmm_classical_hinge_fixed_spatial_rigid_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_fixed_spatial_rigid_rigid",
-    .hash = "1a9f9cbbe6ea84ac1b9bdafec1651ab503be0a0b2cea6a29c59d98e9c5f1991f",
+    .hash = "91931e307a21374bbfba7835498df9f4bdc2ab8a085206373bdb3bcbe37c58b4",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,13 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_rigid;
-int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(const real *restrict U,
-    const real *restrict a, const real *restrict beta, const real *restrict a_n,
-    const real *restrict m_n, const real *restrict tau_n, real *restrict U_h);
-
 /* smooth pin in space, discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.11 with one axis free
  * in  U[13][13] ([m, rad, N*m, N, 1]) matrix of the outboard body
  * in  a[3] (1) axis, unit vector, inertial axes
  * in  beta[3] (rad) inboard less outboard section at the predictor, across the axis
@@ -23,509 +17,132 @@ int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(const real *restrict 
  * in  tau_n[1] (N*m) effort of the next pin (0: smooth)
  * out U_h[13][13] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(const real *restrict U,
-    const real *restrict a, const real *restrict beta, const real *restrict a_n,
-    const real *restrict m_n, const real *restrict tau_n, real *restrict U_h)
+int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(in_t U, in_t a, in_t beta, in_t a_n,
+    in_t m_n, in_t tau_n, out_t U_h)
 {
-    const real t0 = a_n[1] * m_n[2];
-    const real t1 = a_n[2] * m_n[1];
-    const real t2 = t0 - t1;
-    const real t3 = U[42] * t2;
-    const real t4 = a_n[2] * m_n[0];
-    const real t5 = a_n[0] * m_n[2];
-    const real t6 = t4 - t5;
-    const real t7 = U[55] * t6;
-    const real t8 = t3 + t7;
-    const real t9 = a_n[0] * m_n[1];
-    const real t10 = a_n[1] * m_n[0];
-    const real t11 = t9 - t10;
-    const real t12 = U[68] * t11;
-    const real t13 = t8 + t12;
-    const real t14 = U[81] * a_n[0];
-    const real t15 = t13 + t14;
-    const real t16 = U[94] * a_n[1];
-    const real t17 = t15 + t16;
-    const real t18 = U[107] * a_n[2];
-    const real t19 = t17 + t18;
-    const real t20 = U[159] * tau_n[0];
-    const real t21 = t19 - t20;
-    const real t22 = a[0] * t21;
-    const real t23 = U[43] * t2;
-    const real t24 = U[56] * t6;
-    const real t25 = t23 + t24;
-    const real t26 = U[69] * t11;
-    const real t27 = t25 + t26;
-    const real t28 = U[82] * a_n[0];
-    const real t29 = t27 + t28;
-    const real t30 = U[95] * a_n[1];
-    const real t31 = t29 + t30;
-    const real t32 = U[108] * a_n[2];
-    const real t33 = t31 + t32;
-    const real t34 = U[160] * tau_n[0];
-    const real t35 = t33 - t34;
-    const real t36 = a[1] * t35;
-    const real t37 = t22 + t36;
-    const real t38 = U[44] * t2;
-    const real t39 = U[57] * t6;
-    const real t40 = t38 + t39;
-    const real t41 = U[70] * t11;
-    const real t42 = t40 + t41;
-    const real t43 = U[83] * a_n[0];
-    const real t44 = t42 + t43;
-    const real t45 = U[96] * a_n[1];
-    const real t46 = t44 + t45;
-    const real t47 = U[109] * a_n[2];
-    const real t48 = t46 + t47;
-    const real t49 = U[161] * tau_n[0];
-    const real t50 = t48 - t49;
-    const real t51 = a[2] * t50;
-    const real t52 = t37 + t51;
-    const real t53 = fabs(t52);
-    const real t54 = 0.0 < t53;
-    if (!(t54 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 1.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 1.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    const real t55 = U[39] * t2;
-    const real t56 = U[52] * t6;
-    const real t57 = t55 + t56;
-    const real t58 = U[65] * t11;
-    const real t59 = t57 + t58;
-    const real t60 = U[78] * a_n[0];
-    const real t61 = t59 + t60;
-    const real t62 = U[91] * a_n[1];
-    const real t63 = t61 + t62;
-    const real t64 = U[104] * a_n[2];
-    const real t65 = t63 + t64;
-    const real t66 = U[156] * tau_n[0];
-    const real t67 = t65 - t66;
-    const real t68 = 1.0 / t52;
-    const real t69 = t67 * t68;
-    const real t70 = a[0] * t69;
-    const real t71 = -t70;
-    U_h[39] = t71;
-    const real t72 = U[40] * t2;
-    const real t73 = U[53] * t6;
-    const real t74 = t72 + t73;
-    const real t75 = U[66] * t11;
-    const real t76 = t74 + t75;
-    const real t77 = U[79] * a_n[0];
-    const real t78 = t76 + t77;
-    const real t79 = U[92] * a_n[1];
-    const real t80 = t78 + t79;
-    const real t81 = U[105] * a_n[2];
-    const real t82 = t80 + t81;
-    const real t83 = U[157] * tau_n[0];
-    const real t84 = t82 - t83;
-    const real t85 = t84 * t68;
-    const real t86 = a[0] * t85;
-    const real t87 = -t86;
-    U_h[40] = t87;
-    const real t88 = U[41] * t2;
-    const real t89 = U[54] * t6;
-    const real t90 = t88 + t89;
-    const real t91 = U[67] * t11;
-    const real t92 = t90 + t91;
-    const real t93 = U[80] * a_n[0];
-    const real t94 = t92 + t93;
-    const real t95 = U[93] * a_n[1];
-    const real t96 = t94 + t95;
-    const real t97 = U[106] * a_n[2];
-    const real t98 = t96 + t97;
-    const real t99 = U[158] * tau_n[0];
-    const real t100 = t98 - t99;
-    const real t101 = t100 * t68;
-    const real t102 = a[0] * t101;
-    const real t103 = -t102;
-    U_h[41] = t103;
-    const real t104 = t21 * t68;
-    const real t105 = a[0] * t104;
-    const real t106 = 1.0 - t105;
-    U_h[42] = t106;
-    const real t107 = t35 * t68;
-    const real t108 = a[0] * t107;
-    const real t109 = -t108;
-    U_h[43] = t109;
-    const real t110 = t50 * t68;
-    const real t111 = a[0] * t110;
-    const real t112 = -t111;
-    U_h[44] = t112;
-    const real t113 = U[45] * t2;
-    const real t114 = U[58] * t6;
-    const real t115 = t113 + t114;
-    const real t116 = U[71] * t11;
-    const real t117 = t115 + t116;
-    const real t118 = U[84] * a_n[0];
-    const real t119 = t117 + t118;
-    const real t120 = U[97] * a_n[1];
-    const real t121 = t119 + t120;
-    const real t122 = U[110] * a_n[2];
-    const real t123 = t121 + t122;
-    const real t124 = U[162] * tau_n[0];
-    const real t125 = t123 - t124;
-    const real t126 = t125 * t68;
-    const real t127 = a[0] * t126;
-    const real t128 = -t127;
-    U_h[45] = t128;
-    const real t129 = U[46] * t2;
-    const real t130 = U[59] * t6;
-    const real t131 = t129 + t130;
-    const real t132 = U[72] * t11;
-    const real t133 = t131 + t132;
-    const real t134 = U[85] * a_n[0];
-    const real t135 = t133 + t134;
-    const real t136 = U[98] * a_n[1];
-    const real t137 = t135 + t136;
-    const real t138 = U[111] * a_n[2];
-    const real t139 = t137 + t138;
-    const real t140 = U[163] * tau_n[0];
-    const real t141 = t139 - t140;
-    const real t142 = t141 * t68;
-    const real t143 = a[0] * t142;
-    const real t144 = -t143;
-    U_h[46] = t144;
-    const real t145 = U[47] * t2;
-    const real t146 = U[60] * t6;
-    const real t147 = t145 + t146;
-    const real t148 = U[73] * t11;
-    const real t149 = t147 + t148;
-    const real t150 = U[86] * a_n[0];
-    const real t151 = t149 + t150;
-    const real t152 = U[99] * a_n[1];
-    const real t153 = t151 + t152;
-    const real t154 = U[112] * a_n[2];
-    const real t155 = t153 + t154;
-    const real t156 = U[164] * tau_n[0];
-    const real t157 = t155 - t156;
-    const real t158 = t157 * t68;
-    const real t159 = a[0] * t158;
-    const real t160 = -t159;
-    U_h[47] = t160;
-    const real t161 = U[48] * t2;
-    const real t162 = U[61] * t6;
-    const real t163 = t161 + t162;
-    const real t164 = U[74] * t11;
-    const real t165 = t163 + t164;
-    const real t166 = U[87] * a_n[0];
-    const real t167 = t165 + t166;
-    const real t168 = U[100] * a_n[1];
-    const real t169 = t167 + t168;
-    const real t170 = U[113] * a_n[2];
-    const real t171 = t169 + t170;
-    const real t172 = U[165] * tau_n[0];
-    const real t173 = t171 - t172;
-    const real t174 = t173 * t68;
-    const real t175 = a[0] * t174;
-    const real t176 = -t175;
-    U_h[48] = t176;
-    const real t177 = U[49] * t2;
-    const real t178 = U[62] * t6;
-    const real t179 = t177 + t178;
-    const real t180 = U[75] * t11;
-    const real t181 = t179 + t180;
-    const real t182 = U[88] * a_n[0];
-    const real t183 = t181 + t182;
-    const real t184 = U[101] * a_n[1];
-    const real t185 = t183 + t184;
-    const real t186 = U[114] * a_n[2];
-    const real t187 = t185 + t186;
-    const real t188 = U[166] * tau_n[0];
-    const real t189 = t187 - t188;
-    const real t190 = t189 * t68;
-    const real t191 = a[0] * t190;
-    const real t192 = -t191;
-    U_h[49] = t192;
-    const real t193 = U[50] * t2;
-    const real t194 = U[63] * t6;
-    const real t195 = t193 + t194;
-    const real t196 = U[76] * t11;
-    const real t197 = t195 + t196;
-    const real t198 = U[89] * a_n[0];
-    const real t199 = t197 + t198;
-    const real t200 = U[102] * a_n[1];
-    const real t201 = t199 + t200;
-    const real t202 = U[115] * a_n[2];
-    const real t203 = t201 + t202;
-    const real t204 = U[167] * tau_n[0];
-    const real t205 = t203 - t204;
-    const real t206 = t205 * t68;
-    const real t207 = a[0] * t206;
-    const real t208 = -t207;
-    U_h[50] = t208;
-    const real t209 = U[51] * t2;
-    const real t210 = U[64] * t6;
-    const real t211 = t209 + t210;
-    const real t212 = U[77] * t11;
-    const real t213 = t211 + t212;
-    const real t214 = U[90] * a_n[0];
-    const real t215 = t213 + t214;
-    const real t216 = U[103] * a_n[1];
-    const real t217 = t215 + t216;
-    const real t218 = U[116] * a_n[2];
-    const real t219 = t217 + t218;
-    const real t220 = U[168] * tau_n[0];
-    const real t221 = t219 - t220;
-    const real t222 = beta[0] * t21;
-    const real t223 = beta[1] * t35;
-    const real t224 = t222 + t223;
-    const real t225 = beta[2] * t50;
-    const real t226 = t224 + t225;
-    const real t227 = t221 + t226;
-    const real t228 = t227 * t68;
-    const real t229 = a[0] * t228;
-    const real t230 = beta[0] - t229;
-    U_h[51] = t230;
-    const real t231 = a[1] * t69;
-    const real t232 = -t231;
-    U_h[52] = t232;
-    const real t233 = a[1] * t85;
-    const real t234 = -t233;
-    U_h[53] = t234;
-    const real t235 = a[1] * t101;
-    const real t236 = -t235;
-    U_h[54] = t236;
-    const real t237 = a[1] * t104;
-    const real t238 = -t237;
-    U_h[55] = t238;
-    const real t239 = a[1] * t107;
-    const real t240 = 1.0 - t239;
-    U_h[56] = t240;
-    const real t241 = a[1] * t110;
-    const real t242 = -t241;
-    U_h[57] = t242;
-    const real t243 = a[1] * t126;
-    const real t244 = -t243;
-    U_h[58] = t244;
-    const real t245 = a[1] * t142;
-    const real t246 = -t245;
-    U_h[59] = t246;
-    const real t247 = a[1] * t158;
-    const real t248 = -t247;
-    U_h[60] = t248;
-    const real t249 = a[1] * t174;
-    const real t250 = -t249;
-    U_h[61] = t250;
-    const real t251 = a[1] * t190;
-    const real t252 = -t251;
-    U_h[62] = t252;
-    const real t253 = a[1] * t206;
-    const real t254 = -t253;
-    U_h[63] = t254;
-    const real t255 = a[1] * t228;
-    const real t256 = beta[1] - t255;
-    U_h[64] = t256;
-    const real t257 = a[2] * t69;
-    const real t258 = -t257;
-    U_h[65] = t258;
-    const real t259 = a[2] * t85;
-    const real t260 = -t259;
-    U_h[66] = t260;
-    const real t261 = a[2] * t101;
-    const real t262 = -t261;
-    U_h[67] = t262;
-    const real t263 = a[2] * t104;
-    const real t264 = -t263;
-    U_h[68] = t264;
-    const real t265 = a[2] * t107;
-    const real t266 = -t265;
-    U_h[69] = t266;
-    const real t267 = a[2] * t110;
-    const real t268 = 1.0 - t267;
-    U_h[70] = t268;
-    const real t269 = a[2] * t126;
-    const real t270 = -t269;
-    U_h[71] = t270;
-    const real t271 = a[2] * t142;
-    const real t272 = -t271;
-    U_h[72] = t272;
-    const real t273 = a[2] * t158;
-    const real t274 = -t273;
-    U_h[73] = t274;
-    const real t275 = a[2] * t174;
-    const real t276 = -t275;
-    U_h[74] = t276;
-    const real t277 = a[2] * t190;
-    const real t278 = -t277;
-    U_h[75] = t278;
-    const real t279 = a[2] * t206;
-    const real t280 = -t279;
-    U_h[76] = t280;
-    const real t281 = a[2] * t228;
-    const real t282 = beta[2] - t281;
-    U_h[77] = t282;
-    U_h[78] = 0.0;
-    U_h[79] = 0.0;
-    U_h[80] = 0.0;
-    U_h[81] = 0.0;
-    U_h[82] = 0.0;
-    U_h[83] = 0.0;
-    U_h[84] = 1.0;
-    U_h[85] = 0.0;
-    U_h[86] = 0.0;
-    U_h[87] = 0.0;
-    U_h[88] = 0.0;
-    U_h[89] = 0.0;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 0.0;
-    U_h[97] = 0.0;
-    U_h[98] = 1.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 1.0;
-    U_h[127] = 0.0;
-    U_h[128] = 0.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 1.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 0.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 1.0;
-    U_h[155] = 0.0;
-    U_h[156] = 0.0;
-    U_h[157] = 0.0;
-    U_h[158] = 0.0;
-    U_h[159] = 0.0;
-    U_h[160] = 0.0;
-    U_h[161] = 0.0;
-    U_h[162] = 0.0;
-    U_h[163] = 0.0;
-    U_h[164] = 0.0;
-    U_h[165] = 0.0;
-    U_h[166] = 0.0;
-    U_h[167] = 0.0;
-    U_h[168] = 1.0;
-    return 0;
+  real t2 = a_n[1] * m_n[2] - a_n[2] * m_n[1];
+  real t6 = a_n[2] * m_n[0] - a_n[0] * m_n[2];
+  real t11 = a_n[0] * m_n[1] - a_n[1] * m_n[0];
+  real t21 = U[42] * t2 + U[55] * t6 + U[68] * t11 + U[81] * a_n[0] + U[94] * a_n[1] + U[107] *
+    a_n[2] - U[159] * tau_n[0];
+  real t35 = U[43] * t2 + U[56] * t6 + U[69] * t11 + U[82] * a_n[0] + U[95] * a_n[1] + U[108] *
+    a_n[2] - U[160] * tau_n[0];
+  real t50 = U[44] * t2 + U[57] * t6 + U[70] * t11 + U[83] * a_n[0] + U[96] * a_n[1] + U[109] *
+    a_n[2] - U[161] * tau_n[0];
+  real t52 = a[0] * t21 + a[1] * t35 + a[2] * t50;
+  if (!((0.0 < (fabs(t52))))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = 0.0;
+  U_h[14] = 1.0;
+  U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24]
+    = U_h[25] = U_h[26] = U_h[27] = 0.0;
+  U_h[28] = 1.0;
+  U_h[29] = U_h[30] = U_h[31] = U_h[32] = U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38]
+    = 0.0;
+  real t68 = 1.0 / t52;
+  real t69 = (U[39] * t2 + U[52] * t6 + U[65] * t11 + U[78] * a_n[0] + U[91] * a_n[1] + U[104] *
+    a_n[2] - U[156] * tau_n[0]) * t68;
+  U_h[39] = -(a[0] * t69);
+  real t85 = (U[40] * t2 + U[53] * t6 + U[66] * t11 + U[79] * a_n[0] + U[92] * a_n[1] + U[105] *
+    a_n[2] - U[157] * tau_n[0]) * t68;
+  U_h[40] = -(a[0] * t85);
+  real t101 = (U[41] * t2 + U[54] * t6 + U[67] * t11 + U[80] * a_n[0] + U[93] * a_n[1] + U[106] *
+    a_n[2] - U[158] * tau_n[0]) * t68;
+  U_h[41] = -(a[0] * t101);
+  real t104 = t21 * t68;
+  U_h[42] = 1.0 - a[0] * t104;
+  real t107 = t35 * t68;
+  U_h[43] = -(a[0] * t107);
+  real t110 = t50 * t68;
+  U_h[44] = -(a[0] * t110);
+  real t126 = (U[45] * t2 + U[58] * t6 + U[71] * t11 + U[84] * a_n[0] + U[97] * a_n[1] + U[110] *
+    a_n[2] - U[162] * tau_n[0]) * t68;
+  U_h[45] = -(a[0] * t126);
+  real t142 = (U[46] * t2 + U[59] * t6 + U[72] * t11 + U[85] * a_n[0] + U[98] * a_n[1] + U[111] *
+    a_n[2] - U[163] * tau_n[0]) * t68;
+  U_h[46] = -(a[0] * t142);
+  real t158 = (U[47] * t2 + U[60] * t6 + U[73] * t11 + U[86] * a_n[0] + U[99] * a_n[1] + U[112] *
+    a_n[2] - U[164] * tau_n[0]) * t68;
+  U_h[47] = -(a[0] * t158);
+  real t174 = (U[48] * t2 + U[61] * t6 + U[74] * t11 + U[87] * a_n[0] + U[100] * a_n[1] + U[113] *
+    a_n[2] - U[165] * tau_n[0]) * t68;
+  U_h[48] = -(a[0] * t174);
+  real t190 = (U[49] * t2 + U[62] * t6 + U[75] * t11 + U[88] * a_n[0] + U[101] * a_n[1] + U[114] *
+    a_n[2] - U[166] * tau_n[0]) * t68;
+  U_h[49] = -(a[0] * t190);
+  real t206 = (U[50] * t2 + U[63] * t6 + U[76] * t11 + U[89] * a_n[0] + U[102] * a_n[1] + U[115] *
+    a_n[2] - U[167] * tau_n[0]) * t68;
+  U_h[50] = -(a[0] * t206);
+  real t228 = (U[51] * t2 + U[64] * t6 + U[77] * t11 + U[90] * a_n[0] + U[103] * a_n[1] + U[116] *
+    a_n[2] - U[168] * tau_n[0] + (beta[0] * t21 + beta[1] * t35 + beta[2] * t50)) * t68;
+  U_h[51] = beta[0] - a[0] * t228;
+  U_h[52] = -(a[1] * t69);
+  U_h[53] = -(a[1] * t85);
+  U_h[54] = -(a[1] * t101);
+  U_h[55] = -(a[1] * t104);
+  U_h[56] = 1.0 - a[1] * t107;
+  U_h[57] = -(a[1] * t110);
+  U_h[58] = -(a[1] * t126);
+  U_h[59] = -(a[1] * t142);
+  U_h[60] = -(a[1] * t158);
+  U_h[61] = -(a[1] * t174);
+  U_h[62] = -(a[1] * t190);
+  U_h[63] = -(a[1] * t206);
+  U_h[64] = beta[1] - a[1] * t228;
+  U_h[65] = -(a[2] * t69);
+  U_h[66] = -(a[2] * t85);
+  U_h[67] = -(a[2] * t101);
+  U_h[68] = -(a[2] * t104);
+  U_h[69] = -(a[2] * t107);
+  U_h[70] = 1.0 - a[2] * t110;
+  U_h[71] = -(a[2] * t126);
+  U_h[72] = -(a[2] * t142);
+  U_h[73] = -(a[2] * t158);
+  U_h[74] = -(a[2] * t174);
+  U_h[75] = -(a[2] * t190);
+  U_h[76] = -(a[2] * t206);
+  U_h[77] = beta[2] - a[2] * t228;
+  U_h[78] = U_h[79] = U_h[80] = U_h[81] = U_h[82] = U_h[83] = 0.0;
+  U_h[84] = 1.0;
+  U_h[85] = U_h[86] = U_h[87] = U_h[88] = U_h[89] = U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94]
+    = U_h[95] = U_h[96] = U_h[97] = 0.0;
+  U_h[98] = 1.0;
+  U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] = U_h[106] = U_h[107] =
+    U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = 0.0;
+  U_h[126] = 1.0;
+  U_h[127] = U_h[128] = U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] =
+    U_h[136] = U_h[137] = U_h[138] = U_h[139] = 0.0;
+  U_h[140] = 1.0;
+  U_h[141] = U_h[142] = U_h[143] = U_h[144] = U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] =
+    U_h[150] = U_h[151] = U_h[152] = U_h[153] = 0.0;
+  U_h[154] = 1.0;
+  U_h[155] = U_h[156] = U_h[157] = U_h[158] = U_h[159] = U_h[160] = U_h[161] = U_h[162] = U_h[163] =
+    U_h[164] = U_h[165] = U_h[166] = U_h[167] = 0.0;
+  U_h[168] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_inputs[] = {
-    {"U", 169, "[m, rad, N*m, N, 1]", 0, 0},
-    {"a", 3, "1", 0, 0},
-    {"beta", 3, "rad", 0, 0},
-    {"a_n", 3, "1", 0, 0},
-    {"m_n", 3, "N*m", 0, 0},
-    {"tau_n", 1, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_outputs[] = {
-    {"U_h", 169, "[m, rad, N*m, N, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer, (in[0], in[1], in[2], in[3],
+  in[4], in[5], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_pin_spatial_rigid_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer,
-        .call = mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_outputs,
-        .ir_hash = "28bef762b12a3ed530b7d44b9c6342e874a30dc2042bbf257afc18738872dcee",
-        .n_guards = 1,
-        .guards = mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer), 6, 1, (const
+    mstmm_port[]){{"U", 169, "[m, rad, N*m, N, 1]", 0, 0}, {"a", 3, "1", 0, 0}, {"beta", 3, "rad",
+    0, 0}, {"a_n", 3, "1", 0, 0}, {"m_n", 3, "N*m", 0, 0}, {"tau_n", 1, "N*m", 0, 0}}, (const
+    mstmm_port[]){{"U_h", 169, "[m, rad, N*m, N, 1]", 0, 0}},
+    "7fa4412e00a5cc20cc96cfa451dd3f872757650e712d8f6f7887d4f7235b4c7c", 1, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_pin_spatial_rigid_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_pin_spatial_rigid_rigid",
-    .hash = "4ec53b204d7da23d3c65b72d60f93a34dec0932a575ccdbab0c541e96dce44db",
+    .hash = "23e8ca1703574b42c12dc38173e06a0b7ae36e8ff0508bdb3f38b81fe1fbf489",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,161 +8,57 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_smooth_planar_beam_rigid;
-int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(const real *restrict U,
-    const real *restrict tau_n, real *restrict U_h);
-
 /* smooth pin (planar), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.5, (8.103) to (8.105)
  * in  U[7][7] ([m, rad, N*m, N, 1]) matrix of the outboard body
  * in  tau_n[1] (N*m) moment of the next hinge (0: smooth, or free tip)
  * out U_h[7][10] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(const real *restrict U,
-    const real *restrict tau_n, real *restrict U_h)
+int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(in_t U, in_t tau_n, out_t U_h)
 {
-    const real t0 = U[44] * tau_n[0];
-    const real t1 = U[23] - t0;
-    const real t2 = fabs(t1);
-    const real t3 = 0.0 < t2;
-    if (!(t3 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 1.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 0.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    const real t4 = U[42] * tau_n[0];
-    const real t5 = U[21] - t4;
-    const real t6 = 1.0 / t1;
-    const real t7 = t5 * t6;
-    const real t8 = -t7;
-    U_h[20] = t8;
-    const real t9 = U[43] * tau_n[0];
-    const real t10 = U[22] - t9;
-    const real t11 = t10 * t6;
-    const real t12 = -t11;
-    U_h[21] = t12;
-    U_h[22] = 0.0;
-    const real t13 = U[45] * tau_n[0];
-    const real t14 = U[24] - t13;
-    const real t15 = t14 * t6;
-    const real t16 = -t15;
-    U_h[23] = t16;
-    const real t17 = U[46] * tau_n[0];
-    const real t18 = U[25] - t17;
-    const real t19 = t18 * t6;
-    const real t20 = -t19;
-    U_h[24] = t20;
-    const real t21 = U[47] * tau_n[0];
-    const real t22 = U[26] - t21;
-    const real t23 = t22 * t6;
-    const real t24 = -t23;
-    U_h[25] = t24;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 0.0;
-    const real t25 = U[48] * tau_n[0];
-    const real t26 = U[27] - t25;
-    const real t27 = t26 * t6;
-    const real t28 = -t27;
-    U_h[29] = t28;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 1.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 0.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 1.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 0.0;
-    U_h[49] = 0.0;
-    U_h[50] = 0.0;
-    U_h[51] = 0.0;
-    U_h[52] = 0.0;
-    U_h[53] = 0.0;
-    U_h[54] = 0.0;
-    U_h[55] = 1.0;
-    U_h[56] = 0.0;
-    U_h[57] = 0.0;
-    U_h[58] = 0.0;
-    U_h[59] = 0.0;
-    U_h[60] = 0.0;
-    U_h[61] = 0.0;
-    U_h[62] = 0.0;
-    U_h[63] = 0.0;
-    U_h[64] = 0.0;
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 1.0;
-    return 0;
+  real t1 = U[23] - U[44] * tau_n[0];
+  if (!((0.0 < (fabs(t1))))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = 0.0;
+  U_h[11] = 1.0;
+  U_h[12] = U_h[13] = U_h[14] = U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = 0.0;
+  real t6 = 1.0 / t1;
+  U_h[20] = -((U[21] - U[42] * tau_n[0]) * t6);
+  U_h[21] = -((U[22] - U[43] * tau_n[0]) * t6);
+  U_h[22] = 0.0;
+  U_h[23] = -((U[24] - U[45] * tau_n[0]) * t6);
+  U_h[24] = -((U[25] - U[46] * tau_n[0]) * t6);
+  U_h[25] = -((U[26] - U[47] * tau_n[0]) * t6);
+  U_h[26] = U_h[27] = U_h[28] = 0.0;
+  U_h[29] = -((U[27] - U[48] * tau_n[0]) * t6);
+  U_h[30] = U_h[31] = U_h[32] = 0.0;
+  U_h[33] = 1.0;
+  U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = U_h[40] = U_h[41] = U_h[42] = U_h[43]
+    = 0.0;
+  U_h[44] = 1.0;
+  U_h[45] = U_h[46] = U_h[47] = U_h[48] = U_h[49] = U_h[50] = U_h[51] = U_h[52] = U_h[53] = U_h[54]
+    = 0.0;
+  U_h[55] = 1.0;
+  U_h[56] = U_h[57] = U_h[58] = U_h[59] = U_h[60] = U_h[61] = U_h[62] = U_h[63] = U_h[64] = U_h[65]
+    = U_h[66] = U_h[67] = U_h[68] = 0.0;
+  U_h[69] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_inputs[] = {
-    {"U", 49, "[m, rad, N*m, N, 1]", 0, 0},
-    {"tau_n", 1, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_outputs[] = {
-    {"U_h", 70, "[m, rad, N*m, N, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_smooth_planar_beam_rigid_transfer, (in[0], in[1], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_smooth_planar_beam_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_smooth_planar_beam_rigid_transfer,
-        .call = mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_outputs,
-        .ir_hash = "78489c0033c57a701302dfae41cbc74e6ac24d80b6c9707f849f4b9a611b35ac",
-        .n_guards = 1,
-        .guards = mstmm_classical_hinge_smooth_planar_beam_rigid_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_smooth_planar_beam_rigid_transfer), 2, 1,
+    (const mstmm_port[]){{"U", 49, "[m, rad, N*m, N, 1]", 0, 0}, {"tau_n", 1, "N*m", 0, 0}}, (const
+    mstmm_port[]){{"U_h", 70, "[m, rad, N*m, N, 1]", 0, 0}},
+    "90010d49a2056df8141bc841c772c40f5031d744a3202eb92849a89bc6fad7d4", 1, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_smooth_planar_beam_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_smooth_planar_beam_rigid",
-    .hash = "344ce3d1a20743386bbbf8ff809e68cff67bebc480e0fee71302a23e56ea5f05",
+    .hash = "26d7bd8824f7a0034cadbcb0c222a96efa72dbccf1def52049c4ba1f936fa8ac",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,16 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_spring_planar_beam_rigid;
-int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(const real *restrict Theta_I,
-    const real *restrict k_t, const real *restrict c_t, const real *restrict k_1,
-    const real *restrict k_3, const real *restrict c_r, const real *restrict C,
-    const real *restrict D_phi, const real *restrict phi_0, const real *restrict phi_s,
-    const real *restrict theta_s, const real *restrict d_s, const real *restrict q_s,
-    real *restrict U_h);
-
 /* spring hinge (planar, nonlinear torsion spring), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.6, (8.126) to (8.129)
  * in  Theta_I[1][3] (1/m) section rotation per mode at the inboard side of the hinge
  * in  k_t[2][2] (N/m) stiffness, inertial axes at the predictor
  * in  c_t[2][2] (N*s/m) damping, inertial axes at the predictor
@@ -33,308 +24,136 @@ int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(const real *restrict
  * in  q_s[2] (N) force of springs and dampers at the predictor
  * out U_h[7][10] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(const real *restrict Theta_I,
-    const real *restrict k_t, const real *restrict c_t, const real *restrict k_1,
-    const real *restrict k_3, const real *restrict c_r, const real *restrict C,
-    const real *restrict D_phi, const real *restrict phi_0, const real *restrict phi_s,
-    const real *restrict theta_s, const real *restrict d_s, const real *restrict q_s,
-    real *restrict U_h)
+int mstmm_classical_hinge_spring_planar_beam_rigid_transfer(in_t Theta_I, in_t k_t, in_t c_t,
+    in_t k_1, in_t k_3, in_t c_r, in_t C, in_t D_phi, in_t phi_0, in_t phi_s, in_t theta_s,
+    in_t d_s, in_t q_s, out_t U_h)
 {
-    const real t0 = c_t[0] * C[0];
-    const real t1 = k_t[0] + t0;
-    const real t2 = fabs(t1);
-    const real t3 = c_t[2] * C[0];
-    const real t4 = k_t[2] + t3;
-    const real t5 = fabs(t4);
-    const real t6 = t2 < t5;
-    const real t7 = c_t[3] * C[0];
-    const real t8 = k_t[3] + t7;
-    const real t9 = fabs(t8);
-    const real t10 = t5 + t9;
-    const real t11 = c_t[1] * C[0];
-    const real t12 = k_t[1] + t11;
-    const real t13 = fabs(t12);
-    const real t14 = t2 + t13;
-    const real t15 = t6 != 0 ? t10 : t14;
-    const real t16 = t15 * ((real)1 / (real)10000000000000);
-    const real t17 = t6 != 0 ? t4 : t1;
-    const real t18 = fabs(t17);
-    const real t19 = t16 < t18;
-    if (!(t19 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t20 = t6 != 0 ? t14 : t10;
-    const real t21 = t20 * ((real)1 / (real)10000000000000);
-    const real t22 = t6 != 0 ? t12 : t8;
-    const real t23 = t6 != 0 ? t8 : t12;
-    const real t24 = t6 != 0 ? t1 : t4;
-    const real t25 = 1.0 / t17;
-    const real t26 = t24 * t25;
-    const real t27 = t23 * t26;
-    const real t28 = t22 - t27;
-    const real t29 = fabs(t28);
-    const real t30 = t21 < t29;
-    if (!(t30 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t31 = phi_s[0] - phi_0[0];
-    const real t32 = t31 * t31;
-    const real t33 = k_3[0] * t32;
-    const real t34 = 3.0 * t33;
-    const real t35 = c_r[0] * C[0];
-    const real t36 = t34 + t35;
-    const real t37 = k_1[0] + t36;
-    const real t38 = fabs(t37);
-    const real t39 = 0.0 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    const real t40 = t6 != 0 ? 1.0 : 0.0;
-    const real t41 = t6 != 0 ? 0.0 : 1.0;
-    const real t42 = t40 * t26;
-    const real t43 = t41 - t42;
-    const real t44 = 1.0 / t28;
-    const real t45 = t43 * t44;
-    const real t46 = t23 * t45;
-    const real t47 = t40 - t46;
-    const real t48 = t25 * t47;
-    const real t49 = q_s[0] * t48;
-    const real t50 = t41 * t26;
-    const real t51 = t40 - t50;
-    const real t52 = t51 * t44;
-    const real t53 = t23 * t52;
-    const real t54 = t41 - t53;
-    const real t55 = t25 * t54;
-    const real t56 = q_s[1] * t55;
-    const real t57 = t49 - t56;
-    const real t58 = t57 - d_s[1];
-    U_h[2] = t58;
-    U_h[3] = 0.0;
-    const real t59 = -t55;
-    U_h[4] = t59;
-    const real t60 = -t48;
-    U_h[5] = t60;
-    const real t61 = Theta_I[0] * q_s[0];
-    const real t62 = t48 * t61;
-    const real t63 = Theta_I[0] * q_s[1];
-    const real t64 = t55 * t63;
-    const real t65 = t62 - t64;
-    const real t66 = Theta_I[0] * d_s[1];
-    const real t67 = t65 - t66;
-    U_h[6] = t67;
-    const real t68 = Theta_I[1] * q_s[0];
-    const real t69 = t48 * t68;
-    const real t70 = Theta_I[1] * q_s[1];
-    const real t71 = t55 * t70;
-    const real t72 = t69 - t71;
-    const real t73 = Theta_I[1] * d_s[1];
-    const real t74 = t72 - t73;
-    U_h[7] = t74;
-    const real t75 = Theta_I[2] * q_s[0];
-    const real t76 = t48 * t75;
-    const real t77 = Theta_I[2] * q_s[1];
-    const real t78 = t55 * t77;
-    const real t79 = t76 - t78;
-    const real t80 = Theta_I[2] * d_s[1];
-    const real t81 = t79 - t80;
-    U_h[8] = t81;
-    const real t82 = theta_s[0] * d_s[1];
-    const real t83 = theta_s[0] * q_s[1];
-    const real t84 = q_s[0] + t83;
-    const real t85 = t55 * t84;
-    const real t86 = theta_s[0] * q_s[0];
-    const real t87 = t86 - q_s[1];
-    const real t88 = t48 * t87;
-    const real t89 = t85 - t88;
-    const real t90 = t82 + t89;
-    const real t91 = d_s[0] + t90;
-    U_h[9] = t91;
-    U_h[10] = 0.0;
-    U_h[11] = 1.0;
-    const real t92 = q_s[0] * t45;
-    const real t93 = q_s[1] * t52;
-    const real t94 = t92 - t93;
-    const real t95 = d_s[0] + t94;
-    U_h[12] = t95;
-    U_h[13] = 0.0;
-    const real t96 = -t52;
-    U_h[14] = t96;
-    const real t97 = -t45;
-    U_h[15] = t97;
-    const real t98 = Theta_I[0] * d_s[0];
-    const real t99 = t45 * t61;
-    const real t100 = t52 * t63;
-    const real t101 = t99 - t100;
-    const real t102 = t98 + t101;
-    U_h[16] = t102;
-    const real t103 = Theta_I[1] * d_s[0];
-    const real t104 = t45 * t68;
-    const real t105 = t52 * t70;
-    const real t106 = t104 - t105;
-    const real t107 = t103 + t106;
-    U_h[17] = t107;
-    const real t108 = Theta_I[2] * d_s[0];
-    const real t109 = t45 * t75;
-    const real t110 = t52 * t77;
-    const real t111 = t109 - t110;
-    const real t112 = t108 + t111;
-    U_h[18] = t112;
-    const real t113 = t52 * t84;
-    const real t114 = t45 * t87;
-    const real t115 = t113 - t114;
-    const real t116 = theta_s[0] * d_s[0];
-    const real t117 = t115 - t116;
-    const real t118 = d_s[1] + t117;
-    U_h[19] = t118;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    const real t119 = 1.0 / t37;
-    const real t120 = q_s[0] * t95;
-    const real t121 = q_s[1] * t58;
-    const real t122 = t120 - t121;
-    const real t123 = t119 * t122;
-    const real t124 = 1.0 - t123;
-    U_h[22] = t124;
-    const real t125 = -t119;
-    U_h[23] = t125;
-    const real t126 = q_s[0] * t52;
-    const real t127 = t56 - t126;
-    const real t128 = d_s[1] + t127;
-    const real t129 = t119 * t128;
-    const real t130 = -t129;
-    U_h[24] = t130;
-    const real t131 = q_s[1] * t48;
-    const real t132 = t131 - t92;
-    const real t133 = t132 - d_s[0];
-    const real t134 = t119 * t133;
-    const real t135 = -t134;
-    U_h[25] = t135;
-    const real t136 = q_s[0] * t102;
-    const real t137 = q_s[1] * t67;
-    const real t138 = t136 - t137;
-    const real t139 = t119 * t138;
-    const real t140 = Theta_I[0] - t139;
-    U_h[26] = t140;
-    const real t141 = q_s[0] * t107;
-    const real t142 = q_s[1] * t74;
-    const real t143 = t141 - t142;
-    const real t144 = t119 * t143;
-    const real t145 = Theta_I[1] - t144;
-    U_h[27] = t145;
-    const real t146 = q_s[0] * t112;
-    const real t147 = q_s[1] * t81;
-    const real t148 = t146 - t147;
-    const real t149 = t119 * t148;
-    const real t150 = Theta_I[2] - t149;
-    U_h[28] = t150;
-    const real t151 = phi_s[0] + theta_s[0];
-    const real t152 = t31 * t32;
-    const real t153 = k_3[0] * t152;
-    const real t154 = C[0] * phi_s[0];
-    const real t155 = D_phi[0] + t154;
-    const real t156 = c_r[0] * t155;
-    const real t157 = k_1[0] * t31;
-    const real t158 = t156 + t157;
-    const real t159 = t153 + t158;
-    const real t160 = q_s[0] * t117;
-    const real t161 = q_s[1] * t90;
-    const real t162 = t160 - t161;
-    const real t163 = t159 + t162;
-    const real t164 = t119 * t163;
-    const real t165 = t151 - t164;
-    const real t166 = t165 - theta_s[0];
-    U_h[29] = t166;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = t122;
-    U_h[33] = 1.0;
-    U_h[34] = t128;
-    U_h[35] = t133;
-    U_h[36] = t138;
-    U_h[37] = t143;
-    U_h[38] = t148;
-    U_h[39] = t162;
-    U_h[40] = 0.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 1.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 0.0;
-    U_h[49] = 0.0;
-    U_h[50] = 0.0;
-    U_h[51] = 0.0;
-    U_h[52] = 0.0;
-    U_h[53] = 0.0;
-    U_h[54] = 0.0;
-    U_h[55] = 1.0;
-    U_h[56] = 0.0;
-    U_h[57] = 0.0;
-    U_h[58] = 0.0;
-    U_h[59] = 0.0;
-    U_h[60] = 0.0;
-    U_h[61] = 0.0;
-    U_h[62] = 0.0;
-    U_h[63] = 0.0;
-    U_h[64] = 0.0;
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 1.0;
-    return 0;
+  real t1 = k_t[0] + c_t[0] * C[0];
+  real t2 = fabs(t1);
+  real t4 = k_t[2] + c_t[2] * C[0];
+  real t5 = fabs(t4);
+  real t6 = t2 < t5;
+  real t8 = k_t[3] + c_t[3] * C[0];
+  real t10 = t5 + (fabs(t8));
+  real t12 = k_t[1] + c_t[1] * C[0];
+  real t14 = t2 + (fabs(t12));
+  real t17 = t6 != 0 ? t4 : t1;
+  if (!(((t6 != 0 ? t10 : t14) * ((real)1 / (real)10000000000000) < (fabs(t17))))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t23 = t6 != 0 ? t8 : t12;
+  real t25 = 1.0 / t17;
+  real t26 = (t6 != 0 ? t1 : t4) * t25;
+  real t28 = (t6 != 0 ? t12 : t8) - t23 * t26;
+  if (!(((t6 != 0 ? t14 : t10) * ((real)1 / (real)10000000000000) < (fabs(t28))))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t31 = phi_s[0] - phi_0[0];
+  real t32 = t31 * t31;
+  real t37 = k_1[0] + (3.0 * (k_3[0] * t32) + c_r[0] * C[0]);
+  if (!((0.0 < (fabs(t37))))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = 0.0;
+  real t40 = t6 != 0 ? 1.0 : 0.0;
+  real t41 = t6 != 0 ? 0.0 : 1.0;
+  real t44 = 1.0 / t28;
+  real t45 = (t41 - t40 * t26) * t44;
+  real t48 = t25 * (t40 - t23 * t45);
+  real t52 = (t40 - t41 * t26) * t44;
+  real t55 = t25 * (t41 - t23 * t52);
+  real t56 = q_s[1] * t55;
+  real t58 = q_s[0] * t48 - t56 - d_s[1];
+  U_h[2] = t58;
+  U_h[3] = 0.0;
+  U_h[4] = -t55;
+  U_h[5] = -t48;
+  real t61 = Theta_I[0] * q_s[0];
+  real t63 = Theta_I[0] * q_s[1];
+  real t67 = t48 * t61 - t55 * t63 - Theta_I[0] * d_s[1];
+  U_h[6] = t67;
+  real t68 = Theta_I[1] * q_s[0];
+  real t70 = Theta_I[1] * q_s[1];
+  real t74 = t48 * t68 - t55 * t70 - Theta_I[1] * d_s[1];
+  U_h[7] = t74;
+  real t75 = Theta_I[2] * q_s[0];
+  real t77 = Theta_I[2] * q_s[1];
+  real t81 = t48 * t75 - t55 * t77 - Theta_I[2] * d_s[1];
+  U_h[8] = t81;
+  real t84 = q_s[0] + theta_s[0] * q_s[1];
+  real t87 = theta_s[0] * q_s[0] - q_s[1];
+  real t90 = theta_s[0] * d_s[1] + (t55 * t84 - t48 * t87);
+  U_h[9] = d_s[0] + t90;
+  U_h[10] = 0.0;
+  U_h[11] = 1.0;
+  real t92 = q_s[0] * t45;
+  real t95 = d_s[0] + (t92 - q_s[1] * t52);
+  U_h[12] = t95;
+  U_h[13] = 0.0;
+  U_h[14] = -t52;
+  U_h[15] = -t45;
+  real t102 = Theta_I[0] * d_s[0] + (t45 * t61 - t52 * t63);
+  U_h[16] = t102;
+  real t107 = Theta_I[1] * d_s[0] + (t45 * t68 - t52 * t70);
+  U_h[17] = t107;
+  real t112 = Theta_I[2] * d_s[0] + (t45 * t75 - t52 * t77);
+  U_h[18] = t112;
+  real t117 = t52 * t84 - t45 * t87 - theta_s[0] * d_s[0];
+  U_h[19] = d_s[1] + t117;
+  U_h[20] = U_h[21] = 0.0;
+  real t119 = 1.0 / t37;
+  real t122 = q_s[0] * t95 - q_s[1] * t58;
+  U_h[22] = 1.0 - t119 * t122;
+  U_h[23] = -t119;
+  real t128 = d_s[1] + (t56 - q_s[0] * t52);
+  U_h[24] = -(t119 * t128);
+  real t133 = q_s[1] * t48 - t92 - d_s[0];
+  U_h[25] = -(t119 * t133);
+  real t138 = q_s[0] * t102 - q_s[1] * t67;
+  U_h[26] = Theta_I[0] - t119 * t138;
+  real t143 = q_s[0] * t107 - q_s[1] * t74;
+  U_h[27] = Theta_I[1] - t119 * t143;
+  real t148 = q_s[0] * t112 - q_s[1] * t81;
+  U_h[28] = Theta_I[2] - t119 * t148;
+  real t162 = q_s[0] * t117 - q_s[1] * t90;
+  U_h[29] = phi_s[0] + theta_s[0] - t119 * (k_3[0] * (t31 * t32) + (c_r[0] * (D_phi[0] + C[0] *
+    phi_s[0]) + k_1[0] * t31) + t162) - theta_s[0];
+  U_h[30] = U_h[31] = 0.0;
+  U_h[32] = t122;
+  U_h[33] = 1.0;
+  U_h[34] = t128;
+  U_h[35] = t133;
+  U_h[36] = t138;
+  U_h[37] = t143;
+  U_h[38] = t148;
+  U_h[39] = t162;
+  U_h[40] = U_h[41] = U_h[42] = U_h[43] = 0.0;
+  U_h[44] = 1.0;
+  U_h[45] = U_h[46] = U_h[47] = U_h[48] = U_h[49] = U_h[50] = U_h[51] = U_h[52] = U_h[53] = U_h[54]
+    = 0.0;
+  U_h[55] = 1.0;
+  U_h[56] = U_h[57] = U_h[58] = U_h[59] = U_h[60] = U_h[61] = U_h[62] = U_h[63] = U_h[64] = U_h[65]
+    = U_h[66] = U_h[67] = U_h[68] = 0.0;
+  U_h[69] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_spring_planar_beam_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_spring_planar_beam_rigid_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_spring_planar_beam_rigid_transfer_inputs[] = {
-    {"Theta_I", 3, "1/m", 0, 0},
-    {"k_t", 4, "N/m", 0, 0},
-    {"c_t", 4, "N*s/m", 0, 0},
-    {"k_1", 1, "N*m/rad", 0, 0},
-    {"k_3", 1, "N*m/rad3", 0, 0},
-    {"c_r", 1, "N*m*s/rad", 0, 0},
-    {"C", 1, "1/s", 0, 0},
-    {"D_phi", 1, "rad/s", 0, 0},
-    {"phi_0", 1, "rad", 0, 0},
-    {"phi_s", 1, "rad", 0, 0},
-    {"theta_s", 1, "rad", 0, 0},
-    {"d_s", 2, "m", 0, 0},
-    {"q_s", 2, "N", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_spring_planar_beam_rigid_transfer_outputs[] = {
-    {"U_h", 70, "[m, rad, N*m, N, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_spring_planar_beam_rigid_transfer_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_spring_planar_beam_rigid_transfer, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_spring_planar_beam_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_spring_planar_beam_rigid_transfer,
-        .call = mstmm_classical_hinge_spring_planar_beam_rigid_transfer_call,
-        .n_inputs = 13,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_spring_planar_beam_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_spring_planar_beam_rigid_transfer_outputs,
-        .ir_hash = "627fd30f555bfb9661e7bb802e7b7a4776d034f6094e1de3627b2ec4f01aa8f3",
-        .n_guards = 3,
-        .guards = mstmm_classical_hinge_spring_planar_beam_rigid_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_spring_planar_beam_rigid_transfer), 13, 1,
+    (const mstmm_port[]){{"Theta_I", 3, "1/m", 0, 0}, {"k_t", 4, "N/m", 0, 0}, {"c_t", 4, "N*s/m",
+    0, 0}, {"k_1", 1, "N*m/rad", 0, 0}, {"k_3", 1, "N*m/rad3", 0, 0}, {"c_r", 1, "N*m*s/rad", 0, 0},
+    {"C", 1, "1/s", 0, 0}, {"D_phi", 1, "rad/s", 0, 0}, {"phi_0", 1, "rad", 0, 0}, {"phi_s", 1,
+    "rad", 0, 0}, {"theta_s", 1, "rad", 0, 0}, {"d_s", 2, "m", 0, 0}, {"q_s", 2, "N", 0, 0}}, (const
+    mstmm_port[]){{"U_h", 70, "[m, rad, N*m, N, 1]", 0, 0}},
+    "9a947bfc2a068987e67fbdf92d3e8478d487f1a6631802a4339617235c22c746", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_spring_planar_beam_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_spring_planar_beam_rigid",
-    .hash = "45442109e65534ca09025530ffb0b4ea86b664aa4e38e050bb79b0a2144363da",
+    .hash = "124b8896b4af1cc9f150acc487fd8afce0359608a1fd392d7024ec5f84946a7d",
     .nq = 0,
     .nu = 0,
     .np = 0,

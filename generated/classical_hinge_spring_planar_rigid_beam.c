@@ -8,16 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_beam;
-int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(const real *restrict W,
-    const real *restrict Theta_O, const real *restrict k_t, const real *restrict c_t,
-    const real *restrict k_1, const real *restrict k_3, const real *restrict c_r,
-    const real *restrict C, const real *restrict D_phi, const real *restrict phi_0,
-    const real *restrict phi_s, const real *restrict theta_s, const real *restrict d_s,
-    const real *restrict q_s, real *restrict U_h);
-
 /* spring hinge (planar, nonlinear torsion spring), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.6, (8.122) to (8.125)
  * in  W[3][10] (N) modal rows of the outboard body
  * in  Theta_O[1][3] (1/m) section rotation per mode at the outboard side of the hinge
  * in  k_t[2][2] (N/m) stiffness, inertial axes at the predictor
@@ -34,654 +25,253 @@ int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(const real *restrict
  * in  q_s[2] (N) force of springs and dampers at the predictor
  * out U_h[10][7] ([m, rad, N*m, N, m, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(const real *restrict W,
-    const real *restrict Theta_O, const real *restrict k_t, const real *restrict c_t,
-    const real *restrict k_1, const real *restrict k_3, const real *restrict c_r,
-    const real *restrict C, const real *restrict D_phi, const real *restrict phi_0,
-    const real *restrict phi_s, const real *restrict theta_s, const real *restrict d_s,
-    const real *restrict q_s, real *restrict U_h)
+int mstmm_classical_hinge_spring_planar_rigid_beam_transfer(in_t W, in_t Theta_O, in_t k_t,
+    in_t c_t, in_t k_1, in_t k_3, in_t c_r, in_t C, in_t D_phi, in_t phi_0, in_t phi_s,
+    in_t theta_s, in_t d_s, in_t q_s, out_t U_h)
 {
-    const real t0 = c_t[0] * C[0];
-    const real t1 = k_t[0] + t0;
-    const real t2 = fabs(t1);
-    const real t3 = c_t[2] * C[0];
-    const real t4 = k_t[2] + t3;
-    const real t5 = fabs(t4);
-    const real t6 = t2 < t5;
-    const real t7 = c_t[3] * C[0];
-    const real t8 = k_t[3] + t7;
-    const real t9 = fabs(t8);
-    const real t10 = t5 + t9;
-    const real t11 = c_t[1] * C[0];
-    const real t12 = k_t[1] + t11;
-    const real t13 = fabs(t12);
-    const real t14 = t2 + t13;
-    const real t15 = t6 != 0 ? t10 : t14;
-    const real t16 = t15 * ((real)1 / (real)10000000000000);
-    const real t17 = t6 != 0 ? t4 : t1;
-    const real t18 = fabs(t17);
-    const real t19 = t16 < t18;
-    if (!(t19 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t20 = t6 != 0 ? t14 : t10;
-    const real t21 = t20 * ((real)1 / (real)10000000000000);
-    const real t22 = t6 != 0 ? t12 : t8;
-    const real t23 = t6 != 0 ? t8 : t12;
-    const real t24 = t6 != 0 ? t1 : t4;
-    const real t25 = 1.0 / t17;
-    const real t26 = t24 * t25;
-    const real t27 = t23 * t26;
-    const real t28 = t22 - t27;
-    const real t29 = fabs(t28);
-    const real t30 = t21 < t29;
-    if (!(t30 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t31 = phi_s[0] - phi_0[0];
-    const real t32 = t31 * t31;
-    const real t33 = k_3[0] * t32;
-    const real t34 = 3.0 * t33;
-    const real t35 = c_r[0] * C[0];
-    const real t36 = t34 + t35;
-    const real t37 = k_1[0] + t36;
-    const real t38 = fabs(t37);
-    const real t39 = 0.0 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t40 = W[2] * Theta_O[0];
-    const real t41 = W[6] - t40;
-    const real t42 = fabs(t41);
-    const real t43 = W[12] * Theta_O[0];
-    const real t44 = W[16] - t43;
-    const real t45 = fabs(t44);
-    const real t46 = t42 < t45;
-    const real t47 = t46 != 0 ? t44 : t41;
-    const real t48 = fabs(t47);
-    const real t49 = W[22] * Theta_O[0];
-    const real t50 = W[26] - t49;
-    const real t51 = fabs(t50);
-    const real t52 = t48 < t51;
-    const real t53 = W[22] * Theta_O[1];
-    const real t54 = W[27] - t53;
-    const real t55 = fabs(t54);
-    const real t56 = t51 + t55;
-    const real t57 = W[22] * Theta_O[2];
-    const real t58 = W[28] - t57;
-    const real t59 = fabs(t58);
-    const real t60 = t56 + t59;
-    const real t61 = W[12] * Theta_O[1];
-    const real t62 = W[17] - t61;
-    const real t63 = fabs(t62);
-    const real t64 = t45 + t63;
-    const real t65 = W[12] * Theta_O[2];
-    const real t66 = W[18] - t65;
-    const real t67 = fabs(t66);
-    const real t68 = t64 + t67;
-    const real t69 = W[2] * Theta_O[1];
-    const real t70 = W[7] - t69;
-    const real t71 = fabs(t70);
-    const real t72 = t42 + t71;
-    const real t73 = W[2] * Theta_O[2];
-    const real t74 = W[8] - t73;
-    const real t75 = fabs(t74);
-    const real t76 = t72 + t75;
-    const real t77 = t46 != 0 ? t68 : t76;
-    const real t78 = t52 != 0 ? t60 : t77;
-    const real t79 = ((real)1 / (real)10000000000000) * t78;
-    const real t80 = t52 != 0 ? t50 : t47;
-    const real t81 = fabs(t80);
-    const real t82 = t79 < t81;
-    if (!(t82 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t83 = t46 != 0 ? t70 : t62;
-    const real t84 = t46 != 0 ? t62 : t70;
-    const real t85 = t52 != 0 ? t54 : t84;
-    const real t86 = t46 != 0 ? t41 : t44;
-    const real t87 = 1.0 / t80;
-    const real t88 = t86 * t87;
-    const real t89 = t85 * t88;
-    const real t90 = t83 - t89;
-    const real t91 = fabs(t90);
-    const real t92 = t52 != 0 ? t84 : t54;
-    const real t93 = t52 != 0 ? t47 : t50;
-    const real t94 = t93 * t87;
-    const real t95 = t85 * t94;
-    const real t96 = t92 - t95;
-    const real t97 = fabs(t96);
-    const real t98 = t91 < t97;
-    const real t99 = t52 != 0 ? t77 : t60;
-    const real t100 = t46 != 0 ? t76 : t68;
-    const real t101 = t98 != 0 ? t99 : t100;
-    const real t102 = ((real)1 / (real)10000000000000) * t101;
-    const real t103 = t98 != 0 ? t96 : t90;
-    const real t104 = fabs(t103);
-    const real t105 = t102 < t104;
-    if (!(t105 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t106 = t98 != 0 ? t100 : t99;
-    const real t107 = ((real)1 / (real)10000000000000) * t106;
-    const real t108 = t46 != 0 ? t74 : t66;
-    const real t109 = t46 != 0 ? t66 : t74;
-    const real t110 = t52 != 0 ? t58 : t109;
-    const real t111 = t110 * t88;
-    const real t112 = t108 - t111;
-    const real t113 = t52 != 0 ? t109 : t58;
-    const real t114 = t110 * t94;
-    const real t115 = t113 - t114;
-    const real t116 = t98 != 0 ? t112 : t115;
-    const real t117 = t98 != 0 ? t115 : t112;
-    const real t118 = t98 != 0 ? t90 : t96;
-    const real t119 = 1.0 / t103;
-    const real t120 = t118 * t119;
-    const real t121 = t117 * t120;
-    const real t122 = t116 - t121;
-    const real t123 = fabs(t122);
-    const real t124 = t107 < t123;
-    if (!(t124 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    const real t125 = t6 != 0 ? 1.0 : 0.0;
-    const real t126 = t6 != 0 ? 0.0 : 1.0;
-    const real t127 = t125 * t26;
-    const real t128 = t126 - t127;
-    const real t129 = 1.0 / t28;
-    const real t130 = t128 * t129;
-    const real t131 = t23 * t130;
-    const real t132 = t125 - t131;
-    const real t133 = t25 * t132;
-    const real t134 = q_s[0] * t133;
-    const real t135 = t126 * t26;
-    const real t136 = t125 - t135;
-    const real t137 = t136 * t129;
-    const real t138 = t23 * t137;
-    const real t139 = t126 - t138;
-    const real t140 = t25 * t139;
-    const real t141 = q_s[1] * t140;
-    const real t142 = t134 - t141;
-    const real t143 = t142 - d_s[1];
-    U_h[2] = t143;
-    U_h[3] = 0.0;
-    const real t144 = -t140;
-    U_h[4] = t144;
-    const real t145 = -t133;
-    U_h[5] = t145;
-    const real t146 = theta_s[0] * d_s[1];
-    const real t147 = theta_s[0] * q_s[1];
-    const real t148 = q_s[0] + t147;
-    const real t149 = t140 * t148;
-    const real t150 = theta_s[0] * q_s[0];
-    const real t151 = t150 - q_s[1];
-    const real t152 = t133 * t151;
-    const real t153 = t149 - t152;
-    const real t154 = t146 + t153;
-    const real t155 = d_s[0] + t154;
-    U_h[6] = t155;
-    U_h[7] = 0.0;
-    U_h[8] = 1.0;
-    const real t156 = q_s[0] * t130;
-    const real t157 = q_s[1] * t137;
-    const real t158 = t156 - t157;
-    const real t159 = d_s[0] + t158;
-    U_h[9] = t159;
-    U_h[10] = 0.0;
-    const real t160 = -t137;
-    U_h[11] = t160;
-    const real t161 = -t130;
-    U_h[12] = t161;
-    const real t162 = t137 * t148;
-    const real t163 = t130 * t151;
-    const real t164 = t162 - t163;
-    const real t165 = theta_s[0] * d_s[0];
-    const real t166 = t164 - t165;
-    const real t167 = d_s[1] + t166;
-    U_h[13] = t167;
-    const real t168 = t46 != 0 ? W[10] : W[0];
-    const real t169 = t52 != 0 ? W[20] : t168;
-    const real t170 = t52 != 0 ? t168 : W[20];
-    const real t171 = t169 * t94;
-    const real t172 = t170 - t171;
-    const real t173 = t46 != 0 ? W[0] : W[10];
-    const real t174 = t169 * t88;
-    const real t175 = t173 - t174;
-    const real t176 = t98 != 0 ? t172 : t175;
-    const real t177 = t98 != 0 ? t175 : t172;
-    const real t178 = t176 * t120;
-    const real t179 = t177 - t178;
-    const real t180 = 1.0 / t122;
-    const real t181 = t179 * t180;
-    const real t182 = t117 * t181;
-    const real t183 = t176 - t182;
-    const real t184 = t119 * t183;
-    const real t185 = t85 * t184;
-    const real t186 = t169 - t185;
-    const real t187 = t110 * t181;
-    const real t188 = t186 - t187;
-    const real t189 = t87 * t188;
-    const real t190 = Theta_O[0] * t189;
-    const real t191 = Theta_O[1] * t184;
-    const real t192 = t190 + t191;
-    const real t193 = Theta_O[2] * t181;
-    const real t194 = t192 + t193;
-    U_h[14] = t194;
-    const real t195 = t46 != 0 ? W[11] : W[1];
-    const real t196 = t52 != 0 ? W[21] : t195;
-    const real t197 = t52 != 0 ? t195 : W[21];
-    const real t198 = t196 * t94;
-    const real t199 = t197 - t198;
-    const real t200 = t46 != 0 ? W[1] : W[11];
-    const real t201 = t196 * t88;
-    const real t202 = t200 - t201;
-    const real t203 = t98 != 0 ? t199 : t202;
-    const real t204 = t98 != 0 ? t202 : t199;
-    const real t205 = t203 * t120;
-    const real t206 = t204 - t205;
-    const real t207 = t206 * t180;
-    const real t208 = t117 * t207;
-    const real t209 = t203 - t208;
-    const real t210 = t119 * t209;
-    const real t211 = t85 * t210;
-    const real t212 = t196 - t211;
-    const real t213 = t110 * t207;
-    const real t214 = t212 - t213;
-    const real t215 = t87 * t214;
-    const real t216 = Theta_O[0] * t215;
-    const real t217 = Theta_O[1] * t210;
-    const real t218 = t216 + t217;
-    const real t219 = Theta_O[2] * t207;
-    const real t220 = t218 + t219;
-    U_h[15] = t220;
-    const real t221 = 1.0 / t37;
-    const real t222 = q_s[0] * t159;
-    const real t223 = q_s[1] * t143;
-    const real t224 = t222 - t223;
-    const real t225 = t221 * t224;
-    const real t226 = 1.0 - t225;
-    const real t227 = W[20] * t143;
-    const real t228 = W[21] * t159;
-    const real t229 = t227 + t228;
-    const real t230 = W[22] * t226;
-    const real t231 = t229 + t230;
-    const real t232 = W[23] * t224;
-    const real t233 = t231 + t232;
-    const real t234 = W[10] * t143;
-    const real t235 = W[11] * t159;
-    const real t236 = t234 + t235;
-    const real t237 = W[12] * t226;
-    const real t238 = t236 + t237;
-    const real t239 = W[13] * t224;
-    const real t240 = t238 + t239;
-    const real t241 = W[0] * t143;
-    const real t242 = W[1] * t159;
-    const real t243 = t241 + t242;
-    const real t244 = W[2] * t226;
-    const real t245 = t243 + t244;
-    const real t246 = W[3] * t224;
-    const real t247 = t245 + t246;
-    const real t248 = t46 != 0 ? t240 : t247;
-    const real t249 = t52 != 0 ? t233 : t248;
-    const real t250 = t52 != 0 ? t248 : t233;
-    const real t251 = t249 * t94;
-    const real t252 = t250 - t251;
-    const real t253 = t46 != 0 ? t247 : t240;
-    const real t254 = t249 * t88;
-    const real t255 = t253 - t254;
-    const real t256 = t98 != 0 ? t252 : t255;
-    const real t257 = t98 != 0 ? t255 : t252;
-    const real t258 = t256 * t120;
-    const real t259 = t257 - t258;
-    const real t260 = t259 * t180;
-    const real t261 = t117 * t260;
-    const real t262 = t256 - t261;
-    const real t263 = t119 * t262;
-    const real t264 = t85 * t263;
-    const real t265 = t249 - t264;
-    const real t266 = t110 * t260;
-    const real t267 = t265 - t266;
-    const real t268 = t87 * t267;
-    const real t269 = Theta_O[0] * t268;
-    const real t270 = Theta_O[1] * t263;
-    const real t271 = t269 + t270;
-    const real t272 = Theta_O[2] * t260;
-    const real t273 = t271 + t272;
-    const real t274 = t226 + t273;
-    U_h[16] = t274;
-    const real t275 = W[22] * t221;
-    const real t276 = W[23] - t275;
-    const real t277 = W[12] * t221;
-    const real t278 = W[13] - t277;
-    const real t279 = W[2] * t221;
-    const real t280 = W[3] - t279;
-    const real t281 = t46 != 0 ? t278 : t280;
-    const real t282 = t52 != 0 ? t276 : t281;
-    const real t283 = t52 != 0 ? t281 : t276;
-    const real t284 = t282 * t94;
-    const real t285 = t283 - t284;
-    const real t286 = t46 != 0 ? t280 : t278;
-    const real t287 = t282 * t88;
-    const real t288 = t286 - t287;
-    const real t289 = t98 != 0 ? t285 : t288;
-    const real t290 = t98 != 0 ? t288 : t285;
-    const real t291 = t289 * t120;
-    const real t292 = t290 - t291;
-    const real t293 = t292 * t180;
-    const real t294 = t117 * t293;
-    const real t295 = t289 - t294;
-    const real t296 = t119 * t295;
-    const real t297 = t85 * t296;
-    const real t298 = t282 - t297;
-    const real t299 = t110 * t293;
-    const real t300 = t298 - t299;
-    const real t301 = t87 * t300;
-    const real t302 = Theta_O[0] * t301;
-    const real t303 = Theta_O[1] * t296;
-    const real t304 = t302 + t303;
-    const real t305 = Theta_O[2] * t293;
-    const real t306 = t304 + t305;
-    const real t307 = t306 - t221;
-    U_h[17] = t307;
-    const real t308 = q_s[0] * t137;
-    const real t309 = t141 - t308;
-    const real t310 = d_s[1] + t309;
-    const real t311 = W[23] * t310;
-    const real t312 = W[20] * t140;
-    const real t313 = W[21] * t137;
-    const real t314 = t312 + t313;
-    const real t315 = t221 * t310;
-    const real t316 = W[22] * t315;
-    const real t317 = t314 + t316;
-    const real t318 = t311 - t317;
-    const real t319 = W[24] + t318;
-    const real t320 = W[13] * t310;
-    const real t321 = W[10] * t140;
-    const real t322 = W[11] * t137;
-    const real t323 = t321 + t322;
-    const real t324 = W[12] * t315;
-    const real t325 = t323 + t324;
-    const real t326 = t320 - t325;
-    const real t327 = W[14] + t326;
-    const real t328 = W[3] * t310;
-    const real t329 = W[0] * t140;
-    const real t330 = W[1] * t137;
-    const real t331 = t329 + t330;
-    const real t332 = W[2] * t315;
-    const real t333 = t331 + t332;
-    const real t334 = t328 - t333;
-    const real t335 = W[4] + t334;
-    const real t336 = t46 != 0 ? t327 : t335;
-    const real t337 = t52 != 0 ? t319 : t336;
-    const real t338 = t52 != 0 ? t336 : t319;
-    const real t339 = t337 * t94;
-    const real t340 = t338 - t339;
-    const real t341 = t46 != 0 ? t335 : t327;
-    const real t342 = t337 * t88;
-    const real t343 = t341 - t342;
-    const real t344 = t98 != 0 ? t340 : t343;
-    const real t345 = t98 != 0 ? t343 : t340;
-    const real t346 = t344 * t120;
-    const real t347 = t345 - t346;
-    const real t348 = t347 * t180;
-    const real t349 = t117 * t348;
-    const real t350 = t344 - t349;
-    const real t351 = t119 * t350;
-    const real t352 = t85 * t351;
-    const real t353 = t337 - t352;
-    const real t354 = t110 * t348;
-    const real t355 = t353 - t354;
-    const real t356 = t87 * t355;
-    const real t357 = Theta_O[0] * t356;
-    const real t358 = Theta_O[1] * t351;
-    const real t359 = t357 + t358;
-    const real t360 = Theta_O[2] * t348;
-    const real t361 = t359 + t360;
-    const real t362 = t361 - t315;
-    U_h[18] = t362;
-    const real t363 = q_s[1] * t133;
-    const real t364 = t363 - t156;
-    const real t365 = t364 - d_s[0];
-    const real t366 = W[23] * t365;
-    const real t367 = W[20] * t133;
-    const real t368 = W[21] * t130;
-    const real t369 = t367 + t368;
-    const real t370 = t221 * t365;
-    const real t371 = W[22] * t370;
-    const real t372 = t369 + t371;
-    const real t373 = t366 - t372;
-    const real t374 = W[25] + t373;
-    const real t375 = W[13] * t365;
-    const real t376 = W[10] * t133;
-    const real t377 = W[11] * t130;
-    const real t378 = t376 + t377;
-    const real t379 = W[12] * t370;
-    const real t380 = t378 + t379;
-    const real t381 = t375 - t380;
-    const real t382 = W[15] + t381;
-    const real t383 = W[3] * t365;
-    const real t384 = W[0] * t133;
-    const real t385 = W[1] * t130;
-    const real t386 = t384 + t385;
-    const real t387 = W[2] * t370;
-    const real t388 = t386 + t387;
-    const real t389 = t383 - t388;
-    const real t390 = W[5] + t389;
-    const real t391 = t46 != 0 ? t382 : t390;
-    const real t392 = t52 != 0 ? t374 : t391;
-    const real t393 = t52 != 0 ? t391 : t374;
-    const real t394 = t392 * t94;
-    const real t395 = t393 - t394;
-    const real t396 = t46 != 0 ? t390 : t382;
-    const real t397 = t392 * t88;
-    const real t398 = t396 - t397;
-    const real t399 = t98 != 0 ? t395 : t398;
-    const real t400 = t98 != 0 ? t398 : t395;
-    const real t401 = t399 * t120;
-    const real t402 = t400 - t401;
-    const real t403 = t402 * t180;
-    const real t404 = t117 * t403;
-    const real t405 = t399 - t404;
-    const real t406 = t119 * t405;
-    const real t407 = t85 * t406;
-    const real t408 = t392 - t407;
-    const real t409 = t110 * t403;
-    const real t410 = t408 - t409;
-    const real t411 = t87 * t410;
-    const real t412 = Theta_O[0] * t411;
-    const real t413 = Theta_O[1] * t406;
-    const real t414 = t412 + t413;
-    const real t415 = Theta_O[2] * t403;
-    const real t416 = t414 + t415;
-    const real t417 = t416 - t370;
-    U_h[19] = t417;
-    const real t418 = phi_s[0] + theta_s[0];
-    const real t419 = t31 * t32;
-    const real t420 = k_3[0] * t419;
-    const real t421 = C[0] * phi_s[0];
-    const real t422 = D_phi[0] + t421;
-    const real t423 = c_r[0] * t422;
-    const real t424 = k_1[0] * t31;
-    const real t425 = t423 + t424;
-    const real t426 = t420 + t425;
-    const real t427 = q_s[0] * t166;
-    const real t428 = q_s[1] * t154;
-    const real t429 = t427 - t428;
-    const real t430 = t426 + t429;
-    const real t431 = t221 * t430;
-    const real t432 = t418 - t431;
-    const real t433 = t432 - theta_s[0];
-    const real t434 = W[20] * t155;
-    const real t435 = W[21] * t167;
-    const real t436 = t434 + t435;
-    const real t437 = W[22] * t433;
-    const real t438 = t436 + t437;
-    const real t439 = W[23] * t429;
-    const real t440 = t438 + t439;
-    const real t441 = W[29] + t440;
-    const real t442 = W[10] * t155;
-    const real t443 = W[11] * t167;
-    const real t444 = t442 + t443;
-    const real t445 = W[12] * t433;
-    const real t446 = t444 + t445;
-    const real t447 = W[13] * t429;
-    const real t448 = t446 + t447;
-    const real t449 = W[19] + t448;
-    const real t450 = W[0] * t155;
-    const real t451 = W[1] * t167;
-    const real t452 = t450 + t451;
-    const real t453 = W[2] * t433;
-    const real t454 = t452 + t453;
-    const real t455 = W[3] * t429;
-    const real t456 = t454 + t455;
-    const real t457 = W[9] + t456;
-    const real t458 = t46 != 0 ? t449 : t457;
-    const real t459 = t52 != 0 ? t441 : t458;
-    const real t460 = t52 != 0 ? t458 : t441;
-    const real t461 = t459 * t94;
-    const real t462 = t460 - t461;
-    const real t463 = t46 != 0 ? t457 : t449;
-    const real t464 = t459 * t88;
-    const real t465 = t463 - t464;
-    const real t466 = t98 != 0 ? t462 : t465;
-    const real t467 = t98 != 0 ? t465 : t462;
-    const real t468 = t466 * t120;
-    const real t469 = t467 - t468;
-    const real t470 = t469 * t180;
-    const real t471 = t117 * t470;
-    const real t472 = t466 - t471;
-    const real t473 = t119 * t472;
-    const real t474 = t85 * t473;
-    const real t475 = t459 - t474;
-    const real t476 = t110 * t470;
-    const real t477 = t475 - t476;
-    const real t478 = t87 * t477;
-    const real t479 = Theta_O[0] * t478;
-    const real t480 = Theta_O[1] * t473;
-    const real t481 = t479 + t480;
-    const real t482 = Theta_O[2] * t470;
-    const real t483 = t481 + t482;
-    const real t484 = t433 + t483;
-    U_h[20] = t484;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = t224;
-    U_h[24] = 1.0;
-    U_h[25] = t310;
-    U_h[26] = t365;
-    U_h[27] = t429;
-    U_h[28] = 0.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 1.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 1.0;
-    U_h[41] = 0.0;
-    const real t485 = -t189;
-    U_h[42] = t485;
-    const real t486 = -t215;
-    U_h[43] = t486;
-    const real t487 = -t268;
-    U_h[44] = t487;
-    const real t488 = -t301;
-    U_h[45] = t488;
-    const real t489 = -t356;
-    U_h[46] = t489;
-    const real t490 = -t411;
-    U_h[47] = t490;
-    const real t491 = -t478;
-    U_h[48] = t491;
-    const real t492 = -t184;
-    U_h[49] = t492;
-    const real t493 = -t210;
-    U_h[50] = t493;
-    const real t494 = -t263;
-    U_h[51] = t494;
-    const real t495 = -t296;
-    U_h[52] = t495;
-    const real t496 = -t351;
-    U_h[53] = t496;
-    const real t497 = -t406;
-    U_h[54] = t497;
-    const real t498 = -t473;
-    U_h[55] = t498;
-    const real t499 = -t181;
-    U_h[56] = t499;
-    const real t500 = -t207;
-    U_h[57] = t500;
-    const real t501 = -t260;
-    U_h[58] = t501;
-    const real t502 = -t293;
-    U_h[59] = t502;
-    const real t503 = -t348;
-    U_h[60] = t503;
-    const real t504 = -t403;
-    U_h[61] = t504;
-    const real t505 = -t470;
-    U_h[62] = t505;
-    U_h[63] = 0.0;
-    U_h[64] = 0.0;
-    U_h[65] = 0.0;
-    U_h[66] = 0.0;
-    U_h[67] = 0.0;
-    U_h[68] = 0.0;
-    U_h[69] = 1.0;
-    return 0;
+  real t1 = k_t[0] + c_t[0] * C[0];
+  real t2 = fabs(t1);
+  real t4 = k_t[2] + c_t[2] * C[0];
+  real t5 = fabs(t4);
+  real t6 = t2 < t5;
+  real t8 = k_t[3] + c_t[3] * C[0];
+  real t10 = t5 + (fabs(t8));
+  real t12 = k_t[1] + c_t[1] * C[0];
+  real t14 = t2 + (fabs(t12));
+  real t17 = t6 != 0 ? t4 : t1;
+  if (!(((t6 != 0 ? t10 : t14) * ((real)1 / (real)10000000000000) < (fabs(t17))))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t23 = t6 != 0 ? t8 : t12;
+  real t25 = 1.0 / t17;
+  real t26 = (t6 != 0 ? t1 : t4) * t25;
+  real t28 = (t6 != 0 ? t12 : t8) - t23 * t26;
+  if (!(((t6 != 0 ? t14 : t10) * ((real)1 / (real)10000000000000) < (fabs(t28))))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t31 = phi_s[0] - phi_0[0];
+  real t32 = t31 * t31;
+  real t37 = k_1[0] + (3.0 * (k_3[0] * t32) + c_r[0] * C[0]);
+  if (!((0.0 < (fabs(t37))))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t41 = W[6] - W[2] * Theta_O[0];
+  real t42 = fabs(t41);
+  real t44 = W[16] - W[12] * Theta_O[0];
+  real t45 = fabs(t44);
+  real t46 = t42 < t45;
+  real t47 = t46 != 0 ? t44 : t41;
+  real t50 = W[26] - W[22] * Theta_O[0];
+  real t51 = fabs(t50);
+  real t52 = (fabs(t47)) < t51;
+  real t54 = W[27] - W[22] * Theta_O[1];
+  real t58 = W[28] - W[22] * Theta_O[2];
+  real t60 = t51 + (fabs(t54)) + (fabs(t58));
+  real t62 = W[17] - W[12] * Theta_O[1];
+  real t66 = W[18] - W[12] * Theta_O[2];
+  real t68 = t45 + (fabs(t62)) + (fabs(t66));
+  real t70 = W[7] - W[2] * Theta_O[1];
+  real t74 = W[8] - W[2] * Theta_O[2];
+  real t76 = t42 + (fabs(t70)) + (fabs(t74));
+  real t77 = t46 != 0 ? t68 : t76;
+  real t80 = t52 != 0 ? t50 : t47;
+  if (!((((real)1 / (real)10000000000000) * (t52 != 0 ? t60 : t77) < (fabs(t80))))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t84 = t46 != 0 ? t62 : t70;
+  real t85 = t52 != 0 ? t54 : t84;
+  real t87 = 1.0 / t80;
+  real t88 = (t46 != 0 ? t41 : t44) * t87;
+  real t90 = (t46 != 0 ? t70 : t62) - t85 * t88;
+  real t94 = (t52 != 0 ? t47 : t50) * t87;
+  real t96 = (t52 != 0 ? t84 : t54) - t85 * t94;
+  real t98 = (fabs(t90)) < (fabs(t96));
+  real t99 = t52 != 0 ? t77 : t60;
+  real t100 = t46 != 0 ? t76 : t68;
+  real t103 = t98 != 0 ? t96 : t90;
+  if (!((((real)1 / (real)10000000000000) * (t98 != 0 ? t99 : t100) < (fabs(t103))))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t109 = t46 != 0 ? t66 : t74;
+  real t110 = t52 != 0 ? t58 : t109;
+  real t112 = (t46 != 0 ? t74 : t66) - t110 * t88;
+  real t115 = (t52 != 0 ? t109 : t58) - t110 * t94;
+  real t117 = t98 != 0 ? t115 : t112;
+  real t119 = 1.0 / t103;
+  real t120 = (t98 != 0 ? t90 : t96) * t119;
+  real t122 = (t98 != 0 ? t112 : t115) - t117 * t120;
+  if (!((((real)1 / (real)10000000000000) * (t98 != 0 ? t100 : t99) < (fabs(t122))))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = 0.0;
+  real t125 = t6 != 0 ? 1.0 : 0.0;
+  real t126 = t6 != 0 ? 0.0 : 1.0;
+  real t129 = 1.0 / t28;
+  real t130 = (t126 - t125 * t26) * t129;
+  real t133 = t25 * (t125 - t23 * t130);
+  real t137 = (t125 - t126 * t26) * t129;
+  real t140 = t25 * (t126 - t23 * t137);
+  real t141 = q_s[1] * t140;
+  real t143 = q_s[0] * t133 - t141 - d_s[1];
+  U_h[2] = t143;
+  U_h[3] = 0.0;
+  U_h[4] = -t140;
+  U_h[5] = -t133;
+  real t148 = q_s[0] + theta_s[0] * q_s[1];
+  real t151 = theta_s[0] * q_s[0] - q_s[1];
+  real t154 = theta_s[0] * d_s[1] + (t140 * t148 - t133 * t151);
+  real t155 = d_s[0] + t154;
+  U_h[6] = t155;
+  U_h[7] = 0.0;
+  U_h[8] = 1.0;
+  real t156 = q_s[0] * t130;
+  real t159 = d_s[0] + (t156 - q_s[1] * t137);
+  U_h[9] = t159;
+  U_h[10] = 0.0;
+  U_h[11] = -t137;
+  U_h[12] = -t130;
+  real t166 = t137 * t148 - t130 * t151 - theta_s[0] * d_s[0];
+  real t167 = d_s[1] + t166;
+  U_h[13] = t167;
+  real t168 = t46 != 0 ? W[10] : W[0];
+  real t169 = t52 != 0 ? W[20] : t168;
+  real t172 = (t52 != 0 ? t168 : W[20]) - t169 * t94;
+  real t175 = (t46 != 0 ? W[0] : W[10]) - t169 * t88;
+  real t176 = t98 != 0 ? t172 : t175;
+  real t180 = 1.0 / t122;
+  real t181 = ((t98 != 0 ? t175 : t172) - t176 * t120) * t180;
+  real t184 = t119 * (t176 - t117 * t181);
+  real t189 = t87 * (t169 - t85 * t184 - t110 * t181);
+  U_h[14] = Theta_O[0] * t189 + Theta_O[1] * t184 + Theta_O[2] * t181;
+  real t195 = t46 != 0 ? W[11] : W[1];
+  real t196 = t52 != 0 ? W[21] : t195;
+  real t199 = (t52 != 0 ? t195 : W[21]) - t196 * t94;
+  real t202 = (t46 != 0 ? W[1] : W[11]) - t196 * t88;
+  real t203 = t98 != 0 ? t199 : t202;
+  real t207 = ((t98 != 0 ? t202 : t199) - t203 * t120) * t180;
+  real t210 = t119 * (t203 - t117 * t207);
+  real t215 = t87 * (t196 - t85 * t210 - t110 * t207);
+  U_h[15] = Theta_O[0] * t215 + Theta_O[1] * t210 + Theta_O[2] * t207;
+  real t221 = 1.0 / t37;
+  real t224 = q_s[0] * t159 - q_s[1] * t143;
+  real t226 = 1.0 - t221 * t224;
+  real t233 = W[20] * t143 + W[21] * t159 + W[22] * t226 + W[23] * t224;
+  real t240 = W[10] * t143 + W[11] * t159 + W[12] * t226 + W[13] * t224;
+  real t247 = W[0] * t143 + W[1] * t159 + W[2] * t226 + W[3] * t224;
+  real t248 = t46 != 0 ? t240 : t247;
+  real t249 = t52 != 0 ? t233 : t248;
+  real t252 = (t52 != 0 ? t248 : t233) - t249 * t94;
+  real t255 = (t46 != 0 ? t247 : t240) - t249 * t88;
+  real t256 = t98 != 0 ? t252 : t255;
+  real t260 = ((t98 != 0 ? t255 : t252) - t256 * t120) * t180;
+  real t263 = t119 * (t256 - t117 * t260);
+  real t268 = t87 * (t249 - t85 * t263 - t110 * t260);
+  U_h[16] = t226 + (Theta_O[0] * t268 + Theta_O[1] * t263 + Theta_O[2] * t260);
+  real t276 = W[23] - W[22] * t221;
+  real t278 = W[13] - W[12] * t221;
+  real t280 = W[3] - W[2] * t221;
+  real t281 = t46 != 0 ? t278 : t280;
+  real t282 = t52 != 0 ? t276 : t281;
+  real t285 = (t52 != 0 ? t281 : t276) - t282 * t94;
+  real t288 = (t46 != 0 ? t280 : t278) - t282 * t88;
+  real t289 = t98 != 0 ? t285 : t288;
+  real t293 = ((t98 != 0 ? t288 : t285) - t289 * t120) * t180;
+  real t296 = t119 * (t289 - t117 * t293);
+  real t301 = t87 * (t282 - t85 * t296 - t110 * t293);
+  U_h[17] = Theta_O[0] * t301 + Theta_O[1] * t296 + Theta_O[2] * t293 - t221;
+  real t310 = d_s[1] + (t141 - q_s[0] * t137);
+  real t315 = t221 * t310;
+  real t319 = W[24] + (W[23] * t310 - (W[20] * t140 + W[21] * t137 + W[22] * t315));
+  real t327 = W[14] + (W[13] * t310 - (W[10] * t140 + W[11] * t137 + W[12] * t315));
+  real t335 = W[4] + (W[3] * t310 - (W[0] * t140 + W[1] * t137 + W[2] * t315));
+  real t336 = t46 != 0 ? t327 : t335;
+  real t337 = t52 != 0 ? t319 : t336;
+  real t340 = (t52 != 0 ? t336 : t319) - t337 * t94;
+  real t343 = (t46 != 0 ? t335 : t327) - t337 * t88;
+  real t344 = t98 != 0 ? t340 : t343;
+  real t348 = ((t98 != 0 ? t343 : t340) - t344 * t120) * t180;
+  real t351 = t119 * (t344 - t117 * t348);
+  real t356 = t87 * (t337 - t85 * t351 - t110 * t348);
+  U_h[18] = Theta_O[0] * t356 + Theta_O[1] * t351 + Theta_O[2] * t348 - t315;
+  real t365 = q_s[1] * t133 - t156 - d_s[0];
+  real t370 = t221 * t365;
+  real t374 = W[25] + (W[23] * t365 - (W[20] * t133 + W[21] * t130 + W[22] * t370));
+  real t382 = W[15] + (W[13] * t365 - (W[10] * t133 + W[11] * t130 + W[12] * t370));
+  real t390 = W[5] + (W[3] * t365 - (W[0] * t133 + W[1] * t130 + W[2] * t370));
+  real t391 = t46 != 0 ? t382 : t390;
+  real t392 = t52 != 0 ? t374 : t391;
+  real t395 = (t52 != 0 ? t391 : t374) - t392 * t94;
+  real t398 = (t46 != 0 ? t390 : t382) - t392 * t88;
+  real t399 = t98 != 0 ? t395 : t398;
+  real t403 = ((t98 != 0 ? t398 : t395) - t399 * t120) * t180;
+  real t406 = t119 * (t399 - t117 * t403);
+  real t411 = t87 * (t392 - t85 * t406 - t110 * t403);
+  U_h[19] = Theta_O[0] * t411 + Theta_O[1] * t406 + Theta_O[2] * t403 - t370;
+  real t429 = q_s[0] * t166 - q_s[1] * t154;
+  real t433 = phi_s[0] + theta_s[0] - t221 * (k_3[0] * (t31 * t32) + (c_r[0] * (D_phi[0] + C[0] *
+    phi_s[0]) + k_1[0] * t31) + t429) - theta_s[0];
+  real t441 = W[29] + (W[20] * t155 + W[21] * t167 + W[22] * t433 + W[23] * t429);
+  real t449 = W[19] + (W[10] * t155 + W[11] * t167 + W[12] * t433 + W[13] * t429);
+  real t457 = W[9] + (W[0] * t155 + W[1] * t167 + W[2] * t433 + W[3] * t429);
+  real t458 = t46 != 0 ? t449 : t457;
+  real t459 = t52 != 0 ? t441 : t458;
+  real t462 = (t52 != 0 ? t458 : t441) - t459 * t94;
+  real t465 = (t46 != 0 ? t457 : t449) - t459 * t88;
+  real t466 = t98 != 0 ? t462 : t465;
+  real t470 = ((t98 != 0 ? t465 : t462) - t466 * t120) * t180;
+  real t473 = t119 * (t466 - t117 * t470);
+  real t478 = t87 * (t459 - t85 * t473 - t110 * t470);
+  U_h[20] = t433 + (Theta_O[0] * t478 + Theta_O[1] * t473 + Theta_O[2] * t470);
+  U_h[21] = U_h[22] = 0.0;
+  U_h[23] = t224;
+  U_h[24] = 1.0;
+  U_h[25] = t310;
+  U_h[26] = t365;
+  U_h[27] = t429;
+  U_h[28] = U_h[29] = U_h[30] = U_h[31] = 0.0;
+  U_h[32] = 1.0;
+  U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = 0.0;
+  U_h[40] = 1.0;
+  U_h[41] = 0.0;
+  U_h[42] = -t189;
+  U_h[43] = -t215;
+  U_h[44] = -t268;
+  U_h[45] = -t301;
+  U_h[46] = -t356;
+  U_h[47] = -t411;
+  U_h[48] = -t478;
+  U_h[49] = -t184;
+  U_h[50] = -t210;
+  U_h[51] = -t263;
+  U_h[52] = -t296;
+  U_h[53] = -t351;
+  U_h[54] = -t406;
+  U_h[55] = -t473;
+  U_h[56] = -t181;
+  U_h[57] = -t207;
+  U_h[58] = -t260;
+  U_h[59] = -t293;
+  U_h[60] = -t348;
+  U_h[61] = -t403;
+  U_h[62] = -t470;
+  U_h[63] = U_h[64] = U_h[65] = U_h[66] = U_h[67] = U_h[68] = 0.0;
+  U_h[69] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_spring_planar_rigid_beam_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_spring_planar_rigid_beam_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_spring_planar_rigid_beam_transfer_inputs[] = {
-    {"W", 30, "N", 0, 0},
-    {"Theta_O", 3, "1/m", 0, 0},
-    {"k_t", 4, "N/m", 0, 0},
-    {"c_t", 4, "N*s/m", 0, 0},
-    {"k_1", 1, "N*m/rad", 0, 0},
-    {"k_3", 1, "N*m/rad3", 0, 0},
-    {"c_r", 1, "N*m*s/rad", 0, 0},
-    {"C", 1, "1/s", 0, 0},
-    {"D_phi", 1, "rad/s", 0, 0},
-    {"phi_0", 1, "rad", 0, 0},
-    {"phi_s", 1, "rad", 0, 0},
-    {"theta_s", 1, "rad", 0, 0},
-    {"d_s", 2, "m", 0, 0},
-    {"q_s", 2, "N", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_spring_planar_rigid_beam_transfer_outputs[] = {
-    {"U_h", 70, "[m, rad, N*m, N, m, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_spring_planar_rigid_beam_transfer_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_spring_planar_rigid_beam_transfer, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_spring_planar_rigid_beam_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_spring_planar_rigid_beam_transfer,
-        .call = mstmm_classical_hinge_spring_planar_rigid_beam_transfer_call,
-        .n_inputs = 14,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_spring_planar_rigid_beam_transfer_inputs,
-        .outputs = mstmm_classical_hinge_spring_planar_rigid_beam_transfer_outputs,
-        .ir_hash = "2abfe95fd4e67a0d603c825f1bc6a8f01dd31e0b701614512c8a0a75b5955ccd",
-        .n_guards = 6,
-        .guards = mstmm_classical_hinge_spring_planar_rigid_beam_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_spring_planar_rigid_beam_transfer), 14, 1,
+    (const mstmm_port[]){{"W", 30, "N", 0, 0}, {"Theta_O", 3, "1/m", 0, 0}, {"k_t", 4, "N/m", 0, 0},
+    {"c_t", 4, "N*s/m", 0, 0}, {"k_1", 1, "N*m/rad", 0, 0}, {"k_3", 1, "N*m/rad3", 0, 0}, {"c_r", 1,
+    "N*m*s/rad", 0, 0}, {"C", 1, "1/s", 0, 0}, {"D_phi", 1, "rad/s", 0, 0}, {"phi_0", 1, "rad", 0,
+    0}, {"phi_s", 1, "rad", 0, 0}, {"theta_s", 1, "rad", 0, 0}, {"d_s", 2, "m", 0, 0}, {"q_s", 2,
+    "N", 0, 0}}, (const mstmm_port[]){{"U_h", 70, "[m, rad, N*m, N, m, 1]", 0, 0}},
+    "5b9ae3810f93e563d269b59f034a94d93c2c7f87cebc0d771c1e3fe75194bb84", 6, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_spring_planar_rigid_beam = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_spring_planar_rigid_beam",
-    .hash = "6a28a495a76f863b7d9b895df434fabea083f70446e061788f2fa519625cd880",
+    .hash = "014a5e7b26ce2436d7501977884b1dfb8a0b8a295edc7453db3dd11ad9e72ed6",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,15 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_hinge_spring_planar_rigid_rigid;
-int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(const real *restrict k_t,
-    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
-    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
-    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
-    const real *restrict d_s, const real *restrict q_s, real *restrict U_h);
-
 /* spring hinge (planar, nonlinear torsion spring), discrete-time classical matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, section 8.6, (8.106) to (8.111); section 7.6
  * in  k_t[2][2] (N/m) stiffness, inertial axes at the predictor
  * in  c_t[2][2] (N*s/m) damping, inertial axes at the predictor
  * in  k_1[1] (N*m/rad) torsional stiffness
@@ -31,234 +23,107 @@ int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(const real *restric
  * in  q_s[2] (N) force of springs and dampers at the predictor
  * out U_h[7][7] ([m, rad, N*m, N, 1]) matrix, z_O = U_h z_I
  */
-int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(const real *restrict k_t,
-    const real *restrict c_t, const real *restrict k_1, const real *restrict k_3,
-    const real *restrict c_r, const real *restrict C, const real *restrict D_phi,
-    const real *restrict phi_0, const real *restrict phi_s, const real *restrict theta_s,
-    const real *restrict d_s, const real *restrict q_s, real *restrict U_h)
+int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(in_t k_t, in_t c_t, in_t k_1, in_t k_3,
+    in_t c_r, in_t C, in_t D_phi, in_t phi_0, in_t phi_s, in_t theta_s, in_t d_s, in_t q_s,
+    out_t U_h)
 {
-    const real t0 = c_t[0] * C[0];
-    const real t1 = k_t[0] + t0;
-    const real t2 = fabs(t1);
-    const real t3 = c_t[2] * C[0];
-    const real t4 = k_t[2] + t3;
-    const real t5 = fabs(t4);
-    const real t6 = t2 < t5;
-    const real t7 = c_t[3] * C[0];
-    const real t8 = k_t[3] + t7;
-    const real t9 = fabs(t8);
-    const real t10 = t5 + t9;
-    const real t11 = c_t[1] * C[0];
-    const real t12 = k_t[1] + t11;
-    const real t13 = fabs(t12);
-    const real t14 = t2 + t13;
-    const real t15 = t6 != 0 ? t10 : t14;
-    const real t16 = t15 * ((real)1 / (real)10000000000000);
-    const real t17 = t6 != 0 ? t4 : t1;
-    const real t18 = fabs(t17);
-    const real t19 = t16 < t18;
-    if (!(t19 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t20 = t6 != 0 ? t14 : t10;
-    const real t21 = t20 * ((real)1 / (real)10000000000000);
-    const real t22 = t6 != 0 ? t12 : t8;
-    const real t23 = t6 != 0 ? t8 : t12;
-    const real t24 = t6 != 0 ? t1 : t4;
-    const real t25 = 1.0 / t17;
-    const real t26 = t24 * t25;
-    const real t27 = t23 * t26;
-    const real t28 = t22 - t27;
-    const real t29 = fabs(t28);
-    const real t30 = t21 < t29;
-    if (!(t30 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t31 = phi_s[0] - phi_0[0];
-    const real t32 = t31 * t31;
-    const real t33 = k_3[0] * t32;
-    const real t34 = 3.0 * t33;
-    const real t35 = c_r[0] * C[0];
-    const real t36 = t34 + t35;
-    const real t37 = k_1[0] + t36;
-    const real t38 = fabs(t37);
-    const real t39 = 0.0 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    const real t40 = t6 != 0 ? 1.0 : 0.0;
-    const real t41 = t6 != 0 ? 0.0 : 1.0;
-    const real t42 = t40 * t26;
-    const real t43 = t41 - t42;
-    const real t44 = 1.0 / t28;
-    const real t45 = t43 * t44;
-    const real t46 = t23 * t45;
-    const real t47 = t40 - t46;
-    const real t48 = t25 * t47;
-    const real t49 = q_s[0] * t48;
-    const real t50 = t41 * t26;
-    const real t51 = t40 - t50;
-    const real t52 = t51 * t44;
-    const real t53 = t23 * t52;
-    const real t54 = t41 - t53;
-    const real t55 = t25 * t54;
-    const real t56 = q_s[1] * t55;
-    const real t57 = t49 - t56;
-    const real t58 = t57 - d_s[1];
-    U_h[2] = t58;
-    U_h[3] = 0.0;
-    const real t59 = -t55;
-    U_h[4] = t59;
-    const real t60 = -t48;
-    U_h[5] = t60;
-    const real t61 = theta_s[0] * d_s[1];
-    const real t62 = theta_s[0] * q_s[1];
-    const real t63 = q_s[0] + t62;
-    const real t64 = t55 * t63;
-    const real t65 = theta_s[0] * q_s[0];
-    const real t66 = t65 - q_s[1];
-    const real t67 = t48 * t66;
-    const real t68 = t64 - t67;
-    const real t69 = t61 + t68;
-    const real t70 = d_s[0] + t69;
-    U_h[6] = t70;
-    U_h[7] = 0.0;
-    U_h[8] = 1.0;
-    const real t71 = q_s[0] * t45;
-    const real t72 = q_s[1] * t52;
-    const real t73 = t71 - t72;
-    const real t74 = d_s[0] + t73;
-    U_h[9] = t74;
-    U_h[10] = 0.0;
-    const real t75 = -t52;
-    U_h[11] = t75;
-    const real t76 = -t45;
-    U_h[12] = t76;
-    const real t77 = t52 * t63;
-    const real t78 = t45 * t66;
-    const real t79 = t77 - t78;
-    const real t80 = theta_s[0] * d_s[0];
-    const real t81 = t79 - t80;
-    const real t82 = d_s[1] + t81;
-    U_h[13] = t82;
-    U_h[14] = 0.0;
-    U_h[15] = 0.0;
-    const real t83 = 1.0 / t37;
-    const real t84 = q_s[0] * t74;
-    const real t85 = q_s[1] * t58;
-    const real t86 = t84 - t85;
-    const real t87 = t83 * t86;
-    const real t88 = 1.0 - t87;
-    U_h[16] = t88;
-    const real t89 = -t83;
-    U_h[17] = t89;
-    const real t90 = q_s[0] * t52;
-    const real t91 = t56 - t90;
-    const real t92 = d_s[1] + t91;
-    const real t93 = t83 * t92;
-    const real t94 = -t93;
-    U_h[18] = t94;
-    const real t95 = q_s[1] * t48;
-    const real t96 = t95 - t71;
-    const real t97 = t96 - d_s[0];
-    const real t98 = t83 * t97;
-    const real t99 = -t98;
-    U_h[19] = t99;
-    const real t100 = phi_s[0] + theta_s[0];
-    const real t101 = t31 * t32;
-    const real t102 = k_3[0] * t101;
-    const real t103 = C[0] * phi_s[0];
-    const real t104 = D_phi[0] + t103;
-    const real t105 = c_r[0] * t104;
-    const real t106 = k_1[0] * t31;
-    const real t107 = t105 + t106;
-    const real t108 = t102 + t107;
-    const real t109 = q_s[0] * t81;
-    const real t110 = q_s[1] * t69;
-    const real t111 = t109 - t110;
-    const real t112 = t108 + t111;
-    const real t113 = t83 * t112;
-    const real t114 = t100 - t113;
-    const real t115 = t114 - theta_s[0];
-    U_h[20] = t115;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = t86;
-    U_h[24] = 1.0;
-    U_h[25] = t92;
-    U_h[26] = t97;
-    U_h[27] = t111;
-    U_h[28] = 0.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 1.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    U_h[39] = 0.0;
-    U_h[40] = 1.0;
-    U_h[41] = 0.0;
-    U_h[42] = 0.0;
-    U_h[43] = 0.0;
-    U_h[44] = 0.0;
-    U_h[45] = 0.0;
-    U_h[46] = 0.0;
-    U_h[47] = 0.0;
-    U_h[48] = 1.0;
-    return 0;
+  real t1 = k_t[0] + c_t[0] * C[0];
+  real t2 = fabs(t1);
+  real t4 = k_t[2] + c_t[2] * C[0];
+  real t5 = fabs(t4);
+  real t6 = t2 < t5;
+  real t8 = k_t[3] + c_t[3] * C[0];
+  real t10 = t5 + (fabs(t8));
+  real t12 = k_t[1] + c_t[1] * C[0];
+  real t14 = t2 + (fabs(t12));
+  real t17 = t6 != 0 ? t4 : t1;
+  if (!(((t6 != 0 ? t10 : t14) * ((real)1 / (real)10000000000000) < (fabs(t17))))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t23 = t6 != 0 ? t8 : t12;
+  real t25 = 1.0 / t17;
+  real t26 = (t6 != 0 ? t1 : t4) * t25;
+  real t28 = (t6 != 0 ? t12 : t8) - t23 * t26;
+  if (!(((t6 != 0 ? t14 : t10) * ((real)1 / (real)10000000000000) < (fabs(t28))))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t31 = phi_s[0] - phi_0[0];
+  real t32 = t31 * t31;
+  real t37 = k_1[0] + (3.0 * (k_3[0] * t32) + c_r[0] * C[0]);
+  if (!((0.0 < (fabs(t37))))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  U_h[0] = 1.0;
+  U_h[1] = 0.0;
+  real t40 = t6 != 0 ? 1.0 : 0.0;
+  real t41 = t6 != 0 ? 0.0 : 1.0;
+  real t44 = 1.0 / t28;
+  real t45 = (t41 - t40 * t26) * t44;
+  real t48 = t25 * (t40 - t23 * t45);
+  real t52 = (t40 - t41 * t26) * t44;
+  real t55 = t25 * (t41 - t23 * t52);
+  real t56 = q_s[1] * t55;
+  real t58 = q_s[0] * t48 - t56 - d_s[1];
+  U_h[2] = t58;
+  U_h[3] = 0.0;
+  U_h[4] = -t55;
+  U_h[5] = -t48;
+  real t63 = q_s[0] + theta_s[0] * q_s[1];
+  real t66 = theta_s[0] * q_s[0] - q_s[1];
+  real t69 = theta_s[0] * d_s[1] + (t55 * t63 - t48 * t66);
+  U_h[6] = d_s[0] + t69;
+  U_h[7] = 0.0;
+  U_h[8] = 1.0;
+  real t71 = q_s[0] * t45;
+  real t74 = d_s[0] + (t71 - q_s[1] * t52);
+  U_h[9] = t74;
+  U_h[10] = 0.0;
+  U_h[11] = -t52;
+  U_h[12] = -t45;
+  real t81 = t52 * t63 - t45 * t66 - theta_s[0] * d_s[0];
+  U_h[13] = d_s[1] + t81;
+  U_h[14] = U_h[15] = 0.0;
+  real t83 = 1.0 / t37;
+  real t86 = q_s[0] * t74 - q_s[1] * t58;
+  U_h[16] = 1.0 - t83 * t86;
+  U_h[17] = -t83;
+  real t92 = d_s[1] + (t56 - q_s[0] * t52);
+  U_h[18] = -(t83 * t92);
+  real t97 = q_s[1] * t48 - t71 - d_s[0];
+  U_h[19] = -(t83 * t97);
+  real t111 = q_s[0] * t81 - q_s[1] * t69;
+  U_h[20] = phi_s[0] + theta_s[0] - t83 * (k_3[0] * (t31 * t32) + (c_r[0] * (D_phi[0] + C[0] *
+    phi_s[0]) + k_1[0] * t31) + t111) - theta_s[0];
+  U_h[21] = U_h[22] = 0.0;
+  U_h[23] = t86;
+  U_h[24] = 1.0;
+  U_h[25] = t92;
+  U_h[26] = t97;
+  U_h[27] = t111;
+  U_h[28] = U_h[29] = U_h[30] = U_h[31] = 0.0;
+  U_h[32] = 1.0;
+  U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38] = U_h[39] = 0.0;
+  U_h[40] = 1.0;
+  U_h[41] = U_h[42] = U_h[43] = U_h[44] = U_h[45] = U_h[46] = U_h[47] = 0.0;
+  U_h[48] = 1.0;
+  return 0;
 }
 
-static int mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0]);
-}
-
-static const mstmm_port mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_inputs[] = {
-    {"k_t", 4, "N/m", 0, 0},
-    {"c_t", 4, "N*s/m", 0, 0},
-    {"k_1", 1, "N*m/rad", 0, 0},
-    {"k_3", 1, "N*m/rad3", 0, 0},
-    {"c_r", 1, "N*m*s/rad", 0, 0},
-    {"C", 1, "1/s", 0, 0},
-    {"D_phi", 1, "rad/s", 0, 0},
-    {"phi_0", 1, "rad", 0, 0},
-    {"phi_s", 1, "rad", 0, 0},
-    {"theta_s", 1, "rad", 0, 0},
-    {"d_s", 2, "m", 0, 0},
-    {"q_s", 2, "N", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_outputs[] = {
-    {"U_h", 49, "[m, rad, N*m, N, 1]", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_classical_hinge_spring_planar_rigid_rigid_transfer, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0]))
 
 static const mstmm_kernel mstmm_classical_hinge_spring_planar_rigid_rigid_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_hinge_spring_planar_rigid_rigid_transfer,
-        .call = mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_call,
-        .n_inputs = 12,
-        .n_outputs = 1,
-        .inputs = mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_inputs,
-        .outputs = mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_outputs,
-        .ir_hash = "ad28e74159505ad78990dabe30dcd52aac73fbfe8f522f1b7be18f460b119a41",
-        .n_guards = 3,
-        .guards = mstmm_classical_hinge_spring_planar_rigid_rigid_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_hinge_spring_planar_rigid_rigid_transfer), 12, 1,
+    (const mstmm_port[]){{"k_t", 4, "N/m", 0, 0}, {"c_t", 4, "N*s/m", 0, 0}, {"k_1", 1, "N*m/rad",
+    0, 0}, {"k_3", 1, "N*m/rad3", 0, 0}, {"c_r", 1, "N*m*s/rad", 0, 0}, {"C", 1, "1/s", 0, 0},
+    {"D_phi", 1, "rad/s", 0, 0}, {"phi_0", 1, "rad", 0, 0}, {"phi_s", 1, "rad", 0, 0}, {"theta_s",
+    1, "rad", 0, 0}, {"d_s", 2, "m", 0, 0}, {"q_s", 2, "N", 0, 0}}, (const mstmm_port[]){{"U_h", 49,
+    "[m, rad, N*m, N, 1]", 0, 0}},
+    "f9f510f8e18d6c75f546bbda50f57725a17977ae112c7136ce17015aa3978ab3", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
 };
 
 const mstmm_element mstmm_classical_hinge_spring_planar_rigid_rigid = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "hinge_spring_planar_rigid_rigid",
-    .hash = "b1e7c8fde995969b098ec0aa12834358882807ac043f5338faa0edbd6c55249a",
+    .hash = "0ef5cc1531fb7e2c9edcd87165e087091308f69b84a253fef9c8c5f5d131ef6f",
     .nq = 0,
     .nu = 0,
     .np = 0,

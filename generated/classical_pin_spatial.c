@@ -8,13 +8,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_classical_pin_spatial;
-int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *restrict F_scale,
-    const real *restrict a, const real *restrict u, const real *restrict omega_I,
-    const real *restrict a_n, const real *restrict tau_n, real *restrict U_h, real *restrict margin);
-
 /* pin moving in space, classical transfer matrix
- * source: Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 5, (5.50) to (5.61)
  * in  U[13][13] ([m/s2, rad/s2, N*m, N, 1]) transfer matrix of the outboard body
  * in  F_scale[6][6] (kg*m, kg*m2; kg, kg*m) F_scale of the outboard body
  * in  a[3] (1) pin axis, unit vector, inertial axes
@@ -25,444 +19,130 @@ int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *res
  * out U_h[13][13] ([m/s2, rad/s2, N*m, N, 1]) transfer matrix, z_O = U_h z_I
  * out margin[1] (1) relative size of the pivot, 0 to 1
  */
-int mstmm_classical_pin_spatial_transfer(const real *restrict U, const real *restrict F_scale,
-    const real *restrict a, const real *restrict u, const real *restrict omega_I,
-    const real *restrict a_n, const real *restrict tau_n, real *restrict U_h, real *restrict margin)
+int mstmm_classical_pin_spatial_transfer(in_t U, in_t F_scale, in_t a, in_t u, in_t omega_I,
+    in_t a_n, in_t tau_n, out_t U_h, out_t margin)
 {
-    const real t0 = U[81] * a_n[0];
-    const real t1 = U[94] * a_n[1];
-    const real t2 = t0 + t1;
-    const real t3 = U[107] * a_n[2];
-    const real t4 = t2 + t3;
-    const real t5 = a[0] * t4;
-    const real t6 = U[82] * a_n[0];
-    const real t7 = U[95] * a_n[1];
-    const real t8 = t6 + t7;
-    const real t9 = U[108] * a_n[2];
-    const real t10 = t8 + t9;
-    const real t11 = a[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = U[83] * a_n[0];
-    const real t14 = U[96] * a_n[1];
-    const real t15 = t13 + t14;
-    const real t16 = U[109] * a_n[2];
-    const real t17 = t15 + t16;
-    const real t18 = a[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = fabs(t19);
-    const real t21 = 0.0 < t20;
-    if (!(t21 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t22 = fabs(a_n[0]);
-    const real t23 = F_scale[3] * t22;
-    const real t24 = fabs(a_n[1]);
-    const real t25 = F_scale[9] * t24;
-    const real t26 = t23 + t25;
-    const real t27 = fabs(a_n[2]);
-    const real t28 = F_scale[15] * t27;
-    const real t29 = t26 + t28;
-    const real t30 = fabs(a[0]);
-    const real t31 = t29 * t30;
-    const real t32 = F_scale[4] * t22;
-    const real t33 = F_scale[10] * t24;
-    const real t34 = t32 + t33;
-    const real t35 = F_scale[16] * t27;
-    const real t36 = t34 + t35;
-    const real t37 = fabs(a[1]);
-    const real t38 = t36 * t37;
-    const real t39 = t31 + t38;
-    const real t40 = F_scale[5] * t22;
-    const real t41 = F_scale[11] * t24;
-    const real t42 = t40 + t41;
-    const real t43 = F_scale[17] * t27;
-    const real t44 = t42 + t43;
-    const real t45 = fabs(a[2]);
-    const real t46 = t44 * t45;
-    const real t47 = t39 + t46;
-    const real t48 = 1.0 / t19;
-    const real t49 = fabs(t48);
-    const real t50 = t47 * t49;
-    const real t51 = 1.0 / t50;
-    const real t52 = ((real)1 / (real)100000000) < t51;
-    if (!(t52 != 0)) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
-    U_h[0] = 1.0;
-    U_h[1] = 0.0;
-    U_h[2] = 0.0;
-    U_h[3] = 0.0;
-    U_h[4] = 0.0;
-    U_h[5] = 0.0;
-    U_h[6] = 0.0;
-    U_h[7] = 0.0;
-    U_h[8] = 0.0;
-    U_h[9] = 0.0;
-    U_h[10] = 0.0;
-    U_h[11] = 0.0;
-    U_h[12] = 0.0;
-    U_h[13] = 0.0;
-    U_h[14] = 1.0;
-    U_h[15] = 0.0;
-    U_h[16] = 0.0;
-    U_h[17] = 0.0;
-    U_h[18] = 0.0;
-    U_h[19] = 0.0;
-    U_h[20] = 0.0;
-    U_h[21] = 0.0;
-    U_h[22] = 0.0;
-    U_h[23] = 0.0;
-    U_h[24] = 0.0;
-    U_h[25] = 0.0;
-    U_h[26] = 0.0;
-    U_h[27] = 0.0;
-    U_h[28] = 1.0;
-    U_h[29] = 0.0;
-    U_h[30] = 0.0;
-    U_h[31] = 0.0;
-    U_h[32] = 0.0;
-    U_h[33] = 0.0;
-    U_h[34] = 0.0;
-    U_h[35] = 0.0;
-    U_h[36] = 0.0;
-    U_h[37] = 0.0;
-    U_h[38] = 0.0;
-    const real t53 = U[78] * a_n[0];
-    const real t54 = U[91] * a_n[1];
-    const real t55 = t53 + t54;
-    const real t56 = U[104] * a_n[2];
-    const real t57 = t55 + t56;
-    const real t58 = t57 * t48;
-    const real t59 = a[0] * t58;
-    const real t60 = -t59;
-    U_h[39] = t60;
-    const real t61 = U[79] * a_n[0];
-    const real t62 = U[92] * a_n[1];
-    const real t63 = t61 + t62;
-    const real t64 = U[105] * a_n[2];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * t48;
-    const real t67 = a[0] * t66;
-    const real t68 = -t67;
-    U_h[40] = t68;
-    const real t69 = U[80] * a_n[0];
-    const real t70 = U[93] * a_n[1];
-    const real t71 = t69 + t70;
-    const real t72 = U[106] * a_n[2];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * t48;
-    const real t75 = a[0] * t74;
-    const real t76 = -t75;
-    U_h[41] = t76;
-    const real t77 = t4 * t48;
-    const real t78 = a[0] * t77;
-    const real t79 = 1.0 - t78;
-    U_h[42] = t79;
-    const real t80 = t10 * t48;
-    const real t81 = a[0] * t80;
-    const real t82 = -t81;
-    U_h[43] = t82;
-    const real t83 = t17 * t48;
-    const real t84 = a[0] * t83;
-    const real t85 = -t84;
-    U_h[44] = t85;
-    const real t86 = U[84] * a_n[0];
-    const real t87 = U[97] * a_n[1];
-    const real t88 = t86 + t87;
-    const real t89 = U[110] * a_n[2];
-    const real t90 = t88 + t89;
-    const real t91 = t90 * t48;
-    const real t92 = a[0] * t91;
-    const real t93 = -t92;
-    U_h[45] = t93;
-    const real t94 = U[85] * a_n[0];
-    const real t95 = U[98] * a_n[1];
-    const real t96 = t94 + t95;
-    const real t97 = U[111] * a_n[2];
-    const real t98 = t96 + t97;
-    const real t99 = t98 * t48;
-    const real t100 = a[0] * t99;
-    const real t101 = -t100;
-    U_h[46] = t101;
-    const real t102 = U[86] * a_n[0];
-    const real t103 = U[99] * a_n[1];
-    const real t104 = t102 + t103;
-    const real t105 = U[112] * a_n[2];
-    const real t106 = t104 + t105;
-    const real t107 = t106 * t48;
-    const real t108 = a[0] * t107;
-    const real t109 = -t108;
-    U_h[47] = t109;
-    const real t110 = U[87] * a_n[0];
-    const real t111 = U[100] * a_n[1];
-    const real t112 = t110 + t111;
-    const real t113 = U[113] * a_n[2];
-    const real t114 = t112 + t113;
-    const real t115 = t114 * t48;
-    const real t116 = a[0] * t115;
-    const real t117 = -t116;
-    U_h[48] = t117;
-    const real t118 = U[88] * a_n[0];
-    const real t119 = U[101] * a_n[1];
-    const real t120 = t118 + t119;
-    const real t121 = U[114] * a_n[2];
-    const real t122 = t120 + t121;
-    const real t123 = t122 * t48;
-    const real t124 = a[0] * t123;
-    const real t125 = -t124;
-    U_h[49] = t125;
-    const real t126 = U[89] * a_n[0];
-    const real t127 = U[102] * a_n[1];
-    const real t128 = t126 + t127;
-    const real t129 = U[115] * a_n[2];
-    const real t130 = t128 + t129;
-    const real t131 = t130 * t48;
-    const real t132 = a[0] * t131;
-    const real t133 = -t132;
-    U_h[50] = t133;
-    const real t134 = a[2] * omega_I[1];
-    const real t135 = a[1] * omega_I[2];
-    const real t136 = t134 - t135;
-    const real t137 = u[0] * t136;
-    const real t138 = U[90] * a_n[0];
-    const real t139 = U[103] * a_n[1];
-    const real t140 = t138 + t139;
-    const real t141 = U[116] * a_n[2];
-    const real t142 = t140 + t141;
-    const real t143 = t137 * t4;
-    const real t144 = a[0] * omega_I[2];
-    const real t145 = a[2] * omega_I[0];
-    const real t146 = t144 - t145;
-    const real t147 = u[0] * t146;
-    const real t148 = t147 * t10;
-    const real t149 = t143 + t148;
-    const real t150 = a[1] * omega_I[0];
-    const real t151 = a[0] * omega_I[1];
-    const real t152 = t150 - t151;
-    const real t153 = u[0] * t152;
-    const real t154 = t153 * t17;
-    const real t155 = t149 + t154;
-    const real t156 = t142 + t155;
-    const real t157 = tau_n[0] - t156;
-    const real t158 = t157 * t48;
-    const real t159 = a[0] * t158;
-    const real t160 = t137 + t159;
-    U_h[51] = t160;
-    const real t161 = a[1] * t58;
-    const real t162 = -t161;
-    U_h[52] = t162;
-    const real t163 = a[1] * t66;
-    const real t164 = -t163;
-    U_h[53] = t164;
-    const real t165 = a[1] * t74;
-    const real t166 = -t165;
-    U_h[54] = t166;
-    const real t167 = a[1] * t77;
-    const real t168 = -t167;
-    U_h[55] = t168;
-    const real t169 = a[1] * t80;
-    const real t170 = 1.0 - t169;
-    U_h[56] = t170;
-    const real t171 = a[1] * t83;
-    const real t172 = -t171;
-    U_h[57] = t172;
-    const real t173 = a[1] * t91;
-    const real t174 = -t173;
-    U_h[58] = t174;
-    const real t175 = a[1] * t99;
-    const real t176 = -t175;
-    U_h[59] = t176;
-    const real t177 = a[1] * t107;
-    const real t178 = -t177;
-    U_h[60] = t178;
-    const real t179 = a[1] * t115;
-    const real t180 = -t179;
-    U_h[61] = t180;
-    const real t181 = a[1] * t123;
-    const real t182 = -t181;
-    U_h[62] = t182;
-    const real t183 = a[1] * t131;
-    const real t184 = -t183;
-    U_h[63] = t184;
-    const real t185 = a[1] * t158;
-    const real t186 = t147 + t185;
-    U_h[64] = t186;
-    const real t187 = a[2] * t58;
-    const real t188 = -t187;
-    U_h[65] = t188;
-    const real t189 = a[2] * t66;
-    const real t190 = -t189;
-    U_h[66] = t190;
-    const real t191 = a[2] * t74;
-    const real t192 = -t191;
-    U_h[67] = t192;
-    const real t193 = a[2] * t77;
-    const real t194 = -t193;
-    U_h[68] = t194;
-    const real t195 = a[2] * t80;
-    const real t196 = -t195;
-    U_h[69] = t196;
-    const real t197 = a[2] * t83;
-    const real t198 = 1.0 - t197;
-    U_h[70] = t198;
-    const real t199 = a[2] * t91;
-    const real t200 = -t199;
-    U_h[71] = t200;
-    const real t201 = a[2] * t99;
-    const real t202 = -t201;
-    U_h[72] = t202;
-    const real t203 = a[2] * t107;
-    const real t204 = -t203;
-    U_h[73] = t204;
-    const real t205 = a[2] * t115;
-    const real t206 = -t205;
-    U_h[74] = t206;
-    const real t207 = a[2] * t123;
-    const real t208 = -t207;
-    U_h[75] = t208;
-    const real t209 = a[2] * t131;
-    const real t210 = -t209;
-    U_h[76] = t210;
-    const real t211 = a[2] * t158;
-    const real t212 = t153 + t211;
-    U_h[77] = t212;
-    U_h[78] = 0.0;
-    U_h[79] = 0.0;
-    U_h[80] = 0.0;
-    U_h[81] = 0.0;
-    U_h[82] = 0.0;
-    U_h[83] = 0.0;
-    U_h[84] = 1.0;
-    U_h[85] = 0.0;
-    U_h[86] = 0.0;
-    U_h[87] = 0.0;
-    U_h[88] = 0.0;
-    U_h[89] = 0.0;
-    U_h[90] = 0.0;
-    U_h[91] = 0.0;
-    U_h[92] = 0.0;
-    U_h[93] = 0.0;
-    U_h[94] = 0.0;
-    U_h[95] = 0.0;
-    U_h[96] = 0.0;
-    U_h[97] = 0.0;
-    U_h[98] = 1.0;
-    U_h[99] = 0.0;
-    U_h[100] = 0.0;
-    U_h[101] = 0.0;
-    U_h[102] = 0.0;
-    U_h[103] = 0.0;
-    U_h[104] = 0.0;
-    U_h[105] = 0.0;
-    U_h[106] = 0.0;
-    U_h[107] = 0.0;
-    U_h[108] = 0.0;
-    U_h[109] = 0.0;
-    U_h[110] = 0.0;
-    U_h[111] = 0.0;
-    U_h[112] = 1.0;
-    U_h[113] = 0.0;
-    U_h[114] = 0.0;
-    U_h[115] = 0.0;
-    U_h[116] = 0.0;
-    U_h[117] = 0.0;
-    U_h[118] = 0.0;
-    U_h[119] = 0.0;
-    U_h[120] = 0.0;
-    U_h[121] = 0.0;
-    U_h[122] = 0.0;
-    U_h[123] = 0.0;
-    U_h[124] = 0.0;
-    U_h[125] = 0.0;
-    U_h[126] = 1.0;
-    U_h[127] = 0.0;
-    U_h[128] = 0.0;
-    U_h[129] = 0.0;
-    U_h[130] = 0.0;
-    U_h[131] = 0.0;
-    U_h[132] = 0.0;
-    U_h[133] = 0.0;
-    U_h[134] = 0.0;
-    U_h[135] = 0.0;
-    U_h[136] = 0.0;
-    U_h[137] = 0.0;
-    U_h[138] = 0.0;
-    U_h[139] = 0.0;
-    U_h[140] = 1.0;
-    U_h[141] = 0.0;
-    U_h[142] = 0.0;
-    U_h[143] = 0.0;
-    U_h[144] = 0.0;
-    U_h[145] = 0.0;
-    U_h[146] = 0.0;
-    U_h[147] = 0.0;
-    U_h[148] = 0.0;
-    U_h[149] = 0.0;
-    U_h[150] = 0.0;
-    U_h[151] = 0.0;
-    U_h[152] = 0.0;
-    U_h[153] = 0.0;
-    U_h[154] = 1.0;
-    U_h[155] = 0.0;
-    U_h[156] = 0.0;
-    U_h[157] = 0.0;
-    U_h[158] = 0.0;
-    U_h[159] = 0.0;
-    U_h[160] = 0.0;
-    U_h[161] = 0.0;
-    U_h[162] = 0.0;
-    U_h[163] = 0.0;
-    U_h[164] = 0.0;
-    U_h[165] = 0.0;
-    U_h[166] = 0.0;
-    U_h[167] = 0.0;
-    U_h[168] = 1.0;
-    margin[0] = t51;
-    return 0;
+  real t4 = U[81] * a_n[0] + U[94] * a_n[1] + U[107] * a_n[2];
+  real t10 = U[82] * a_n[0] + U[95] * a_n[1] + U[108] * a_n[2];
+  real t17 = U[83] * a_n[0] + U[96] * a_n[1] + U[109] * a_n[2];
+  real t19 = a[0] * t4 + a[1] * t10 + a[2] * t17;
+  if (!((0.0 < (fabs(t19))))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t22 = fabs(a_n[0]);
+  real t24 = fabs(a_n[1]);
+  real t27 = fabs(a_n[2]);
+  real t48 = 1.0 / t19;
+  real t51 = 1.0 / (((F_scale[3] * t22 + F_scale[9] * t24 + F_scale[15] * t27) * (fabs(a[0])) +
+    (F_scale[4] * t22 + F_scale[10] * t24 + F_scale[16] * t27) * (fabs(a[1])) + (F_scale[5] * t22 +
+    F_scale[11] * t24 + F_scale[17] * t27) * (fabs(a[2]))) * (fabs(t48)));
+  if (!((((real)1 / (real)100000000) < t51))) return 2; /* the pivot vanishes: no transfer matrix here, use the Riccati sweep */
+  U_h[0] = 1.0;
+  U_h[1] = U_h[2] = U_h[3] = U_h[4] = U_h[5] = U_h[6] = U_h[7] = U_h[8] = U_h[9] = U_h[10] = U_h[11]
+    = U_h[12] = U_h[13] = 0.0;
+  U_h[14] = 1.0;
+  U_h[15] = U_h[16] = U_h[17] = U_h[18] = U_h[19] = U_h[20] = U_h[21] = U_h[22] = U_h[23] = U_h[24]
+    = U_h[25] = U_h[26] = U_h[27] = 0.0;
+  U_h[28] = 1.0;
+  U_h[29] = U_h[30] = U_h[31] = U_h[32] = U_h[33] = U_h[34] = U_h[35] = U_h[36] = U_h[37] = U_h[38]
+    = 0.0;
+  real t58 = (U[78] * a_n[0] + U[91] * a_n[1] + U[104] * a_n[2]) * t48;
+  U_h[39] = -(a[0] * t58);
+  real t66 = (U[79] * a_n[0] + U[92] * a_n[1] + U[105] * a_n[2]) * t48;
+  U_h[40] = -(a[0] * t66);
+  real t74 = (U[80] * a_n[0] + U[93] * a_n[1] + U[106] * a_n[2]) * t48;
+  U_h[41] = -(a[0] * t74);
+  real t77 = t4 * t48;
+  U_h[42] = 1.0 - a[0] * t77;
+  real t80 = t10 * t48;
+  U_h[43] = -(a[0] * t80);
+  real t83 = t17 * t48;
+  U_h[44] = -(a[0] * t83);
+  real t91 = (U[84] * a_n[0] + U[97] * a_n[1] + U[110] * a_n[2]) * t48;
+  U_h[45] = -(a[0] * t91);
+  real t99 = (U[85] * a_n[0] + U[98] * a_n[1] + U[111] * a_n[2]) * t48;
+  U_h[46] = -(a[0] * t99);
+  real t107 = (U[86] * a_n[0] + U[99] * a_n[1] + U[112] * a_n[2]) * t48;
+  U_h[47] = -(a[0] * t107);
+  real t115 = (U[87] * a_n[0] + U[100] * a_n[1] + U[113] * a_n[2]) * t48;
+  U_h[48] = -(a[0] * t115);
+  real t123 = (U[88] * a_n[0] + U[101] * a_n[1] + U[114] * a_n[2]) * t48;
+  U_h[49] = -(a[0] * t123);
+  real t131 = (U[89] * a_n[0] + U[102] * a_n[1] + U[115] * a_n[2]) * t48;
+  U_h[50] = -(a[0] * t131);
+  real t137 = u[0] * (a[2] * omega_I[1] - a[1] * omega_I[2]);
+  real t147 = u[0] * (a[0] * omega_I[2] - a[2] * omega_I[0]);
+  real t153 = u[0] * (a[1] * omega_I[0] - a[0] * omega_I[1]);
+  real t158 = (tau_n[0] - (U[90] * a_n[0] + U[103] * a_n[1] + U[116] * a_n[2] + (t137 * t4 + t147 *
+    t10 + t153 * t17))) * t48;
+  U_h[51] = t137 + a[0] * t158;
+  U_h[52] = -(a[1] * t58);
+  U_h[53] = -(a[1] * t66);
+  U_h[54] = -(a[1] * t74);
+  U_h[55] = -(a[1] * t77);
+  U_h[56] = 1.0 - a[1] * t80;
+  U_h[57] = -(a[1] * t83);
+  U_h[58] = -(a[1] * t91);
+  U_h[59] = -(a[1] * t99);
+  U_h[60] = -(a[1] * t107);
+  U_h[61] = -(a[1] * t115);
+  U_h[62] = -(a[1] * t123);
+  U_h[63] = -(a[1] * t131);
+  U_h[64] = t147 + a[1] * t158;
+  U_h[65] = -(a[2] * t58);
+  U_h[66] = -(a[2] * t66);
+  U_h[67] = -(a[2] * t74);
+  U_h[68] = -(a[2] * t77);
+  U_h[69] = -(a[2] * t80);
+  U_h[70] = 1.0 - a[2] * t83;
+  U_h[71] = -(a[2] * t91);
+  U_h[72] = -(a[2] * t99);
+  U_h[73] = -(a[2] * t107);
+  U_h[74] = -(a[2] * t115);
+  U_h[75] = -(a[2] * t123);
+  U_h[76] = -(a[2] * t131);
+  U_h[77] = t153 + a[2] * t158;
+  U_h[78] = U_h[79] = U_h[80] = U_h[81] = U_h[82] = U_h[83] = 0.0;
+  U_h[84] = 1.0;
+  U_h[85] = U_h[86] = U_h[87] = U_h[88] = U_h[89] = U_h[90] = U_h[91] = U_h[92] = U_h[93] = U_h[94]
+    = U_h[95] = U_h[96] = U_h[97] = 0.0;
+  U_h[98] = 1.0;
+  U_h[99] = U_h[100] = U_h[101] = U_h[102] = U_h[103] = U_h[104] = U_h[105] = U_h[106] = U_h[107] =
+    U_h[108] = U_h[109] = U_h[110] = U_h[111] = 0.0;
+  U_h[112] = 1.0;
+  U_h[113] = U_h[114] = U_h[115] = U_h[116] = U_h[117] = U_h[118] = U_h[119] = U_h[120] = U_h[121] =
+    U_h[122] = U_h[123] = U_h[124] = U_h[125] = 0.0;
+  U_h[126] = 1.0;
+  U_h[127] = U_h[128] = U_h[129] = U_h[130] = U_h[131] = U_h[132] = U_h[133] = U_h[134] = U_h[135] =
+    U_h[136] = U_h[137] = U_h[138] = U_h[139] = 0.0;
+  U_h[140] = 1.0;
+  U_h[141] = U_h[142] = U_h[143] = U_h[144] = U_h[145] = U_h[146] = U_h[147] = U_h[148] = U_h[149] =
+    U_h[150] = U_h[151] = U_h[152] = U_h[153] = 0.0;
+  U_h[154] = 1.0;
+  U_h[155] = U_h[156] = U_h[157] = U_h[158] = U_h[159] = U_h[160] = U_h[161] = U_h[162] = U_h[163] =
+    U_h[164] = U_h[165] = U_h[166] = U_h[167] = 0.0;
+  U_h[168] = 1.0;
+  margin[0] = t51;
+  return 0;
 }
 
-static int mstmm_classical_pin_spatial_transfer_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_classical_pin_spatial_transfer(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_classical_pin_spatial_transfer_inputs[] = {
-    {"U", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0},
-    {"F_scale", 36, "kg*m, kg*m2; kg, kg*m", 0, 0},
-    {"a", 3, "1", 0, 0},
-    {"u", 1, "rad/s", 0, 0},
-    {"omega_I", 3, "rad/s", 0, 0},
-    {"a_n", 3, "1", 0, 0},
-    {"tau_n", 1, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_classical_pin_spatial_transfer_outputs[] = {
-    {"U_h", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0},
-    {"margin", 1, "1", 0, 0},
-};
-
-static const mstmm_guard mstmm_classical_pin_spatial_transfer_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {2, "the pivot vanishes: no transfer matrix here, use the Riccati sweep"},
-};
+MSTMM_CALL(mstmm_classical_pin_spatial_transfer, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 static const mstmm_kernel mstmm_classical_pin_spatial_kernels[] = {
-    {
-        .name = "transfer",
-        .function = (void (*)(void))mstmm_classical_pin_spatial_transfer,
-        .call = mstmm_classical_pin_spatial_transfer_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_classical_pin_spatial_transfer_inputs,
-        .outputs = mstmm_classical_pin_spatial_transfer_outputs,
-        .ir_hash = "89337273a43818807f7f84024d60b621470ba52180588c03df7a70dcf7431835",
-        .n_guards = 2,
-        .guards = mstmm_classical_pin_spatial_transfer_guards,
-    },
+  {"transfer", MSTMM_FUNCTIONS(mstmm_classical_pin_spatial_transfer), 7, 2, (const
+    mstmm_port[]){{"U", 169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0}, {"F_scale", 36,
+    "kg*m, kg*m2; kg, kg*m", 0, 0}, {"a", 3, "1", 0, 0}, {"u", 1, "rad/s", 0, 0}, {"omega_I", 3,
+    "rad/s", 0, 0}, {"a_n", 3, "1", 0, 0}, {"tau_n", 1, "N*m", 0, 0}}, (const mstmm_port[]){{"U_h",
+    169, "[m/s2, rad/s2, N*m, N, 1]", 0, 0}, {"margin", 1, "1", 0, 0}},
+    "e9e5f0a4eacddfb0b2b7ecc1fb96ba2d5653ddba87dd066301e4256e4ecf3a24", 2, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {2,
+    "the pivot vanishes: no transfer matrix here, use the Riccati sweep"}}},
 };
 
 const mstmm_element mstmm_classical_pin_spatial = {
     .abi = MSTMM_ABI,
     .kind = "classical",
     .name = "pin_spatial",
-    .hash = "132923f29edfbcbc2e01380f436e90debc07147dcd1d499da705dd48a77ee024",
+    .hash = "f1d2867dbc5d5feece3789c86d07d9b35571d7b07bff89a974d182555de88ff2",
     .nq = 0,
     .nu = 0,
     .np = 0,

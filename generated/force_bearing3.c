@@ -7,21 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_force_bearing3;
-int mstmm_force_bearing3_wrench(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
-    real *restrict M, real *restrict V, real *restrict P);
-int mstmm_force_bearing3_wrench_slope(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
-    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
-    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
-    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
-    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M);
-
 /* load of the bearing without moments, cross-coupled
  * in  p[21] parameters: k11 [N/m], k12 [N/m], k13 [N/m], k22 [N/m], k23 [N/m], k33 [N/m], c11 [N*s/m], c12 [N*s/m], c13 [N*s/m], c22 [N*s/m], c23 [N*s/m], c33 [N*s/m], preload1 [N], preload2 [N], preload3 [N], n12 [N/m], n13 [N/m], n23 [N/m], g12 [N*s/m], g13 [N*s/m], g23 [N*s/m]
  * in  t[1] (s) time
@@ -39,222 +24,62 @@ int mstmm_force_bearing3_wrench_slope(const real *restrict p, const real *restri
  * out V[1] (J) stored energy
  * out P[1] (W) power of non-conservative forces
  */
-int mstmm_force_bearing3_wrench(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
-    real *restrict M, real *restrict V, real *restrict P)
+int mstmm_force_bearing3_wrench(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F, in_t w_F,
+    in_t A_T, in_t x_T, in_t v_T, in_t w_T, out_t F, out_t M, out_t V, out_t P)
 {
-    (void)t;
-    (void)effort;
-    (void)A_T;
-    (void)w_T;
-    const real t0 = x_T[0] - x_F[0];
-    const real t1 = A_F[1] * t0;
-    const real t2 = x_T[1] - x_F[1];
-    const real t3 = A_F[4] * t2;
-    const real t4 = t1 + t3;
-    const real t5 = x_T[2] - x_F[2];
-    const real t6 = A_F[7] * t5;
-    const real t7 = t4 + t6;
-    const real t8 = A_F[2] * w_F[0];
-    const real t9 = A_F[5] * w_F[1];
-    const real t10 = t8 + t9;
-    const real t11 = A_F[8] * w_F[2];
-    const real t12 = t10 + t11;
-    const real t13 = t7 * t12;
-    const real t14 = A_F[2] * t0;
-    const real t15 = A_F[5] * t2;
-    const real t16 = t14 + t15;
-    const real t17 = A_F[8] * t5;
-    const real t18 = t16 + t17;
-    const real t19 = A_F[1] * w_F[0];
-    const real t20 = A_F[4] * w_F[1];
-    const real t21 = t19 + t20;
-    const real t22 = A_F[7] * w_F[2];
-    const real t23 = t21 + t22;
-    const real t24 = t18 * t23;
-    const real t25 = t13 - t24;
-    const real t26 = v_T[0] - v_F[0];
-    const real t27 = A_F[0] * t26;
-    const real t28 = v_T[1] - v_F[1];
-    const real t29 = A_F[3] * t28;
-    const real t30 = t27 + t29;
-    const real t31 = v_T[2] - v_F[2];
-    const real t32 = A_F[6] * t31;
-    const real t33 = t30 + t32;
-    const real t34 = t25 + t33;
-    const real t35 = p[6] * t34;
-    const real t36 = A_F[0] * t0;
-    const real t37 = A_F[3] * t2;
-    const real t38 = t36 + t37;
-    const real t39 = A_F[6] * t5;
-    const real t40 = t38 + t39;
-    const real t41 = p[0] * t40;
-    const real t42 = t40 * t23;
-    const real t43 = A_F[0] * w_F[0];
-    const real t44 = A_F[3] * w_F[1];
-    const real t45 = t43 + t44;
-    const real t46 = A_F[6] * w_F[2];
-    const real t47 = t45 + t46;
-    const real t48 = t7 * t47;
-    const real t49 = t42 - t48;
-    const real t50 = A_F[2] * t26;
-    const real t51 = A_F[5] * t28;
-    const real t52 = t50 + t51;
-    const real t53 = A_F[8] * t31;
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = p[8] + p[19];
-    const real t57 = t55 * t56;
-    const real t58 = t18 * t47;
-    const real t59 = t40 * t12;
-    const real t60 = t58 - t59;
-    const real t61 = A_F[1] * t26;
-    const real t62 = A_F[4] * t28;
-    const real t63 = t61 + t62;
-    const real t64 = A_F[7] * t31;
-    const real t65 = t63 + t64;
-    const real t66 = t60 + t65;
-    const real t67 = p[7] + p[18];
-    const real t68 = t66 * t67;
-    const real t69 = p[1] + p[15];
-    const real t70 = t7 * t69;
-    const real t71 = p[2] + p[16];
-    const real t72 = t18 * t71;
-    const real t73 = t70 + t72;
-    const real t74 = t68 + t73;
-    const real t75 = t57 + t74;
-    const real t76 = t41 + t75;
-    const real t77 = t35 + t76;
-    const real t78 = p[12] - t77;
-    const real t79 = A_F[0] * t78;
-    const real t80 = p[9] * t66;
-    const real t81 = p[3] * t7;
-    const real t82 = p[10] + p[20];
-    const real t83 = t55 * t82;
-    const real t84 = p[7] - p[18];
-    const real t85 = t34 * t84;
-    const real t86 = p[1] - p[15];
-    const real t87 = t40 * t86;
-    const real t88 = p[4] + p[17];
-    const real t89 = t18 * t88;
-    const real t90 = t87 + t89;
-    const real t91 = t85 + t90;
-    const real t92 = t83 + t91;
-    const real t93 = t81 + t92;
-    const real t94 = t80 + t93;
-    const real t95 = p[13] - t94;
-    const real t96 = A_F[1] * t95;
-    const real t97 = t79 + t96;
-    const real t98 = p[11] * t55;
-    const real t99 = p[5] * t18;
-    const real t100 = p[10] - p[20];
-    const real t101 = t66 * t100;
-    const real t102 = p[8] - p[19];
-    const real t103 = t34 * t102;
-    const real t104 = p[2] - p[16];
-    const real t105 = t40 * t104;
-    const real t106 = p[4] - p[17];
-    const real t107 = t7 * t106;
-    const real t108 = t105 + t107;
-    const real t109 = t103 + t108;
-    const real t110 = t101 + t109;
-    const real t111 = t99 + t110;
-    const real t112 = t98 + t111;
-    const real t113 = p[14] - t112;
-    const real t114 = A_F[2] * t113;
-    const real t115 = t97 + t114;
-    F[0] = t115;
-    const real t116 = A_F[3] * t78;
-    const real t117 = A_F[4] * t95;
-    const real t118 = t116 + t117;
-    const real t119 = A_F[5] * t113;
-    const real t120 = t118 + t119;
-    F[1] = t120;
-    const real t121 = A_F[6] * t78;
-    const real t122 = A_F[7] * t95;
-    const real t123 = t121 + t122;
-    const real t124 = A_F[8] * t113;
-    const real t125 = t123 + t124;
-    F[2] = t125;
-    M[0] = 0.0;
-    M[1] = 0.0;
-    M[2] = 0.0;
-    const real t126 = t99 * 0.5;
-    const real t127 = p[2] * t40;
-    const real t128 = 0.5 * t127;
-    const real t129 = p[4] * t7;
-    const real t130 = 0.5 * t129;
-    const real t131 = t128 + t130;
-    const real t132 = t126 + t131;
-    const real t133 = t132 - p[14];
-    const real t134 = t18 * t133;
-    const real t135 = p[2] * t18;
-    const real t136 = 0.5 * t135;
-    const real t137 = t41 * 0.5;
-    const real t138 = p[1] * t7;
-    const real t139 = 0.5 * t138;
-    const real t140 = t137 + t139;
-    const real t141 = t136 + t140;
-    const real t142 = t141 - p[12];
-    const real t143 = t40 * t142;
-    const real t144 = p[4] * t18;
-    const real t145 = 0.5 * t144;
-    const real t146 = p[1] * t40;
-    const real t147 = 0.5 * t146;
-    const real t148 = t81 * 0.5;
-    const real t149 = t147 + t148;
-    const real t150 = t145 + t149;
-    const real t151 = t150 - p[13];
-    const real t152 = t7 * t151;
-    const real t153 = t143 + t152;
-    const real t154 = t134 + t153;
-    V[0] = t154;
-    const real t155 = t127 - t110;
-    const real t156 = t129 + t155;
-    const real t157 = t156 - t98;
-    const real t158 = t55 * t157;
-    const real t159 = t146 - t92;
-    const real t160 = t144 + t159;
-    const real t161 = t160 - t80;
-    const real t162 = t66 * t161;
-    const real t163 = t138 - t75;
-    const real t164 = t135 + t163;
-    const real t165 = t164 - t35;
-    const real t166 = t34 * t165;
-    const real t167 = t162 + t166;
-    const real t168 = t158 + t167;
-    P[0] = t168;
-    return 0;
+  (void)t;
+  (void)effort;
+  (void)A_T;
+  (void)w_T;
+  real t0 = x_T[0] - x_F[0];
+  real t2 = x_T[1] - x_F[1];
+  real t5 = x_T[2] - x_F[2];
+  real t7 = A_F[1] * t0 + A_F[4] * t2 + A_F[7] * t5;
+  real t12 = A_F[2] * w_F[0] + A_F[5] * w_F[1] + A_F[8] * w_F[2];
+  real t18 = A_F[2] * t0 + A_F[5] * t2 + A_F[8] * t5;
+  real t23 = A_F[1] * w_F[0] + A_F[4] * w_F[1] + A_F[7] * w_F[2];
+  real t26 = v_T[0] - v_F[0];
+  real t28 = v_T[1] - v_F[1];
+  real t31 = v_T[2] - v_F[2];
+  real t34 = t7 * t12 - t18 * t23 + (A_F[0] * t26 + A_F[3] * t28 + A_F[6] * t31);
+  real t35 = p[6] * t34;
+  real t40 = A_F[0] * t0 + A_F[3] * t2 + A_F[6] * t5;
+  real t41 = p[0] * t40;
+  real t47 = A_F[0] * w_F[0] + A_F[3] * w_F[1] + A_F[6] * w_F[2];
+  real t55 = t40 * t23 - t7 * t47 + (A_F[2] * t26 + A_F[5] * t28 + A_F[8] * t31);
+  real t66 = t18 * t47 - t40 * t12 + (A_F[1] * t26 + A_F[4] * t28 + A_F[7] * t31);
+  real t75 = t55 * (p[8] + p[19]) + (t66 * (p[7] + p[18]) + (t7 * (p[1] + p[15]) + t18 * (p[2] +
+    p[16])));
+  real t78 = p[12] - (t35 + (t41 + t75));
+  real t80 = p[9] * t66;
+  real t81 = p[3] * t7;
+  real t92 = t55 * (p[10] + p[20]) + (t34 * (p[7] - p[18]) + (t40 * (p[1] - p[15]) + t18 * (p[4] +
+    p[17])));
+  real t95 = p[13] - (t80 + (t81 + t92));
+  real t98 = p[11] * t55;
+  real t99 = p[5] * t18;
+  real t110 = t66 * (p[10] - p[20]) + (t34 * (p[8] - p[19]) + (t40 * (p[2] - p[16]) + t7 * (p[4] -
+    p[17])));
+  real t113 = p[14] - (t98 + (t99 + t110));
+  F[0] = A_F[0] * t78 + A_F[1] * t95 + A_F[2] * t113;
+  F[1] = A_F[3] * t78 + A_F[4] * t95 + A_F[5] * t113;
+  F[2] = A_F[6] * t78 + A_F[7] * t95 + A_F[8] * t113;
+  M[0] = M[1] = M[2] = 0.0;
+  real t127 = p[2] * t40;
+  real t129 = p[4] * t7;
+  real t135 = p[2] * t18;
+  real t138 = p[1] * t7;
+  real t144 = p[4] * t18;
+  real t146 = p[1] * t40;
+  V[0] = t18 * (t99 * 0.5 + (0.5 * t127 + 0.5 * t129) - p[14]) + (t40 * (0.5 * t135 + (t41 * 0.5 +
+    0.5 * t138) - p[12]) + t7 * (0.5 * t144 + (0.5 * t146 + t81 * 0.5) - p[13]));
+  P[0] = t55 * (t129 + (t127 - t110) - t98) + (t66 * (t144 + (t146 - t92) - t80) + t34 * (t135 +
+    (t138 - t75) - t35));
+  return 0;
 }
 
-static int mstmm_force_bearing3_wrench_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_force_bearing3_wrench(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_force_bearing3_wrench_inputs[] = {
-    {"p", 21, "", 0, 0},
-    {"t", 1, "s", 0, 0},
-    {"effort", 1, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"x_F", 3, "", 0, 0},
-    {"v_F", 3, "", 0, 0},
-    {"w_F", 3, "", 0, 0},
-    {"A_T", 9, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"v_T", 3, "", 0, 0},
-    {"w_T", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_force_bearing3_wrench_outputs[] = {
-    {"F", 3, "N", 0, 0},
-    {"M", 3, "N*m", 0, 0},
-    {"V", 1, "J", 0, 0},
-    {"P", 1, "W", 0, 0},
-};
+MSTMM_CALL(mstmm_force_bearing3_wrench, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], out[0], out[1], out[2], out[3]))
 
 /* wrench and its derivative along a direction
  * in  p[21] parameters: k11 [N/m], k12 [N/m], k13 [N/m], k22 [N/m], k23 [N/m], k33 [N/m], c11 [N*s/m], c12 [N*s/m], c13 [N*s/m], c22 [N*s/m], c23 [N*s/m], c33 [N*s/m], preload1 [N], preload2 [N], preload3 [N], n12 [N/m], n13 [N/m], n23 [N/m], g12 [N*s/m], g13 [N*s/m], g23 [N*s/m]
@@ -281,372 +106,92 @@ static const mstmm_port mstmm_force_bearing3_wrench_outputs[] = {
  * out d_F[3] (N) derivative of F
  * out d_M[3] (N*m) derivative of M
  */
-int mstmm_force_bearing3_wrench_slope(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
-    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
-    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
-    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
-    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M)
+int mstmm_force_bearing3_wrench_slope(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F,
+    in_t w_F, in_t A_T, in_t x_T, in_t v_T, in_t w_T, in_t d_t, in_t d_effort, in_t d_A_F,
+    in_t d_x_F, in_t d_v_F, in_t d_w_F, in_t d_A_T, in_t d_x_T, in_t d_v_T, in_t d_w_T, out_t d_F,
+    out_t d_M)
 {
-    (void)t;
-    (void)effort;
-    (void)A_T;
-    (void)w_T;
-    (void)d_t;
-    (void)d_effort;
-    (void)d_A_T;
-    (void)d_w_T;
-    const real t0 = A_F[1] * w_F[0];
-    const real t1 = A_F[4] * w_F[1];
-    const real t2 = t0 + t1;
-    const real t3 = A_F[7] * w_F[2];
-    const real t4 = t2 + t3;
-    const real t5 = x_T[0] - x_F[0];
-    const real t6 = t5 * A_F[0];
-    const real t7 = x_T[1] - x_F[1];
-    const real t8 = t7 * A_F[3];
-    const real t9 = t6 + t8;
-    const real t10 = x_T[2] - x_F[2];
-    const real t11 = t10 * A_F[6];
-    const real t12 = t9 + t11;
-    const real t13 = t4 * t12;
-    const real t14 = t5 * A_F[1];
-    const real t15 = t7 * A_F[4];
-    const real t16 = t14 + t15;
-    const real t17 = t10 * A_F[7];
-    const real t18 = t16 + t17;
-    const real t19 = w_F[0] * A_F[0];
-    const real t20 = w_F[1] * A_F[3];
-    const real t21 = t19 + t20;
-    const real t22 = w_F[2] * A_F[6];
-    const real t23 = t21 + t22;
-    const real t24 = t18 * t23;
-    const real t25 = t13 - t24;
-    const real t26 = v_T[0] - v_F[0];
-    const real t27 = A_F[2] * t26;
-    const real t28 = v_T[1] - v_F[1];
-    const real t29 = A_F[5] * t28;
-    const real t30 = t27 + t29;
-    const real t31 = v_T[2] - v_F[2];
-    const real t32 = A_F[8] * t31;
-    const real t33 = t30 + t32;
-    const real t34 = t25 + t33;
-    const real t35 = t34 * p[11];
-    const real t36 = t5 * A_F[2];
-    const real t37 = t7 * A_F[5];
-    const real t38 = t36 + t37;
-    const real t39 = t10 * A_F[8];
-    const real t40 = t38 + t39;
-    const real t41 = t40 * p[5];
-    const real t42 = t40 * t23;
-    const real t43 = A_F[2] * w_F[0];
-    const real t44 = A_F[5] * w_F[1];
-    const real t45 = t43 + t44;
-    const real t46 = A_F[8] * w_F[2];
-    const real t47 = t45 + t46;
-    const real t48 = t47 * t12;
-    const real t49 = t42 - t48;
-    const real t50 = A_F[1] * t26;
-    const real t51 = A_F[4] * t28;
-    const real t52 = t50 + t51;
-    const real t53 = A_F[7] * t31;
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = p[10] - p[20];
-    const real t57 = t55 * t56;
-    const real t58 = t18 * t47;
-    const real t59 = t40 * t4;
-    const real t60 = t58 - t59;
-    const real t61 = t26 * A_F[0];
-    const real t62 = t28 * A_F[3];
-    const real t63 = t61 + t62;
-    const real t64 = t31 * A_F[6];
-    const real t65 = t63 + t64;
-    const real t66 = t60 + t65;
-    const real t67 = p[8] - p[19];
-    const real t68 = t66 * t67;
-    const real t69 = p[2] - p[16];
-    const real t70 = t12 * t69;
-    const real t71 = p[4] - p[17];
-    const real t72 = t18 * t71;
-    const real t73 = t70 + t72;
-    const real t74 = t68 + t73;
-    const real t75 = t57 + t74;
-    const real t76 = t41 + t75;
-    const real t77 = t35 + t76;
-    const real t78 = p[14] - t77;
-    const real t79 = t78 * d_A_F[2];
-    const real t80 = d_x_T[2] - d_x_F[2];
-    const real t81 = A_F[7] * t80;
-    const real t82 = t10 * d_A_F[7];
-    const real t83 = t81 + t82;
-    const real t84 = d_x_T[1] - d_x_F[1];
-    const real t85 = A_F[4] * t84;
-    const real t86 = t7 * d_A_F[4];
-    const real t87 = t85 + t86;
-    const real t88 = d_x_T[0] - d_x_F[0];
-    const real t89 = A_F[1] * t88;
-    const real t90 = t5 * d_A_F[1];
-    const real t91 = t89 + t90;
-    const real t92 = t87 + t91;
-    const real t93 = t83 + t92;
-    const real t94 = t71 * t93;
-    const real t95 = A_F[6] * t80;
-    const real t96 = t10 * d_A_F[6];
-    const real t97 = t95 + t96;
-    const real t98 = A_F[3] * t84;
-    const real t99 = t7 * d_A_F[3];
-    const real t100 = t98 + t99;
-    const real t101 = A_F[0] * t88;
-    const real t102 = t5 * d_A_F[0];
-    const real t103 = t101 + t102;
-    const real t104 = t100 + t103;
-    const real t105 = t97 + t104;
-    const real t106 = t69 * t105;
-    const real t107 = t94 + t106;
-    const real t108 = d_v_T[2] - d_v_F[2];
-    const real t109 = A_F[6] * t108;
-    const real t110 = t31 * d_A_F[6];
-    const real t111 = t109 + t110;
-    const real t112 = d_v_T[1] - d_v_F[1];
-    const real t113 = A_F[3] * t112;
-    const real t114 = t28 * d_A_F[3];
-    const real t115 = t113 + t114;
-    const real t116 = d_v_T[0] - d_v_F[0];
-    const real t117 = A_F[0] * t116;
-    const real t118 = t26 * d_A_F[0];
-    const real t119 = t117 + t118;
-    const real t120 = t115 + t119;
-    const real t121 = t111 + t120;
-    const real t122 = t47 * t93;
-    const real t123 = w_F[2] * d_A_F[8];
-    const real t124 = A_F[8] * d_w_F[2];
-    const real t125 = t123 + t124;
-    const real t126 = w_F[1] * d_A_F[5];
-    const real t127 = A_F[5] * d_w_F[1];
-    const real t128 = t126 + t127;
-    const real t129 = w_F[0] * d_A_F[2];
-    const real t130 = A_F[2] * d_w_F[0];
-    const real t131 = t129 + t130;
-    const real t132 = t128 + t131;
-    const real t133 = t125 + t132;
-    const real t134 = t18 * t133;
-    const real t135 = t122 + t134;
-    const real t136 = A_F[8] * t80;
-    const real t137 = t10 * d_A_F[8];
-    const real t138 = t136 + t137;
-    const real t139 = A_F[5] * t84;
-    const real t140 = t7 * d_A_F[5];
-    const real t141 = t139 + t140;
-    const real t142 = A_F[2] * t88;
-    const real t143 = t5 * d_A_F[2];
-    const real t144 = t142 + t143;
-    const real t145 = t141 + t144;
-    const real t146 = t138 + t145;
-    const real t147 = t4 * t146;
-    const real t148 = w_F[2] * d_A_F[7];
-    const real t149 = A_F[7] * d_w_F[2];
-    const real t150 = t148 + t149;
-    const real t151 = w_F[1] * d_A_F[4];
-    const real t152 = A_F[4] * d_w_F[1];
-    const real t153 = t151 + t152;
-    const real t154 = w_F[0] * d_A_F[1];
-    const real t155 = A_F[1] * d_w_F[0];
-    const real t156 = t154 + t155;
-    const real t157 = t153 + t156;
-    const real t158 = t150 + t157;
-    const real t159 = t40 * t158;
-    const real t160 = t147 + t159;
-    const real t161 = t135 - t160;
-    const real t162 = t121 + t161;
-    const real t163 = t67 * t162;
-    const real t164 = t107 + t163;
-    const real t165 = t31 * d_A_F[7];
-    const real t166 = A_F[7] * t108;
-    const real t167 = t165 + t166;
-    const real t168 = t28 * d_A_F[4];
-    const real t169 = A_F[4] * t112;
-    const real t170 = t168 + t169;
-    const real t171 = t26 * d_A_F[1];
-    const real t172 = A_F[1] * t116;
-    const real t173 = t171 + t172;
-    const real t174 = t170 + t173;
-    const real t175 = t167 + t174;
-    const real t176 = t23 * t146;
-    const real t177 = A_F[6] * d_w_F[2];
-    const real t178 = w_F[2] * d_A_F[6];
-    const real t179 = t177 + t178;
-    const real t180 = A_F[3] * d_w_F[1];
-    const real t181 = w_F[1] * d_A_F[3];
-    const real t182 = t180 + t181;
-    const real t183 = A_F[0] * d_w_F[0];
-    const real t184 = w_F[0] * d_A_F[0];
-    const real t185 = t183 + t184;
-    const real t186 = t182 + t185;
-    const real t187 = t179 + t186;
-    const real t188 = t40 * t187;
-    const real t189 = t176 + t188;
-    const real t190 = t12 * t133;
-    const real t191 = t47 * t105;
-    const real t192 = t190 + t191;
-    const real t193 = t189 - t192;
-    const real t194 = t175 + t193;
-    const real t195 = t56 * t194;
-    const real t196 = t164 + t195;
-    const real t197 = p[5] * t146;
-    const real t198 = t196 + t197;
-    const real t199 = t31 * d_A_F[8];
-    const real t200 = A_F[8] * t108;
-    const real t201 = t199 + t200;
-    const real t202 = t28 * d_A_F[5];
-    const real t203 = A_F[5] * t112;
-    const real t204 = t202 + t203;
-    const real t205 = t26 * d_A_F[2];
-    const real t206 = A_F[2] * t116;
-    const real t207 = t205 + t206;
-    const real t208 = t204 + t207;
-    const real t209 = t201 + t208;
-    const real t210 = t12 * t158;
-    const real t211 = t4 * t105;
-    const real t212 = t210 + t211;
-    const real t213 = t23 * t93;
-    const real t214 = t18 * t187;
-    const real t215 = t213 + t214;
-    const real t216 = t212 - t215;
-    const real t217 = t209 + t216;
-    const real t218 = p[11] * t217;
-    const real t219 = t198 + t218;
-    const real t220 = A_F[2] * t219;
-    const real t221 = t79 - t220;
-    const real t222 = t55 * p[9];
-    const real t223 = t18 * p[3];
-    const real t224 = p[10] + p[20];
-    const real t225 = t34 * t224;
-    const real t226 = p[7] - p[18];
-    const real t227 = t66 * t226;
-    const real t228 = p[1] - p[15];
-    const real t229 = t12 * t228;
-    const real t230 = p[4] + p[17];
-    const real t231 = t40 * t230;
-    const real t232 = t229 + t231;
-    const real t233 = t227 + t232;
-    const real t234 = t225 + t233;
-    const real t235 = t223 + t234;
-    const real t236 = t222 + t235;
-    const real t237 = p[13] - t236;
-    const real t238 = t237 * d_A_F[1];
-    const real t239 = t230 * t146;
-    const real t240 = t228 * t105;
-    const real t241 = t239 + t240;
-    const real t242 = t226 * t162;
-    const real t243 = t241 + t242;
-    const real t244 = t224 * t217;
-    const real t245 = t243 + t244;
-    const real t246 = p[3] * t93;
-    const real t247 = t245 + t246;
-    const real t248 = p[9] * t194;
-    const real t249 = t247 + t248;
-    const real t250 = A_F[1] * t249;
-    const real t251 = t238 - t250;
-    const real t252 = t66 * p[6];
-    const real t253 = t12 * p[0];
-    const real t254 = p[8] + p[19];
-    const real t255 = t34 * t254;
-    const real t256 = p[7] + p[18];
-    const real t257 = t55 * t256;
-    const real t258 = p[1] + p[15];
-    const real t259 = t18 * t258;
-    const real t260 = p[2] + p[16];
-    const real t261 = t40 * t260;
-    const real t262 = t259 + t261;
-    const real t263 = t257 + t262;
-    const real t264 = t255 + t263;
-    const real t265 = t253 + t264;
-    const real t266 = t252 + t265;
-    const real t267 = p[12] - t266;
-    const real t268 = t267 * d_A_F[0];
-    const real t269 = t260 * t146;
-    const real t270 = t258 * t93;
-    const real t271 = t269 + t270;
-    const real t272 = t256 * t194;
-    const real t273 = t271 + t272;
-    const real t274 = t254 * t217;
-    const real t275 = t273 + t274;
-    const real t276 = p[0] * t105;
-    const real t277 = t275 + t276;
-    const real t278 = p[6] * t162;
-    const real t279 = t277 + t278;
-    const real t280 = A_F[0] * t279;
-    const real t281 = t268 - t280;
-    const real t282 = t251 + t281;
-    const real t283 = t221 + t282;
-    d_F[0] = t283;
-    const real t284 = t78 * d_A_F[5];
-    const real t285 = A_F[5] * t219;
-    const real t286 = t284 - t285;
-    const real t287 = t237 * d_A_F[4];
-    const real t288 = A_F[4] * t249;
-    const real t289 = t287 - t288;
-    const real t290 = t267 * d_A_F[3];
-    const real t291 = A_F[3] * t279;
-    const real t292 = t290 - t291;
-    const real t293 = t289 + t292;
-    const real t294 = t286 + t293;
-    d_F[1] = t294;
-    const real t295 = t78 * d_A_F[8];
-    const real t296 = A_F[8] * t219;
-    const real t297 = t295 - t296;
-    const real t298 = t237 * d_A_F[7];
-    const real t299 = A_F[7] * t249;
-    const real t300 = t298 - t299;
-    const real t301 = t267 * d_A_F[6];
-    const real t302 = A_F[6] * t279;
-    const real t303 = t301 - t302;
-    const real t304 = t300 + t303;
-    const real t305 = t297 + t304;
-    d_F[2] = t305;
-    d_M[0] = 0.0;
-    d_M[1] = 0.0;
-    d_M[2] = 0.0;
-    return 0;
+  (void)t;
+  (void)effort;
+  (void)A_T;
+  (void)w_T;
+  (void)d_t;
+  (void)d_effort;
+  (void)d_A_T;
+  (void)d_w_T;
+  real t4 = A_F[1] * w_F[0] + A_F[4] * w_F[1] + A_F[7] * w_F[2];
+  real t5 = x_T[0] - x_F[0];
+  real t7 = x_T[1] - x_F[1];
+  real t10 = x_T[2] - x_F[2];
+  real t12 = t5 * A_F[0] + t7 * A_F[3] + t10 * A_F[6];
+  real t18 = t5 * A_F[1] + t7 * A_F[4] + t10 * A_F[7];
+  real t23 = w_F[0] * A_F[0] + w_F[1] * A_F[3] + w_F[2] * A_F[6];
+  real t26 = v_T[0] - v_F[0];
+  real t28 = v_T[1] - v_F[1];
+  real t31 = v_T[2] - v_F[2];
+  real t34 = t4 * t12 - t18 * t23 + (A_F[2] * t26 + A_F[5] * t28 + A_F[8] * t31);
+  real t40 = t5 * A_F[2] + t7 * A_F[5] + t10 * A_F[8];
+  real t47 = A_F[2] * w_F[0] + A_F[5] * w_F[1] + A_F[8] * w_F[2];
+  real t55 = t40 * t23 - t47 * t12 + (A_F[1] * t26 + A_F[4] * t28 + A_F[7] * t31);
+  real t56 = p[10] - p[20];
+  real t66 = t18 * t47 - t40 * t4 + (t26 * A_F[0] + t28 * A_F[3] + t31 * A_F[6]);
+  real t67 = p[8] - p[19];
+  real t69 = p[2] - p[16];
+  real t71 = p[4] - p[17];
+  real t78 = p[14] - (t34 * p[11] + (t40 * p[5] + (t55 * t56 + (t66 * t67 + (t12 * t69 + t18 *
+    t71)))));
+  real t80 = d_x_T[2] - d_x_F[2];
+  real t84 = d_x_T[1] - d_x_F[1];
+  real t88 = d_x_T[0] - d_x_F[0];
+  real t93 = A_F[7] * t80 + t10 * d_A_F[7] + (A_F[4] * t84 + t7 * d_A_F[4] + (A_F[1] * t88 + t5 *
+    d_A_F[1]));
+  real t105 = A_F[6] * t80 + t10 * d_A_F[6] + (A_F[3] * t84 + t7 * d_A_F[3] + (A_F[0] * t88 + t5 *
+    d_A_F[0]));
+  real t108 = d_v_T[2] - d_v_F[2];
+  real t112 = d_v_T[1] - d_v_F[1];
+  real t116 = d_v_T[0] - d_v_F[0];
+  real t133 = w_F[2] * d_A_F[8] + A_F[8] * d_w_F[2] + (w_F[1] * d_A_F[5] + A_F[5] * d_w_F[1] +
+    (w_F[0] * d_A_F[2] + A_F[2] * d_w_F[0]));
+  real t146 = A_F[8] * t80 + t10 * d_A_F[8] + (A_F[5] * t84 + t7 * d_A_F[5] + (A_F[2] * t88 + t5 *
+    d_A_F[2]));
+  real t158 = w_F[2] * d_A_F[7] + A_F[7] * d_w_F[2] + (w_F[1] * d_A_F[4] + A_F[4] * d_w_F[1] +
+    (w_F[0] * d_A_F[1] + A_F[1] * d_w_F[0]));
+  real t162 = A_F[6] * t108 + t31 * d_A_F[6] + (A_F[3] * t112 + t28 * d_A_F[3] + (A_F[0] * t116 +
+    t26 * d_A_F[0])) + (t47 * t93 + t18 * t133 - (t4 * t146 + t40 * t158));
+  real t187 = A_F[6] * d_w_F[2] + w_F[2] * d_A_F[6] + (A_F[3] * d_w_F[1] + w_F[1] * d_A_F[3] +
+    (A_F[0] * d_w_F[0] + w_F[0] * d_A_F[0]));
+  real t194 = t31 * d_A_F[7] + A_F[7] * t108 + (t28 * d_A_F[4] + A_F[4] * t112 + (t26 * d_A_F[1] +
+    A_F[1] * t116)) + (t23 * t146 + t40 * t187 - (t12 * t133 + t47 * t105));
+  real t217 = t31 * d_A_F[8] + A_F[8] * t108 + (t28 * d_A_F[5] + A_F[5] * t112 + (t26 * d_A_F[2] +
+    A_F[2] * t116)) + (t12 * t158 + t4 * t105 - (t23 * t93 + t18 * t187));
+  real t219 = t71 * t93 + t69 * t105 + t67 * t162 + t56 * t194 + p[5] * t146 + p[11] * t217;
+  real t224 = p[10] + p[20];
+  real t226 = p[7] - p[18];
+  real t228 = p[1] - p[15];
+  real t230 = p[4] + p[17];
+  real t237 = p[13] - (t55 * p[9] + (t18 * p[3] + (t34 * t224 + (t66 * t226 + (t12 * t228 + t40 *
+    t230)))));
+  real t249 = t230 * t146 + t228 * t105 + t226 * t162 + t224 * t217 + p[3] * t93 + p[9] * t194;
+  real t254 = p[8] + p[19];
+  real t256 = p[7] + p[18];
+  real t258 = p[1] + p[15];
+  real t260 = p[2] + p[16];
+  real t267 = p[12] - (t66 * p[6] + (t12 * p[0] + (t34 * t254 + (t55 * t256 + (t18 * t258 + t40 *
+    t260)))));
+  real t279 = t260 * t146 + t258 * t93 + t256 * t194 + t254 * t217 + p[0] * t105 + p[6] * t162;
+  d_F[0] = t78 * d_A_F[2] - A_F[2] * t219 + (t237 * d_A_F[1] - A_F[1] * t249 + (t267 * d_A_F[0] -
+    A_F[0] * t279));
+  d_F[1] = t78 * d_A_F[5] - A_F[5] * t219 + (t237 * d_A_F[4] - A_F[4] * t249 + (t267 * d_A_F[3] -
+    A_F[3] * t279));
+  d_F[2] = t78 * d_A_F[8] - A_F[8] * t219 + (t237 * d_A_F[7] - A_F[7] * t249 + (t267 * d_A_F[6] -
+    A_F[6] * t279));
+  d_M[0] = d_M[1] = d_M[2] = 0.0;
+  return 0;
 }
 
-static int mstmm_force_bearing3_wrench_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_force_bearing3_wrench_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_force_bearing3_wrench_slope_inputs[] = {
-    {"p", 21, "", 0, 0},
-    {"t", 1, "s", 0, 0},
-    {"effort", 1, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"x_F", 3, "", 0, 0},
-    {"v_F", 3, "", 0, 0},
-    {"w_F", 3, "", 0, 0},
-    {"A_T", 9, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"v_T", 3, "", 0, 0},
-    {"w_T", 3, "", 0, 0},
-    {"d_t", 1, "s", 0, 0},
-    {"d_effort", 1, "", 0, 0},
-    {"d_A_F", 9, "", 0, 0},
-    {"d_x_F", 3, "", 0, 0},
-    {"d_v_F", 3, "", 0, 0},
-    {"d_w_F", 3, "", 0, 0},
-    {"d_A_T", 9, "", 0, 0},
-    {"d_x_T", 3, "", 0, 0},
-    {"d_v_T", 3, "", 0, 0},
-    {"d_w_T", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_force_bearing3_wrench_slope_outputs[] = {
-    {"d_F", 3, "N", 0, 0},
-    {"d_M", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_force_bearing3_wrench_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18],
+  in[19], in[20], out[0], out[1]))
 
 static const char *const mstmm_force_bearing3_p_names[] = {
     "k11", "k12", "k13", "k22", "k23", "k33", "c11", "c12", "c13", "c22", "c23", "c33", "preload1", "preload2", "preload3", "n12", "n13", "n23", "g12", "g13", "g23",
@@ -657,37 +202,27 @@ static const char *const mstmm_force_bearing3_p_units[] = {
 };
 
 static const mstmm_kernel mstmm_force_bearing3_kernels[] = {
-    {
-        .name = "wrench",
-        .function = (void (*)(void))mstmm_force_bearing3_wrench,
-        .call = mstmm_force_bearing3_wrench_call,
-        .n_inputs = 11,
-        .n_outputs = 4,
-        .inputs = mstmm_force_bearing3_wrench_inputs,
-        .outputs = mstmm_force_bearing3_wrench_outputs,
-        .ir_hash = "2d8eefebf7ffc8b192392276e26e4b8de14ddfe010019a31b4307244204561e6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "wrench_slope",
-        .function = (void (*)(void))mstmm_force_bearing3_wrench_slope,
-        .call = mstmm_force_bearing3_wrench_slope_call,
-        .n_inputs = 21,
-        .n_outputs = 2,
-        .inputs = mstmm_force_bearing3_wrench_slope_inputs,
-        .outputs = mstmm_force_bearing3_wrench_slope_outputs,
-        .ir_hash = "b5187893ac2c7235b95ed7e3d18c92a1b635e52b00b14149be0db11a6e91eaf0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"wrench", MSTMM_FUNCTIONS(mstmm_force_bearing3_wrench), 11, 4, (const mstmm_port[]){{"p", 21, "",
+    0, 0}, {"t", 1, "s", 0, 0}, {"effort", 1, "", 0, 0}, {"A_F", 9, "", 0, 0}, {"x_F", 3, "", 0, 0},
+    {"v_F", 3, "", 0, 0}, {"w_F", 3, "", 0, 0}, {"A_T", 9, "", 0, 0}, {"x_T", 3, "", 0, 0}, {"v_T",
+    3, "", 0, 0}, {"w_T", 3, "", 0, 0}}, (const mstmm_port[]){{"F", 3, "N", 0, 0}, {"M", 3, "N*m",
+    0, 0}, {"V", 1, "J", 0, 0}, {"P", 1, "W", 0, 0}},
+    "983d005635b89c694faf1705dd6449e0ec3a86ce17d096980997698df640f3e0", 0, NULL},
+  {"wrench_slope", MSTMM_FUNCTIONS(mstmm_force_bearing3_wrench_slope), 21, 2, (const
+    mstmm_port[]){{"p", 21, "", 0, 0}, {"t", 1, "s", 0, 0}, {"effort", 1, "", 0, 0}, {"A_F", 9, "",
+    0, 0}, {"x_F", 3, "", 0, 0}, {"v_F", 3, "", 0, 0}, {"w_F", 3, "", 0, 0}, {"A_T", 9, "", 0, 0},
+    {"x_T", 3, "", 0, 0}, {"v_T", 3, "", 0, 0}, {"w_T", 3, "", 0, 0}, {"d_t", 1, "s", 0, 0},
+    {"d_effort", 1, "", 0, 0}, {"d_A_F", 9, "", 0, 0}, {"d_x_F", 3, "", 0, 0}, {"d_v_F", 3, "", 0,
+    0}, {"d_w_F", 3, "", 0, 0}, {"d_A_T", 9, "", 0, 0}, {"d_x_T", 3, "", 0, 0}, {"d_v_T", 3, "", 0,
+    0}, {"d_w_T", 3, "", 0, 0}}, (const mstmm_port[]){{"d_F", 3, "N", 0, 0}, {"d_M", 3, "N*m", 0,
+    0}}, "77513648591f5d397259494794451148f82560f404307dd34fe2bf29b2504479", 0, NULL},
 };
 
 const mstmm_element mstmm_force_bearing3 = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "bearing3",
-    .hash = "ff984e7e6a54a0b65171a16f233e724748bbe760189df40dd579f8e288c3ed32",
+    .hash = "5d768bef7721ef1d6ef1047f75d433596ea80a39a599834fa6c225349b072113",
     .nq = 0,
     .nu = 0,
     .np = 21,

@@ -7,21 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_force_spring;
-int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
-    real *restrict M, real *restrict V, real *restrict P);
-int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
-    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
-    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
-    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
-    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M);
-
 /* load of the spring-damper-actuator
  * in  p[3] parameters: stiffness [N/m], rest [m], damping [N*s/m]
  * in  t[1] (s) time
@@ -39,179 +24,49 @@ int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict
  * out V[1] (J) stored energy
  * out P[1] (W) power of non-conservative forces
  */
-int mstmm_force_spring_wrench(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T, real *restrict F,
-    real *restrict M, real *restrict V, real *restrict P)
+int mstmm_force_spring_wrench(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F, in_t w_F,
+    in_t A_T, in_t x_T, in_t v_T, in_t w_T, out_t F, out_t M, out_t V, out_t P)
 {
-    (void)t;
-    (void)A_T;
-    (void)w_T;
-    const real t0 = x_T[0] - x_F[0];
-    const real t1 = A_F[2] * t0;
-    const real t2 = x_T[1] - x_F[1];
-    const real t3 = A_F[5] * t2;
-    const real t4 = t1 + t3;
-    const real t5 = x_T[2] - x_F[2];
-    const real t6 = A_F[8] * t5;
-    const real t7 = t4 + t6;
-    const real t8 = t7 * t7;
-    const real t9 = A_F[0] * t0;
-    const real t10 = A_F[3] * t2;
-    const real t11 = t9 + t10;
-    const real t12 = A_F[6] * t5;
-    const real t13 = t11 + t12;
-    const real t14 = t13 * t13;
-    const real t15 = A_F[1] * t0;
-    const real t16 = A_F[4] * t2;
-    const real t17 = t15 + t16;
-    const real t18 = A_F[7] * t5;
-    const real t19 = t17 + t18;
-    const real t20 = t19 * t19;
-    const real t21 = t14 + t20;
-    const real t22 = t8 + t21;
-    const real t23 = 1e-24 < t22;
-    if (!(t23 != 0)) return 2; /* the force is undefined there */
-    const real t24 = sqrt(t22);
-    const real t25 = 1.0 / t24;
-    const real t26 = t24 - p[1];
-    const real t27 = p[0] * t26;
-    const real t28 = A_F[1] * w_F[0];
-    const real t29 = A_F[4] * w_F[1];
-    const real t30 = t28 + t29;
-    const real t31 = A_F[7] * w_F[2];
-    const real t32 = t30 + t31;
-    const real t33 = t13 * t32;
-    const real t34 = A_F[0] * w_F[0];
-    const real t35 = A_F[3] * w_F[1];
-    const real t36 = t34 + t35;
-    const real t37 = A_F[6] * w_F[2];
-    const real t38 = t36 + t37;
-    const real t39 = t19 * t38;
-    const real t40 = t33 - t39;
-    const real t41 = v_T[0] - v_F[0];
-    const real t42 = A_F[2] * t41;
-    const real t43 = v_T[1] - v_F[1];
-    const real t44 = A_F[5] * t43;
-    const real t45 = t42 + t44;
-    const real t46 = v_T[2] - v_F[2];
-    const real t47 = A_F[8] * t46;
-    const real t48 = t45 + t47;
-    const real t49 = t40 + t48;
-    const real t50 = t7 * t49;
-    const real t51 = t25 * t50;
-    const real t52 = A_F[2] * w_F[0];
-    const real t53 = A_F[5] * w_F[1];
-    const real t54 = t52 + t53;
-    const real t55 = A_F[8] * w_F[2];
-    const real t56 = t54 + t55;
-    const real t57 = t19 * t56;
-    const real t58 = t7 * t32;
-    const real t59 = t57 - t58;
-    const real t60 = A_F[0] * t41;
-    const real t61 = A_F[3] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = A_F[6] * t46;
-    const real t64 = t62 + t63;
-    const real t65 = t59 + t64;
-    const real t66 = t13 * t65;
-    const real t67 = t66 * t25;
-    const real t68 = t7 * t38;
-    const real t69 = t13 * t56;
-    const real t70 = t68 - t69;
-    const real t71 = A_F[1] * t41;
-    const real t72 = A_F[4] * t43;
-    const real t73 = t71 + t72;
-    const real t74 = A_F[7] * t46;
-    const real t75 = t73 + t74;
-    const real t76 = t70 + t75;
-    const real t77 = t19 * t76;
-    const real t78 = t25 * t77;
-    const real t79 = t67 + t78;
-    const real t80 = t51 + t79;
-    const real t81 = p[2] * t80;
-    const real t82 = t27 + t81;
-    const real t83 = effort[0] - t82;
-    const real t84 = t13 * t83;
-    const real t85 = t25 * t84;
-    const real t86 = A_F[0] * t85;
-    const real t87 = t19 * t83;
-    const real t88 = t25 * t87;
-    const real t89 = A_F[1] * t88;
-    const real t90 = t86 + t89;
-    const real t91 = t7 * t83;
-    const real t92 = t25 * t91;
-    const real t93 = A_F[2] * t92;
-    const real t94 = t90 + t93;
-    F[0] = t94;
-    const real t95 = A_F[3] * t85;
-    const real t96 = A_F[4] * t88;
-    const real t97 = t95 + t96;
-    const real t98 = A_F[5] * t92;
-    const real t99 = t97 + t98;
-    F[1] = t99;
-    const real t100 = A_F[6] * t85;
-    const real t101 = A_F[7] * t88;
-    const real t102 = t100 + t101;
-    const real t103 = A_F[8] * t92;
-    const real t104 = t102 + t103;
-    F[2] = t104;
-    M[0] = 0.0;
-    M[1] = 0.0;
-    M[2] = 0.0;
-    const real t105 = t26 * t26;
-    const real t106 = p[0] * t105;
-    const real t107 = 0.5 * t106;
-    V[0] = t107;
-    const real t108 = t7 * t27;
-    const real t109 = t25 * t108;
-    const real t110 = t92 + t109;
-    const real t111 = t49 * t110;
-    const real t112 = t13 * t27;
-    const real t113 = t25 * t112;
-    const real t114 = t85 + t113;
-    const real t115 = t65 * t114;
-    const real t116 = t19 * t27;
-    const real t117 = t25 * t116;
-    const real t118 = t88 + t117;
-    const real t119 = t76 * t118;
-    const real t120 = t115 + t119;
-    const real t121 = t111 + t120;
-    P[0] = t121;
-    return 0;
+  (void)t;
+  (void)A_T;
+  (void)w_T;
+  real t0 = x_T[0] - x_F[0];
+  real t2 = x_T[1] - x_F[1];
+  real t5 = x_T[2] - x_F[2];
+  real t7 = A_F[2] * t0 + A_F[5] * t2 + A_F[8] * t5;
+  real t13 = A_F[0] * t0 + A_F[3] * t2 + A_F[6] * t5;
+  real t19 = A_F[1] * t0 + A_F[4] * t2 + A_F[7] * t5;
+  real t22 = t7 * t7 + (t13 * t13 + t19 * t19);
+  if (!((1e-24 < t22))) return 2; /* the force is undefined there */
+  real t24 = sqrt(t22);
+  real t25 = 1.0 / t24;
+  real t26 = t24 - p[1];
+  real t27 = p[0] * t26;
+  real t32 = A_F[1] * w_F[0] + A_F[4] * w_F[1] + A_F[7] * w_F[2];
+  real t38 = A_F[0] * w_F[0] + A_F[3] * w_F[1] + A_F[6] * w_F[2];
+  real t41 = v_T[0] - v_F[0];
+  real t43 = v_T[1] - v_F[1];
+  real t46 = v_T[2] - v_F[2];
+  real t49 = t13 * t32 - t19 * t38 + (A_F[2] * t41 + A_F[5] * t43 + A_F[8] * t46);
+  real t56 = A_F[2] * w_F[0] + A_F[5] * w_F[1] + A_F[8] * w_F[2];
+  real t65 = t19 * t56 - t7 * t32 + (A_F[0] * t41 + A_F[3] * t43 + A_F[6] * t46);
+  real t76 = t7 * t38 - t13 * t56 + (A_F[1] * t41 + A_F[4] * t43 + A_F[7] * t46);
+  real t83 = effort[0] - (t27 + p[2] * (t25 * (t7 * t49) + (t13 * t65 * t25 + t25 * (t19 * t76))));
+  real t85 = t25 * (t13 * t83);
+  real t88 = t25 * (t19 * t83);
+  real t92 = t25 * (t7 * t83);
+  F[0] = A_F[0] * t85 + A_F[1] * t88 + A_F[2] * t92;
+  F[1] = A_F[3] * t85 + A_F[4] * t88 + A_F[5] * t92;
+  F[2] = A_F[6] * t85 + A_F[7] * t88 + A_F[8] * t92;
+  M[0] = M[1] = M[2] = 0.0;
+  V[0] = 0.5 * (p[0] * (t26 * t26));
+  P[0] = t49 * (t92 + t25 * (t7 * t27)) + (t65 * (t85 + t25 * (t13 * t27)) + t76 * (t88 + t25 * (t19
+    * t27)));
+  return 0;
 }
 
-static int mstmm_force_spring_wrench_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_force_spring_wrench(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_force_spring_wrench_inputs[] = {
-    {"p", 3, "", 0, 0},
-    {"t", 1, "s", 0, 0},
-    {"effort", 1, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"x_F", 3, "", 0, 0},
-    {"v_F", 3, "", 0, 0},
-    {"w_F", 3, "", 0, 0},
-    {"A_T", 9, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"v_T", 3, "", 0, 0},
-    {"w_T", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_force_spring_wrench_outputs[] = {
-    {"F", 3, "N", 0, 0},
-    {"M", 3, "N*m", 0, 0},
-    {"V", 1, "J", 0, 0},
-    {"P", 1, "W", 0, 0},
-};
-
-static const mstmm_guard mstmm_force_spring_wrench_guards[] = {
-    {2, "the force is undefined there"},
-};
+MSTMM_CALL(mstmm_force_spring_wrench, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], out[0], out[1], out[2], out[3]))
 
 /* wrench and its derivative along a direction
  * in  p[3] parameters: stiffness [N/m], rest [m], damping [N*s/m]
@@ -238,369 +93,90 @@ static const mstmm_guard mstmm_force_spring_wrench_guards[] = {
  * out d_F[3] (N) derivative of F
  * out d_M[3] (N*m) derivative of M
  */
-int mstmm_force_spring_wrench_slope(const real *restrict p, const real *restrict t,
-    const real *restrict effort, const real *restrict A_F, const real *restrict x_F,
-    const real *restrict v_F, const real *restrict w_F, const real *restrict A_T,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict w_T,
-    const real *restrict d_t, const real *restrict d_effort, const real *restrict d_A_F,
-    const real *restrict d_x_F, const real *restrict d_v_F, const real *restrict d_w_F,
-    const real *restrict d_A_T, const real *restrict d_x_T, const real *restrict d_v_T,
-    const real *restrict d_w_T, real *restrict d_F, real *restrict d_M)
+int mstmm_force_spring_wrench_slope(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F,
+    in_t w_F, in_t A_T, in_t x_T, in_t v_T, in_t w_T, in_t d_t, in_t d_effort, in_t d_A_F,
+    in_t d_x_F, in_t d_v_F, in_t d_w_F, in_t d_A_T, in_t d_x_T, in_t d_v_T, in_t d_w_T, out_t d_F,
+    out_t d_M)
 {
-    (void)t;
-    (void)A_T;
-    (void)w_T;
-    (void)d_t;
-    (void)d_A_T;
-    (void)d_w_T;
-    const real t0 = x_T[0] - x_F[0];
-    const real t1 = t0 * A_F[2];
-    const real t2 = x_T[1] - x_F[1];
-    const real t3 = t2 * A_F[5];
-    const real t4 = t1 + t3;
-    const real t5 = x_T[2] - x_F[2];
-    const real t6 = t5 * A_F[8];
-    const real t7 = t4 + t6;
-    const real t8 = t7 * t7;
-    const real t9 = t0 * A_F[0];
-    const real t10 = t2 * A_F[3];
-    const real t11 = t9 + t10;
-    const real t12 = t5 * A_F[6];
-    const real t13 = t11 + t12;
-    const real t14 = t13 * t13;
-    const real t15 = t0 * A_F[1];
-    const real t16 = t2 * A_F[4];
-    const real t17 = t15 + t16;
-    const real t18 = t5 * A_F[7];
-    const real t19 = t17 + t18;
-    const real t20 = t19 * t19;
-    const real t21 = t14 + t20;
-    const real t22 = t8 + t21;
-    const real t23 = sqrt(t22);
-    const real t24 = 1.0 / t23;
-    const real t25 = t23 - p[1];
-    const real t26 = t25 * p[0];
-    const real t27 = A_F[1] * w_F[0];
-    const real t28 = A_F[4] * w_F[1];
-    const real t29 = t27 + t28;
-    const real t30 = A_F[7] * w_F[2];
-    const real t31 = t29 + t30;
-    const real t32 = t13 * t31;
-    const real t33 = A_F[0] * w_F[0];
-    const real t34 = A_F[3] * w_F[1];
-    const real t35 = t33 + t34;
-    const real t36 = A_F[6] * w_F[2];
-    const real t37 = t35 + t36;
-    const real t38 = t19 * t37;
-    const real t39 = t32 - t38;
-    const real t40 = v_T[0] - v_F[0];
-    const real t41 = A_F[2] * t40;
-    const real t42 = v_T[1] - v_F[1];
-    const real t43 = A_F[5] * t42;
-    const real t44 = t41 + t43;
-    const real t45 = v_T[2] - v_F[2];
-    const real t46 = A_F[8] * t45;
-    const real t47 = t44 + t46;
-    const real t48 = t39 + t47;
-    const real t49 = t7 * t48;
-    const real t50 = t24 * t49;
-    const real t51 = A_F[2] * w_F[0];
-    const real t52 = A_F[5] * w_F[1];
-    const real t53 = t51 + t52;
-    const real t54 = A_F[8] * w_F[2];
-    const real t55 = t53 + t54;
-    const real t56 = t19 * t55;
-    const real t57 = t7 * t31;
-    const real t58 = t56 - t57;
-    const real t59 = A_F[0] * t40;
-    const real t60 = A_F[3] * t42;
-    const real t61 = t59 + t60;
-    const real t62 = A_F[6] * t45;
-    const real t63 = t61 + t62;
-    const real t64 = t58 + t63;
-    const real t65 = t13 * t64;
-    const real t66 = t24 * t65;
-    const real t67 = t7 * t37;
-    const real t68 = t13 * t55;
-    const real t69 = t67 - t68;
-    const real t70 = A_F[1] * t40;
-    const real t71 = A_F[4] * t42;
-    const real t72 = t70 + t71;
-    const real t73 = A_F[7] * t45;
-    const real t74 = t72 + t73;
-    const real t75 = t69 + t74;
-    const real t76 = t19 * t75;
-    const real t77 = t24 * t76;
-    const real t78 = t66 + t77;
-    const real t79 = t50 + t78;
-    const real t80 = t79 * p[2];
-    const real t81 = t26 + t80;
-    const real t82 = effort[0] - t81;
-    const real t83 = t7 * t82;
-    const real t84 = t24 * t83;
-    const real t85 = t84 * d_A_F[2];
-    const real t86 = d_x_T[2] - d_x_F[2];
-    const real t87 = A_F[8] * t86;
-    const real t88 = t5 * d_A_F[8];
-    const real t89 = t87 + t88;
-    const real t90 = d_x_T[1] - d_x_F[1];
-    const real t91 = A_F[5] * t90;
-    const real t92 = t2 * d_A_F[5];
-    const real t93 = t91 + t92;
-    const real t94 = d_x_T[0] - d_x_F[0];
-    const real t95 = A_F[2] * t94;
-    const real t96 = t0 * d_A_F[2];
-    const real t97 = t95 + t96;
-    const real t98 = t93 + t97;
-    const real t99 = t89 + t98;
-    const real t100 = t82 * t99;
-    const real t101 = A_F[7] * t86;
-    const real t102 = t5 * d_A_F[7];
-    const real t103 = t101 + t102;
-    const real t104 = A_F[4] * t90;
-    const real t105 = t2 * d_A_F[4];
-    const real t106 = t104 + t105;
-    const real t107 = A_F[1] * t94;
-    const real t108 = t0 * d_A_F[1];
-    const real t109 = t107 + t108;
-    const real t110 = t106 + t109;
-    const real t111 = t103 + t110;
-    const real t112 = t75 * t111;
-    const real t113 = t45 * d_A_F[7];
-    const real t114 = d_v_T[2] - d_v_F[2];
-    const real t115 = A_F[7] * t114;
-    const real t116 = t113 + t115;
-    const real t117 = t42 * d_A_F[4];
-    const real t118 = d_v_T[1] - d_v_F[1];
-    const real t119 = A_F[4] * t118;
-    const real t120 = t117 + t119;
-    const real t121 = t40 * d_A_F[1];
-    const real t122 = d_v_T[0] - d_v_F[0];
-    const real t123 = A_F[1] * t122;
-    const real t124 = t121 + t123;
-    const real t125 = t120 + t124;
-    const real t126 = t116 + t125;
-    const real t127 = t37 * t99;
-    const real t128 = w_F[2] * d_A_F[6];
-    const real t129 = A_F[6] * d_w_F[2];
-    const real t130 = t128 + t129;
-    const real t131 = w_F[1] * d_A_F[3];
-    const real t132 = A_F[3] * d_w_F[1];
-    const real t133 = t131 + t132;
-    const real t134 = w_F[0] * d_A_F[0];
-    const real t135 = A_F[0] * d_w_F[0];
-    const real t136 = t134 + t135;
-    const real t137 = t133 + t136;
-    const real t138 = t130 + t137;
-    const real t139 = t7 * t138;
-    const real t140 = t127 + t139;
-    const real t141 = A_F[6] * t86;
-    const real t142 = t5 * d_A_F[6];
-    const real t143 = t141 + t142;
-    const real t144 = A_F[3] * t90;
-    const real t145 = t2 * d_A_F[3];
-    const real t146 = t144 + t145;
-    const real t147 = A_F[0] * t94;
-    const real t148 = t0 * d_A_F[0];
-    const real t149 = t147 + t148;
-    const real t150 = t146 + t149;
-    const real t151 = t143 + t150;
-    const real t152 = t55 * t151;
-    const real t153 = w_F[2] * d_A_F[8];
-    const real t154 = A_F[8] * d_w_F[2];
-    const real t155 = t153 + t154;
-    const real t156 = w_F[1] * d_A_F[5];
-    const real t157 = A_F[5] * d_w_F[1];
-    const real t158 = t156 + t157;
-    const real t159 = w_F[0] * d_A_F[2];
-    const real t160 = A_F[2] * d_w_F[0];
-    const real t161 = t159 + t160;
-    const real t162 = t158 + t161;
-    const real t163 = t155 + t162;
-    const real t164 = t13 * t163;
-    const real t165 = t152 + t164;
-    const real t166 = t140 - t165;
-    const real t167 = t126 + t166;
-    const real t168 = t19 * t167;
-    const real t169 = t112 + t168;
-    const real t170 = t24 * t169;
-    const real t171 = t19 * t111;
-    const real t172 = t171 + t171;
-    const real t173 = t13 * t151;
-    const real t174 = t173 + t173;
-    const real t175 = t172 + t174;
-    const real t176 = t7 * t99;
-    const real t177 = t176 + t176;
-    const real t178 = t175 + t177;
-    const real t179 = t23 * 2.0;
-    const real t180 = t178 / t179;
-    const real t181 = t24 * t180;
-    const real t182 = t181 / t23;
-    const real t183 = t76 * t182;
-    const real t184 = t170 - t183;
-    const real t185 = t64 * t151;
-    const real t186 = t45 * d_A_F[6];
-    const real t187 = A_F[6] * t114;
-    const real t188 = t186 + t187;
-    const real t189 = t42 * d_A_F[3];
-    const real t190 = A_F[3] * t118;
-    const real t191 = t189 + t190;
-    const real t192 = t40 * d_A_F[0];
-    const real t193 = A_F[0] * t122;
-    const real t194 = t192 + t193;
-    const real t195 = t191 + t194;
-    const real t196 = t188 + t195;
-    const real t197 = t55 * t111;
-    const real t198 = t19 * t163;
-    const real t199 = t197 + t198;
-    const real t200 = t31 * t99;
-    const real t201 = w_F[2] * d_A_F[7];
-    const real t202 = A_F[7] * d_w_F[2];
-    const real t203 = t201 + t202;
-    const real t204 = w_F[1] * d_A_F[4];
-    const real t205 = A_F[4] * d_w_F[1];
-    const real t206 = t204 + t205;
-    const real t207 = w_F[0] * d_A_F[1];
-    const real t208 = A_F[1] * d_w_F[0];
-    const real t209 = t207 + t208;
-    const real t210 = t206 + t209;
-    const real t211 = t203 + t210;
-    const real t212 = t7 * t211;
-    const real t213 = t200 + t212;
-    const real t214 = t199 - t213;
-    const real t215 = t196 + t214;
-    const real t216 = t13 * t215;
-    const real t217 = t185 + t216;
-    const real t218 = t24 * t217;
-    const real t219 = t65 * t182;
-    const real t220 = t218 - t219;
-    const real t221 = t184 + t220;
-    const real t222 = t48 * t99;
-    const real t223 = t45 * d_A_F[8];
-    const real t224 = A_F[8] * t114;
-    const real t225 = t223 + t224;
-    const real t226 = t42 * d_A_F[5];
-    const real t227 = A_F[5] * t118;
-    const real t228 = t226 + t227;
-    const real t229 = t40 * d_A_F[2];
-    const real t230 = A_F[2] * t122;
-    const real t231 = t229 + t230;
-    const real t232 = t228 + t231;
-    const real t233 = t225 + t232;
-    const real t234 = t31 * t151;
-    const real t235 = t13 * t211;
-    const real t236 = t234 + t235;
-    const real t237 = t37 * t111;
-    const real t238 = t19 * t138;
-    const real t239 = t237 + t238;
-    const real t240 = t236 - t239;
-    const real t241 = t233 + t240;
-    const real t242 = t7 * t241;
-    const real t243 = t222 + t242;
-    const real t244 = t24 * t243;
-    const real t245 = t49 * t182;
-    const real t246 = t244 - t245;
-    const real t247 = t221 + t246;
-    const real t248 = p[2] * t247;
-    const real t249 = p[0] * t180;
-    const real t250 = t248 + t249;
-    const real t251 = d_effort[0] - t250;
-    const real t252 = t7 * t251;
-    const real t253 = t100 + t252;
-    const real t254 = t24 * t253;
-    const real t255 = t83 * t182;
-    const real t256 = t254 - t255;
-    const real t257 = A_F[2] * t256;
-    const real t258 = t85 + t257;
-    const real t259 = t19 * t82;
-    const real t260 = t24 * t259;
-    const real t261 = t260 * d_A_F[1];
-    const real t262 = t82 * t111;
-    const real t263 = t19 * t251;
-    const real t264 = t262 + t263;
-    const real t265 = t24 * t264;
-    const real t266 = t259 * t182;
-    const real t267 = t265 - t266;
-    const real t268 = A_F[1] * t267;
-    const real t269 = t261 + t268;
-    const real t270 = t13 * t82;
-    const real t271 = t24 * t270;
-    const real t272 = t271 * d_A_F[0];
-    const real t273 = t82 * t151;
-    const real t274 = t13 * t251;
-    const real t275 = t273 + t274;
-    const real t276 = t24 * t275;
-    const real t277 = t270 * t182;
-    const real t278 = t276 - t277;
-    const real t279 = A_F[0] * t278;
-    const real t280 = t272 + t279;
-    const real t281 = t269 + t280;
-    const real t282 = t258 + t281;
-    d_F[0] = t282;
-    const real t283 = t84 * d_A_F[5];
-    const real t284 = A_F[5] * t256;
-    const real t285 = t283 + t284;
-    const real t286 = t260 * d_A_F[4];
-    const real t287 = A_F[4] * t267;
-    const real t288 = t286 + t287;
-    const real t289 = t271 * d_A_F[3];
-    const real t290 = A_F[3] * t278;
-    const real t291 = t289 + t290;
-    const real t292 = t288 + t291;
-    const real t293 = t285 + t292;
-    d_F[1] = t293;
-    const real t294 = t84 * d_A_F[8];
-    const real t295 = A_F[8] * t256;
-    const real t296 = t294 + t295;
-    const real t297 = t260 * d_A_F[7];
-    const real t298 = A_F[7] * t267;
-    const real t299 = t297 + t298;
-    const real t300 = t271 * d_A_F[6];
-    const real t301 = A_F[6] * t278;
-    const real t302 = t300 + t301;
-    const real t303 = t299 + t302;
-    const real t304 = t296 + t303;
-    d_F[2] = t304;
-    d_M[0] = 0.0;
-    d_M[1] = 0.0;
-    d_M[2] = 0.0;
-    return 0;
+  (void)t;
+  (void)A_T;
+  (void)w_T;
+  (void)d_t;
+  (void)d_A_T;
+  (void)d_w_T;
+  real t0 = x_T[0] - x_F[0];
+  real t2 = x_T[1] - x_F[1];
+  real t5 = x_T[2] - x_F[2];
+  real t7 = t0 * A_F[2] + t2 * A_F[5] + t5 * A_F[8];
+  real t13 = t0 * A_F[0] + t2 * A_F[3] + t5 * A_F[6];
+  real t19 = t0 * A_F[1] + t2 * A_F[4] + t5 * A_F[7];
+  real t23 = sqrt(t7 * t7 + (t13 * t13 + t19 * t19));
+  real t24 = 1.0 / t23;
+  real t31 = A_F[1] * w_F[0] + A_F[4] * w_F[1] + A_F[7] * w_F[2];
+  real t37 = A_F[0] * w_F[0] + A_F[3] * w_F[1] + A_F[6] * w_F[2];
+  real t40 = v_T[0] - v_F[0];
+  real t42 = v_T[1] - v_F[1];
+  real t45 = v_T[2] - v_F[2];
+  real t48 = t13 * t31 - t19 * t37 + (A_F[2] * t40 + A_F[5] * t42 + A_F[8] * t45);
+  real t49 = t7 * t48;
+  real t55 = A_F[2] * w_F[0] + A_F[5] * w_F[1] + A_F[8] * w_F[2];
+  real t64 = t19 * t55 - t7 * t31 + (A_F[0] * t40 + A_F[3] * t42 + A_F[6] * t45);
+  real t65 = t13 * t64;
+  real t75 = t7 * t37 - t13 * t55 + (A_F[1] * t40 + A_F[4] * t42 + A_F[7] * t45);
+  real t76 = t19 * t75;
+  real t82 = effort[0] - ((t23 - p[1]) * p[0] + (t24 * t49 + (t24 * t65 + t24 * t76)) * p[2]);
+  real t83 = t7 * t82;
+  real t84 = t24 * t83;
+  real t86 = d_x_T[2] - d_x_F[2];
+  real t90 = d_x_T[1] - d_x_F[1];
+  real t94 = d_x_T[0] - d_x_F[0];
+  real t99 = A_F[8] * t86 + t5 * d_A_F[8] + (A_F[5] * t90 + t2 * d_A_F[5] + (A_F[2] * t94 + t0 *
+    d_A_F[2]));
+  real t111 = A_F[7] * t86 + t5 * d_A_F[7] + (A_F[4] * t90 + t2 * d_A_F[4] + (A_F[1] * t94 + t0 *
+    d_A_F[1]));
+  real t114 = d_v_T[2] - d_v_F[2];
+  real t118 = d_v_T[1] - d_v_F[1];
+  real t122 = d_v_T[0] - d_v_F[0];
+  real t138 = w_F[2] * d_A_F[6] + A_F[6] * d_w_F[2] + (w_F[1] * d_A_F[3] + A_F[3] * d_w_F[1] +
+    (w_F[0] * d_A_F[0] + A_F[0] * d_w_F[0]));
+  real t151 = A_F[6] * t86 + t5 * d_A_F[6] + (A_F[3] * t90 + t2 * d_A_F[3] + (A_F[0] * t94 + t0 *
+    d_A_F[0]));
+  real t163 = w_F[2] * d_A_F[8] + A_F[8] * d_w_F[2] + (w_F[1] * d_A_F[5] + A_F[5] * d_w_F[1] +
+    (w_F[0] * d_A_F[2] + A_F[2] * d_w_F[0]));
+  real t171 = t19 * t111;
+  real t173 = t13 * t151;
+  real t176 = t7 * t99;
+  real t180 = (t171 + t171 + (t173 + t173) + (t176 + t176)) / (t23 * 2.0);
+  real t182 = t24 * t180 / t23;
+  real t211 = w_F[2] * d_A_F[7] + A_F[7] * d_w_F[2] + (w_F[1] * d_A_F[4] + A_F[4] * d_w_F[1] +
+    (w_F[0] * d_A_F[1] + A_F[1] * d_w_F[0]));
+  real t251 = d_effort[0] - (p[2] * (t24 * (t75 * t111 + t19 * (t45 * d_A_F[7] + A_F[7] * t114 +
+    (t42 * d_A_F[4] + A_F[4] * t118 + (t40 * d_A_F[1] + A_F[1] * t122)) + (t37 * t99 + t7 * t138 -
+    (t55 * t151 + t13 * t163)))) - t76 * t182 + (t24 * (t64 * t151 + t13 * (t45 * d_A_F[6] + A_F[6]
+    * t114 + (t42 * d_A_F[3] + A_F[3] * t118 + (t40 * d_A_F[0] + A_F[0] * t122)) + (t55 * t111 + t19
+    * t163 - (t31 * t99 + t7 * t211)))) - t65 * t182) + (t24 * (t48 * t99 + t7 * (t45 * d_A_F[8] +
+    A_F[8] * t114 + (t42 * d_A_F[5] + A_F[5] * t118 + (t40 * d_A_F[2] + A_F[2] * t122)) + (t31 *
+    t151 + t13 * t211 - (t37 * t111 + t19 * t138)))) - t49 * t182)) + p[0] * t180);
+  real t256 = t24 * (t82 * t99 + t7 * t251) - t83 * t182;
+  real t259 = t19 * t82;
+  real t260 = t24 * t259;
+  real t267 = t24 * (t82 * t111 + t19 * t251) - t259 * t182;
+  real t270 = t13 * t82;
+  real t271 = t24 * t270;
+  real t278 = t24 * (t82 * t151 + t13 * t251) - t270 * t182;
+  d_F[0] = t84 * d_A_F[2] + A_F[2] * t256 + (t260 * d_A_F[1] + A_F[1] * t267 + (t271 * d_A_F[0] +
+    A_F[0] * t278));
+  d_F[1] = t84 * d_A_F[5] + A_F[5] * t256 + (t260 * d_A_F[4] + A_F[4] * t267 + (t271 * d_A_F[3] +
+    A_F[3] * t278));
+  d_F[2] = t84 * d_A_F[8] + A_F[8] * t256 + (t260 * d_A_F[7] + A_F[7] * t267 + (t271 * d_A_F[6] +
+    A_F[6] * t278));
+  d_M[0] = d_M[1] = d_M[2] = 0.0;
+  return 0;
 }
 
-static int mstmm_force_spring_wrench_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_force_spring_wrench_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_force_spring_wrench_slope_inputs[] = {
-    {"p", 3, "", 0, 0},
-    {"t", 1, "s", 0, 0},
-    {"effort", 1, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"x_F", 3, "", 0, 0},
-    {"v_F", 3, "", 0, 0},
-    {"w_F", 3, "", 0, 0},
-    {"A_T", 9, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"v_T", 3, "", 0, 0},
-    {"w_T", 3, "", 0, 0},
-    {"d_t", 1, "s", 0, 0},
-    {"d_effort", 1, "", 0, 0},
-    {"d_A_F", 9, "", 0, 0},
-    {"d_x_F", 3, "", 0, 0},
-    {"d_v_F", 3, "", 0, 0},
-    {"d_w_F", 3, "", 0, 0},
-    {"d_A_T", 9, "", 0, 0},
-    {"d_x_T", 3, "", 0, 0},
-    {"d_v_T", 3, "", 0, 0},
-    {"d_w_T", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_force_spring_wrench_slope_outputs[] = {
-    {"d_F", 3, "N", 0, 0},
-    {"d_M", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_force_spring_wrench_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19],
+  in[20], out[0], out[1]))
 
 static const char *const mstmm_force_spring_p_names[] = {
     "stiffness", "rest", "damping",
@@ -611,37 +187,28 @@ static const char *const mstmm_force_spring_p_units[] = {
 };
 
 static const mstmm_kernel mstmm_force_spring_kernels[] = {
-    {
-        .name = "wrench",
-        .function = (void (*)(void))mstmm_force_spring_wrench,
-        .call = mstmm_force_spring_wrench_call,
-        .n_inputs = 11,
-        .n_outputs = 4,
-        .inputs = mstmm_force_spring_wrench_inputs,
-        .outputs = mstmm_force_spring_wrench_outputs,
-        .ir_hash = "70b325b45d2a2f19528d26b81589ed756ed0db087bb873e9a3fb9a870f35b7f6",
-        .n_guards = 1,
-        .guards = mstmm_force_spring_wrench_guards,
-    },
-    {
-        .name = "wrench_slope",
-        .function = (void (*)(void))mstmm_force_spring_wrench_slope,
-        .call = mstmm_force_spring_wrench_slope_call,
-        .n_inputs = 21,
-        .n_outputs = 2,
-        .inputs = mstmm_force_spring_wrench_slope_inputs,
-        .outputs = mstmm_force_spring_wrench_slope_outputs,
-        .ir_hash = "21bb06ddaa01f5f99116f6aacc4b01627a949491ab2b7c204b74ecc66979313a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"wrench", MSTMM_FUNCTIONS(mstmm_force_spring_wrench), 11, 4, (const mstmm_port[]){{"p", 3, "", 0,
+    0}, {"t", 1, "s", 0, 0}, {"effort", 1, "", 0, 0}, {"A_F", 9, "", 0, 0}, {"x_F", 3, "", 0, 0},
+    {"v_F", 3, "", 0, 0}, {"w_F", 3, "", 0, 0}, {"A_T", 9, "", 0, 0}, {"x_T", 3, "", 0, 0}, {"v_T",
+    3, "", 0, 0}, {"w_T", 3, "", 0, 0}}, (const mstmm_port[]){{"F", 3, "N", 0, 0}, {"M", 3, "N*m",
+    0, 0}, {"V", 1, "J", 0, 0}, {"P", 1, "W", 0, 0}},
+    "fd556b49466babd3862d2eaca151a91d90fffe07ba5b012704c61a1ae5065ab4", 1, (const mstmm_guard[]){{2,
+    "the force is undefined there"}}},
+  {"wrench_slope", MSTMM_FUNCTIONS(mstmm_force_spring_wrench_slope), 21, 2, (const
+    mstmm_port[]){{"p", 3, "", 0, 0}, {"t", 1, "s", 0, 0}, {"effort", 1, "", 0, 0}, {"A_F", 9, "",
+    0, 0}, {"x_F", 3, "", 0, 0}, {"v_F", 3, "", 0, 0}, {"w_F", 3, "", 0, 0}, {"A_T", 9, "", 0, 0},
+    {"x_T", 3, "", 0, 0}, {"v_T", 3, "", 0, 0}, {"w_T", 3, "", 0, 0}, {"d_t", 1, "s", 0, 0},
+    {"d_effort", 1, "", 0, 0}, {"d_A_F", 9, "", 0, 0}, {"d_x_F", 3, "", 0, 0}, {"d_v_F", 3, "", 0,
+    0}, {"d_w_F", 3, "", 0, 0}, {"d_A_T", 9, "", 0, 0}, {"d_x_T", 3, "", 0, 0}, {"d_v_T", 3, "", 0,
+    0}, {"d_w_T", 3, "", 0, 0}}, (const mstmm_port[]){{"d_F", 3, "N", 0, 0}, {"d_M", 3, "N*m", 0,
+    0}}, "dbce1d39116f4bf72ffd2e50acc356554aedf132dfe6726c7a81cac7f51abd49", 0, NULL},
 };
 
 const mstmm_element mstmm_force_spring = {
     .abi = MSTMM_ABI,
     .kind = "force",
     .name = "spring",
-    .hash = "9d9d912efd76eaf5606ed7414c3827a31729d38b3cc7887887e37a4a001342e9",
+    .hash = "4570b03db301d8bbd5860e7d21d085da92433e3422030428931a3c3c124b1355",
     .nq = 0,
     .nu = 0,
     .np = 3,

@@ -9,42 +9,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_ball;
-int mstmm_hinge_ball_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_ball_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_ball_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_ball_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_ball_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the ball hinge
- * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
  * in  q[4] coordinates: w, x, y, z
  * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
@@ -56,142 +21,49 @@ int mstmm_hinge_ball_directions(const real *restrict p, const real *restrict q,
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[4] coordinate rates
  */
-int mstmm_hinge_ball_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_ball_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    const real t0 = q[2] * q[2];
-    const real t1 = q[3] * q[3];
-    const real t2 = t0 + t1;
-    const real t3 = q[0] * q[0];
-    const real t4 = q[1] * q[1];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = 2.0 * t8;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    R[0] = t11;
-    const real t12 = q[1] * q[2];
-    const real t13 = q[0] * q[3];
-    const real t14 = t12 - t13;
-    const real t15 = t9 * t14;
-    R[1] = t15;
-    const real t16 = q[0] * q[2];
-    const real t17 = q[1] * q[3];
-    const real t18 = t16 + t17;
-    const real t19 = t9 * t18;
-    R[2] = t19;
-    const real t20 = t13 + t12;
-    const real t21 = t9 * t20;
-    R[3] = t21;
-    const real t22 = t1 + t4;
-    const real t23 = t9 * t22;
-    const real t24 = 1.0 - t23;
-    R[4] = t24;
-    const real t25 = q[2] * q[3];
-    const real t26 = q[0] * q[1];
-    const real t27 = t25 - t26;
-    const real t28 = t9 * t27;
-    R[5] = t28;
-    const real t29 = t17 - t16;
-    const real t30 = t9 * t29;
-    R[6] = t30;
-    const real t31 = t26 + t25;
-    const real t32 = t9 * t31;
-    R[7] = t32;
-    const real t33 = t0 + t4;
-    const real t34 = t9 * t33;
-    const real t35 = 1.0 - t34;
-    R[8] = t35;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 1.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 1.0;
-    H[14] = 0.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    w[0] = u[0];
-    w[1] = u[1];
-    w[2] = u[2];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    const real t36 = q[3] * u[2];
-    const real t37 = q[1] * u[0];
-    const real t38 = q[2] * u[1];
-    const real t39 = t37 + t38;
-    const real t40 = t36 + t39;
-    const real t41 = 0.5 * t40;
-    const real t42 = -t41;
-    qdot[0] = t42;
-    const real t43 = q[0] * u[0];
-    const real t44 = q[2] * u[2];
-    const real t45 = t43 + t44;
-    const real t46 = q[3] * u[1];
-    const real t47 = t45 - t46;
-    const real t48 = 0.5 * t47;
-    qdot[1] = t48;
-    const real t49 = q[3] * u[0];
-    const real t50 = q[0] * u[1];
-    const real t51 = q[1] * u[2];
-    const real t52 = t50 - t51;
-    const real t53 = t49 + t52;
-    const real t54 = 0.5 * t53;
-    qdot[2] = t54;
-    const real t55 = q[0] * u[2];
-    const real t56 = q[1] * u[1];
-    const real t57 = t55 + t56;
-    const real t58 = q[2] * u[0];
-    const real t59 = t57 - t58;
-    const real t60 = 0.5 * t59;
-    qdot[3] = t60;
-    return 0;
+  (void)p;
+  real t0 = q[2] * q[2];
+  real t1 = q[3] * q[3];
+  real t4 = q[1] * q[1];
+  real t9 = 2.0 * (1.0 / (t1 + (t0 + (q[0] * q[0] + t4))));
+  R[0] = 1.0 - (t0 + t1) * t9;
+  real t12 = q[1] * q[2];
+  real t13 = q[0] * q[3];
+  R[1] = t9 * (t12 - t13);
+  real t16 = q[0] * q[2];
+  real t17 = q[1] * q[3];
+  R[2] = t9 * (t16 + t17);
+  R[3] = t9 * (t13 + t12);
+  R[4] = 1.0 - t9 * (t1 + t4);
+  real t25 = q[2] * q[3];
+  real t26 = q[0] * q[1];
+  R[5] = t9 * (t25 - t26);
+  R[6] = t9 * (t17 - t16);
+  R[7] = t9 * (t26 + t25);
+  R[8] = 1.0 - t9 * (t0 + t4);
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = H[7] = H[8] = 0.0;
+  H[9] = 1.0;
+  H[10] = H[11] = H[12] = 0.0;
+  H[13] = 1.0;
+  H[14] = H[15] = H[16] = 0.0;
+  H[17] = 1.0;
+  v[0] = v[1] = v[2] = 0.0;
+  w[0] = u[0];
+  w[1] = u[1];
+  w[2] = u[2];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = -(0.5 * (q[3] * u[2] + (q[1] * u[0] + q[2] * u[1])));
+  qdot[1] = 0.5 * (q[0] * u[0] + q[2] * u[2] - q[3] * u[1]);
+  qdot[2] = 0.5 * (q[3] * u[0] + (q[0] * u[1] - q[1] * u[2]));
+  qdot[3] = 0.5 * (q[0] * u[2] + q[1] * u[1] - q[2] * u[0]);
+  return 0;
 }
 
-static int mstmm_hinge_ball_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_ball_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the ball hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -208,264 +80,86 @@ static const mstmm_port mstmm_hinge_ball_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[4] coordinate rates
  */
-int mstmm_hinge_ball_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_ball_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = q[2] * q[2];
-    const real t1 = q[3] * q[3];
-    const real t2 = t0 + t1;
-    const real t3 = q[0] * q[0];
-    const real t4 = q[1] * q[1];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = 2.0 * t8;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    const real t12 = Rt[0] * t11;
-    const real t13 = q[0] * q[3];
-    const real t14 = q[1] * q[2];
-    const real t15 = t13 + t14;
-    const real t16 = t9 * t15;
-    const real t17 = Rt[1] * t16;
-    const real t18 = t12 + t17;
-    const real t19 = q[1] * q[3];
-    const real t20 = q[0] * q[2];
-    const real t21 = t19 - t20;
-    const real t22 = t9 * t21;
-    const real t23 = Rt[2] * t22;
-    const real t24 = t18 + t23;
-    Rc[0] = t24;
-    const real t25 = t14 - t13;
-    const real t26 = t9 * t25;
-    const real t27 = Rt[0] * t26;
-    const real t28 = t1 + t4;
-    const real t29 = t9 * t28;
-    const real t30 = 1.0 - t29;
-    const real t31 = Rt[1] * t30;
-    const real t32 = t27 + t31;
-    const real t33 = q[0] * q[1];
-    const real t34 = q[2] * q[3];
-    const real t35 = t33 + t34;
-    const real t36 = t9 * t35;
-    const real t37 = Rt[2] * t36;
-    const real t38 = t32 + t37;
-    Rc[1] = t38;
-    const real t39 = t20 + t19;
-    const real t40 = t9 * t39;
-    const real t41 = Rt[0] * t40;
-    const real t42 = t34 - t33;
-    const real t43 = t9 * t42;
-    const real t44 = Rt[1] * t43;
-    const real t45 = t41 + t44;
-    const real t46 = t0 + t4;
-    const real t47 = t9 * t46;
-    const real t48 = 1.0 - t47;
-    const real t49 = Rt[2] * t48;
-    const real t50 = t45 + t49;
-    Rc[2] = t50;
-    const real t51 = Rt[3] * t11;
-    const real t52 = Rt[4] * t16;
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * t22;
-    const real t55 = t53 + t54;
-    Rc[3] = t55;
-    const real t56 = Rt[3] * t26;
-    const real t57 = Rt[4] * t30;
-    const real t58 = t56 + t57;
-    const real t59 = Rt[5] * t36;
-    const real t60 = t58 + t59;
-    Rc[4] = t60;
-    const real t61 = Rt[3] * t40;
-    const real t62 = Rt[4] * t43;
-    const real t63 = t61 + t62;
-    const real t64 = Rt[5] * t48;
-    const real t65 = t63 + t64;
-    Rc[5] = t65;
-    const real t66 = Rt[6] * t11;
-    const real t67 = Rt[7] * t16;
-    const real t68 = t66 + t67;
-    const real t69 = Rt[8] * t22;
-    const real t70 = t68 + t69;
-    Rc[6] = t70;
-    const real t71 = Rt[6] * t26;
-    const real t72 = Rt[7] * t30;
-    const real t73 = t71 + t72;
-    const real t74 = Rt[8] * t36;
-    const real t75 = t73 + t74;
-    Rc[7] = t75;
-    const real t76 = Rt[6] * t40;
-    const real t77 = Rt[7] * t43;
-    const real t78 = t76 + t77;
-    const real t79 = Rt[8] * t48;
-    const real t80 = t78 + t79;
-    Rc[8] = t80;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t81 = motion_I[0] * t24;
-    const real t82 = motion_I[1] * t55;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[2] * t70;
-    const real t85 = t83 + t84;
-    const real t86 = u[0] + t85;
-    motion[0] = t86;
-    const real t87 = motion_I[0] * t38;
-    const real t88 = motion_I[1] * t60;
-    const real t89 = t87 + t88;
-    const real t90 = motion_I[2] * t75;
-    const real t91 = t89 + t90;
-    const real t92 = u[1] + t91;
-    motion[1] = t92;
-    const real t93 = motion_I[0] * t50;
-    const real t94 = motion_I[1] * t65;
-    const real t95 = t93 + t94;
-    const real t96 = motion_I[2] * t80;
-    const real t97 = t95 + t96;
-    const real t98 = u[2] + t97;
-    motion[2] = t98;
-    const real t99 = motion_I[3] * t24;
-    const real t100 = motion_I[4] * t55;
-    const real t101 = t99 + t100;
-    const real t102 = motion_I[5] * t70;
-    const real t103 = t101 + t102;
-    const real t104 = u[2] * t91;
-    const real t105 = u[1] * t97;
-    const real t106 = t104 - t105;
-    const real t107 = s[0] + t106;
-    const real t108 = t103 + t107;
-    motion[3] = t108;
-    const real t109 = motion_I[3] * t38;
-    const real t110 = motion_I[4] * t60;
-    const real t111 = t109 + t110;
-    const real t112 = motion_I[5] * t75;
-    const real t113 = t111 + t112;
-    const real t114 = u[0] * t97;
-    const real t115 = u[2] * t85;
-    const real t116 = t114 - t115;
-    const real t117 = s[1] + t116;
-    const real t118 = t113 + t117;
-    motion[4] = t118;
-    const real t119 = motion_I[3] * t50;
-    const real t120 = motion_I[4] * t65;
-    const real t121 = t119 + t120;
-    const real t122 = motion_I[5] * t80;
-    const real t123 = t121 + t122;
-    const real t124 = u[1] * t85;
-    const real t125 = u[0] * t91;
-    const real t126 = t124 - t125;
-    const real t127 = s[2] + t126;
-    const real t128 = t123 + t127;
-    motion[5] = t128;
-    const real t129 = motion_I[0] * motion_I[1];
-    const real t130 = t129 - motion_I[5];
-    const real t131 = ro[1] * t130;
-    const real t132 = motion_I[1] * motion_I[1];
-    const real t133 = motion_I[2] * motion_I[2];
-    const real t134 = t132 + t133;
-    const real t135 = ro[0] * t134;
-    const real t136 = t131 - t135;
-    const real t137 = motion_I[0] * motion_I[2];
-    const real t138 = motion_I[4] + t137;
-    const real t139 = ro[2] * t138;
-    const real t140 = t136 + t139;
-    const real t141 = motion_I[6] + t140;
-    const real t142 = t24 * t141;
-    const real t143 = motion_I[5] + t129;
-    const real t144 = ro[0] * t143;
-    const real t145 = motion_I[0] * motion_I[0];
-    const real t146 = t133 + t145;
-    const real t147 = ro[1] * t146;
-    const real t148 = t144 - t147;
-    const real t149 = motion_I[1] * motion_I[2];
-    const real t150 = t149 - motion_I[3];
-    const real t151 = ro[2] * t150;
-    const real t152 = t148 + t151;
-    const real t153 = motion_I[7] + t152;
-    const real t154 = t55 * t153;
-    const real t155 = t142 + t154;
-    const real t156 = t137 - motion_I[4];
-    const real t157 = ro[0] * t156;
-    const real t158 = motion_I[3] + t149;
-    const real t159 = ro[1] * t158;
-    const real t160 = t157 + t159;
-    const real t161 = t132 + t145;
-    const real t162 = ro[2] * t161;
-    const real t163 = t160 - t162;
-    const real t164 = motion_I[8] + t163;
-    const real t165 = t70 * t164;
-    const real t166 = t155 + t165;
-    motion[6] = t166;
-    const real t167 = t38 * t141;
-    const real t168 = t60 * t153;
-    const real t169 = t167 + t168;
-    const real t170 = t75 * t164;
-    const real t171 = t169 + t170;
-    motion[7] = t171;
-    const real t172 = t50 * t141;
-    const real t173 = t65 * t153;
-    const real t174 = t172 + t173;
-    const real t175 = t80 * t164;
-    const real t176 = t174 + t175;
-    motion[8] = t176;
-    const real t177 = q[3] * u[2];
-    const real t178 = q[1] * u[0];
-    const real t179 = q[2] * u[1];
-    const real t180 = t178 + t179;
-    const real t181 = t177 + t180;
-    const real t182 = 0.5 * t181;
-    const real t183 = -t182;
-    qdot[0] = t183;
-    const real t184 = q[0] * u[0];
-    const real t185 = q[2] * u[2];
-    const real t186 = t184 + t185;
-    const real t187 = q[3] * u[1];
-    const real t188 = t186 - t187;
-    const real t189 = 0.5 * t188;
-    qdot[1] = t189;
-    const real t190 = q[3] * u[0];
-    const real t191 = q[0] * u[1];
-    const real t192 = q[1] * u[2];
-    const real t193 = t191 - t192;
-    const real t194 = t190 + t193;
-    const real t195 = 0.5 * t194;
-    qdot[2] = t195;
-    const real t196 = q[0] * u[2];
-    const real t197 = q[1] * u[1];
-    const real t198 = t196 + t197;
-    const real t199 = q[2] * u[0];
-    const real t200 = t198 - t199;
-    const real t201 = 0.5 * t200;
-    qdot[3] = t201;
-    return 0;
+  (void)p;
+  real t0 = q[2] * q[2];
+  real t1 = q[3] * q[3];
+  real t4 = q[1] * q[1];
+  real t9 = 2.0 * (1.0 / (t1 + (t0 + (q[0] * q[0] + t4))));
+  real t11 = 1.0 - (t0 + t1) * t9;
+  real t13 = q[0] * q[3];
+  real t14 = q[1] * q[2];
+  real t16 = t9 * (t13 + t14);
+  real t19 = q[1] * q[3];
+  real t20 = q[0] * q[2];
+  real t22 = t9 * (t19 - t20);
+  real t24 = Rt[0] * t11 + Rt[1] * t16 + Rt[2] * t22;
+  Rc[0] = t24;
+  real t26 = t9 * (t14 - t13);
+  real t30 = 1.0 - t9 * (t1 + t4);
+  real t33 = q[0] * q[1];
+  real t34 = q[2] * q[3];
+  real t36 = t9 * (t33 + t34);
+  real t38 = Rt[0] * t26 + Rt[1] * t30 + Rt[2] * t36;
+  Rc[1] = t38;
+  real t40 = t9 * (t20 + t19);
+  real t43 = t9 * (t34 - t33);
+  real t48 = 1.0 - t9 * (t0 + t4);
+  real t50 = Rt[0] * t40 + Rt[1] * t43 + Rt[2] * t48;
+  Rc[2] = t50;
+  real t55 = Rt[3] * t11 + Rt[4] * t16 + Rt[5] * t22;
+  Rc[3] = t55;
+  real t60 = Rt[3] * t26 + Rt[4] * t30 + Rt[5] * t36;
+  Rc[4] = t60;
+  real t65 = Rt[3] * t40 + Rt[4] * t43 + Rt[5] * t48;
+  Rc[5] = t65;
+  real t70 = Rt[6] * t11 + Rt[7] * t16 + Rt[8] * t22;
+  Rc[6] = t70;
+  real t75 = Rt[6] * t26 + Rt[7] * t30 + Rt[8] * t36;
+  Rc[7] = t75;
+  real t80 = Rt[6] * t40 + Rt[7] * t43 + Rt[8] * t48;
+  Rc[8] = t80;
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t85 = motion_I[0] * t24 + motion_I[1] * t55 + motion_I[2] * t70;
+  motion[0] = u[0] + t85;
+  real t91 = motion_I[0] * t38 + motion_I[1] * t60 + motion_I[2] * t75;
+  motion[1] = u[1] + t91;
+  real t97 = motion_I[0] * t50 + motion_I[1] * t65 + motion_I[2] * t80;
+  motion[2] = u[2] + t97;
+  motion[3] = motion_I[3] * t24 + motion_I[4] * t55 + motion_I[5] * t70 + (s[0] + (u[2] * t91 - u[1]
+    * t97));
+  motion[4] = motion_I[3] * t38 + motion_I[4] * t60 + motion_I[5] * t75 + (s[1] + (u[0] * t97 - u[2]
+    * t85));
+  motion[5] = motion_I[3] * t50 + motion_I[4] * t65 + motion_I[5] * t80 + (s[2] + (u[1] * t85 - u[0]
+    * t91));
+  real t129 = motion_I[0] * motion_I[1];
+  real t132 = motion_I[1] * motion_I[1];
+  real t133 = motion_I[2] * motion_I[2];
+  real t137 = motion_I[0] * motion_I[2];
+  real t141 = motion_I[6] + (ro[1] * (t129 - motion_I[5]) - ro[0] * (t132 + t133) + ro[2] *
+    (motion_I[4] + t137));
+  real t145 = motion_I[0] * motion_I[0];
+  real t149 = motion_I[1] * motion_I[2];
+  real t153 = motion_I[7] + (ro[0] * (motion_I[5] + t129) - ro[1] * (t133 + t145) + ro[2] * (t149 -
+    motion_I[3]));
+  real t164 = motion_I[8] + (ro[0] * (t137 - motion_I[4]) + ro[1] * (motion_I[3] + t149) - ro[2] *
+    (t132 + t145));
+  motion[6] = t24 * t141 + t55 * t153 + t70 * t164;
+  motion[7] = t38 * t141 + t60 * t153 + t75 * t164;
+  motion[8] = t50 * t141 + t65 * t153 + t80 * t164;
+  qdot[0] = -(0.5 * (q[3] * u[2] + (q[1] * u[0] + q[2] * u[1])));
+  qdot[1] = 0.5 * (q[0] * u[0] + q[2] * u[2] - q[3] * u[1]);
+  qdot[2] = 0.5 * (q[3] * u[0] + (q[0] * u[1] - q[1] * u[2]));
+  qdot[3] = 0.5 * (q[0] * u[2] + q[1] * u[1] - q[2] * u[0]);
+  return 0;
 }
 
-static int mstmm_hinge_ball_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_ball_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -483,478 +177,147 @@ static const mstmm_port mstmm_hinge_ball_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_ball_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_ball_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[15];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t1 = S[18] * ((real)1 / (real)10000000000000);
-    const real t2 = 1.0 / S[15];
-    const real t3 = S[16] * t2;
-    const real t4 = S[16] * t3;
-    const real t5 = S[18] - t4;
-    const real t6 = t1 < t5;
-    if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t7 = S[20] * ((real)1 / (real)10000000000000);
-    const real t8 = S[17] * t2;
-    const real t9 = S[17] * t8;
-    const real t10 = S[20] - t9;
-    const real t11 = S[17] * t3;
-    const real t12 = S[19] - t11;
-    const real t13 = 1.0 / t5;
-    const real t14 = t13 * t12;
-    const real t15 = t12 * t14;
-    const real t16 = t10 - t15;
-    const real t17 = t7 < t16;
-    if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t18 = 0.0 < floor_[1];
-    const real t19 = S[15] + S[18];
-    const real t20 = S[20] + t19;
-    const real t21 = ((real)1 / (real)300000000000000) * t20;
-    const real t22 = t18 != 0 ? floor_[1] : t21;
-    const real t23 = t22 < S[15];
-    if (!(t23 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t24 = t22 < S[18];
-    if (!(t24 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t25 = t22 < S[20];
-    if (!(t25 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    const real t26 = S[3] * t2;
-    const real t27 = S[3] * t3;
-    const real t28 = S[4] - t27;
-    const real t29 = t13 * t28;
-    const real t30 = 1.0 / t16;
-    const real t31 = S[3] * t8;
-    const real t32 = S[5] - t31;
-    const real t33 = t14 * t28;
-    const real t34 = t32 - t33;
-    const real t35 = t30 * t34;
-    const real t36 = t14 * t35;
-    const real t37 = t29 - t36;
-    const real t38 = t3 * t37;
-    const real t39 = t26 - t38;
-    const real t40 = t8 * t35;
-    const real t41 = t39 - t40;
-    G[0] = t41;
-    const real t42 = S[8] * t2;
-    const real t43 = S[8] * t3;
-    const real t44 = S[9] - t43;
-    const real t45 = t13 * t44;
-    const real t46 = S[8] * t8;
-    const real t47 = S[10] - t46;
-    const real t48 = t14 * t44;
-    const real t49 = t47 - t48;
-    const real t50 = t30 * t49;
-    const real t51 = t14 * t50;
-    const real t52 = t45 - t51;
-    const real t53 = t3 * t52;
-    const real t54 = t42 - t53;
-    const real t55 = t8 * t50;
-    const real t56 = t54 - t55;
-    G[1] = t56;
-    const real t57 = S[12] * t2;
-    const real t58 = S[12] * t3;
-    const real t59 = S[13] - t58;
-    const real t60 = t13 * t59;
-    const real t61 = S[12] * t8;
-    const real t62 = S[14] - t61;
-    const real t63 = t14 * t59;
-    const real t64 = t62 - t63;
-    const real t65 = t30 * t64;
-    const real t66 = t14 * t65;
-    const real t67 = t60 - t66;
-    const real t68 = t3 * t67;
-    const real t69 = t57 - t68;
-    const real t70 = t8 * t65;
-    const real t71 = t69 - t70;
-    G[2] = t71;
-    const real t72 = S[15] * t2;
-    const real t73 = S[15] * t3;
-    const real t74 = S[16] - t73;
-    const real t75 = t13 * t74;
-    const real t76 = S[15] * t8;
-    const real t77 = S[17] - t76;
-    const real t78 = t14 * t74;
-    const real t79 = t77 - t78;
-    const real t80 = t30 * t79;
-    const real t81 = t14 * t80;
-    const real t82 = t75 - t81;
-    const real t83 = t3 * t82;
-    const real t84 = t72 - t83;
-    const real t85 = t8 * t80;
-    const real t86 = t84 - t85;
-    G[3] = t86;
-    const real t87 = t5 * t13;
-    const real t88 = S[16] * t8;
-    const real t89 = S[19] - t88;
-    const real t90 = t5 * t14;
-    const real t91 = t89 - t90;
-    const real t92 = t30 * t91;
-    const real t93 = t14 * t92;
-    const real t94 = t87 - t93;
-    const real t95 = t3 * t94;
-    const real t96 = t3 - t95;
-    const real t97 = t8 * t92;
-    const real t98 = t96 - t97;
-    G[4] = t98;
-    const real t99 = t16 * t30;
-    const real t100 = t14 * t99;
-    const real t101 = t14 - t100;
-    const real t102 = t3 * t101;
-    const real t103 = t8 - t102;
-    const real t104 = t8 * t99;
-    const real t105 = t103 - t104;
-    G[5] = t105;
-    G[6] = t37;
-    G[7] = t52;
-    G[8] = t67;
-    G[9] = t82;
-    G[10] = t94;
-    G[11] = t101;
-    G[12] = t35;
-    G[13] = t50;
-    G[14] = t65;
-    G[15] = t80;
-    G[16] = t92;
-    G[17] = t99;
-    const real t106 = tau[0] - e[3];
-    const real t107 = t2 * t106;
-    const real t108 = tau[1] - e[4];
-    const real t109 = t3 * t106;
-    const real t110 = t108 - t109;
-    const real t111 = t13 * t110;
-    const real t112 = tau[2] - e[5];
-    const real t113 = t8 * t106;
-    const real t114 = t112 - t113;
-    const real t115 = t14 * t110;
-    const real t116 = t114 - t115;
-    const real t117 = t30 * t116;
-    const real t118 = t14 * t117;
-    const real t119 = t111 - t118;
-    const real t120 = t3 * t119;
-    const real t121 = t107 - t120;
-    const real t122 = t8 * t117;
-    const real t123 = t121 - t122;
-    g[0] = t123;
-    g[1] = t119;
-    g[2] = t117;
-    const real t124 = S[3] * t41;
-    const real t125 = S[4] * t37;
-    const real t126 = t124 + t125;
-    const real t127 = S[5] * t35;
-    const real t128 = t126 + t127;
-    const real t129 = S[0] - t128;
-    const real t130 = Rc[0] * t129;
-    const real t131 = S[3] * t56;
-    const real t132 = S[4] * t52;
-    const real t133 = t131 + t132;
-    const real t134 = S[5] * t50;
-    const real t135 = t133 + t134;
-    const real t136 = S[1] - t135;
-    const real t137 = Rc[1] * t136;
-    const real t138 = t130 + t137;
-    const real t139 = S[3] * t71;
-    const real t140 = S[4] * t67;
-    const real t141 = t139 + t140;
-    const real t142 = S[5] * t65;
-    const real t143 = t141 + t142;
-    const real t144 = S[2] - t143;
-    const real t145 = Rc[2] * t144;
-    const real t146 = t138 + t145;
-    const real t147 = Rc[0] * t146;
-    const real t148 = Rc[0] * t136;
-    const real t149 = S[8] * t56;
-    const real t150 = S[9] * t52;
-    const real t151 = t149 + t150;
-    const real t152 = S[10] * t50;
-    const real t153 = t151 + t152;
-    const real t154 = S[6] - t153;
-    const real t155 = Rc[1] * t154;
-    const real t156 = t148 + t155;
-    const real t157 = S[8] * t71;
-    const real t158 = S[9] * t67;
-    const real t159 = t157 + t158;
-    const real t160 = S[10] * t65;
-    const real t161 = t159 + t160;
-    const real t162 = S[7] - t161;
-    const real t163 = Rc[2] * t162;
-    const real t164 = t156 + t163;
-    const real t165 = Rc[1] * t164;
-    const real t166 = t147 + t165;
-    const real t167 = Rc[0] * t144;
-    const real t168 = Rc[1] * t162;
-    const real t169 = t167 + t168;
-    const real t170 = S[12] * t71;
-    const real t171 = S[13] * t67;
-    const real t172 = t170 + t171;
-    const real t173 = S[14] * t65;
-    const real t174 = t172 + t173;
-    const real t175 = S[11] - t174;
-    const real t176 = Rc[2] * t175;
-    const real t177 = t169 + t176;
-    const real t178 = Rc[2] * t177;
-    const real t179 = t166 + t178;
-    S_I[0] += t179;
-    const real t180 = Rc[3] * t146;
-    const real t181 = Rc[4] * t164;
-    const real t182 = t180 + t181;
-    const real t183 = Rc[5] * t177;
-    const real t184 = t182 + t183;
-    S_I[1] += t184;
-    const real t185 = Rc[6] * t146;
-    const real t186 = Rc[7] * t164;
-    const real t187 = t185 + t186;
-    const real t188 = Rc[8] * t177;
-    const real t189 = t187 + t188;
-    S_I[2] += t189;
-    const real t190 = r[1] * t189;
-    const real t191 = r[2] * t184;
-    const real t192 = t190 - t191;
-    S_I[3] += t192;
-    const real t193 = r[2] * t179;
-    const real t194 = r[0] * t189;
-    const real t195 = t193 - t194;
-    S_I[4] += t195;
-    const real t196 = r[0] * t184;
-    const real t197 = r[1] * t179;
-    const real t198 = t196 - t197;
-    S_I[5] += t198;
-    const real t199 = Rc[3] * t129;
-    const real t200 = Rc[4] * t136;
-    const real t201 = t199 + t200;
-    const real t202 = Rc[5] * t144;
-    const real t203 = t201 + t202;
-    const real t204 = Rc[3] * t203;
-    const real t205 = Rc[3] * t136;
-    const real t206 = Rc[4] * t154;
-    const real t207 = t205 + t206;
-    const real t208 = Rc[5] * t162;
-    const real t209 = t207 + t208;
-    const real t210 = Rc[4] * t209;
-    const real t211 = t204 + t210;
-    const real t212 = Rc[3] * t144;
-    const real t213 = Rc[4] * t162;
-    const real t214 = t212 + t213;
-    const real t215 = Rc[5] * t175;
-    const real t216 = t214 + t215;
-    const real t217 = Rc[5] * t216;
-    const real t218 = t211 + t217;
-    S_I[6] += t218;
-    const real t219 = Rc[6] * t203;
-    const real t220 = Rc[7] * t209;
-    const real t221 = t219 + t220;
-    const real t222 = Rc[8] * t216;
-    const real t223 = t221 + t222;
-    S_I[7] += t223;
-    const real t224 = r[1] * t223;
-    const real t225 = r[2] * t218;
-    const real t226 = t224 - t225;
-    S_I[8] += t226;
-    const real t227 = r[0] * t223;
-    const real t228 = t191 - t227;
-    S_I[9] += t228;
-    const real t229 = r[0] * t218;
-    const real t230 = r[1] * t184;
-    const real t231 = t229 - t230;
-    S_I[10] += t231;
-    const real t232 = Rc[6] * t129;
-    const real t233 = Rc[7] * t136;
-    const real t234 = t232 + t233;
-    const real t235 = Rc[8] * t144;
-    const real t236 = t234 + t235;
-    const real t237 = Rc[6] * t236;
-    const real t238 = Rc[6] * t136;
-    const real t239 = Rc[7] * t154;
-    const real t240 = t238 + t239;
-    const real t241 = Rc[8] * t162;
-    const real t242 = t240 + t241;
-    const real t243 = Rc[7] * t242;
-    const real t244 = t237 + t243;
-    const real t245 = Rc[6] * t144;
-    const real t246 = Rc[7] * t162;
-    const real t247 = t245 + t246;
-    const real t248 = Rc[8] * t175;
-    const real t249 = t247 + t248;
-    const real t250 = Rc[8] * t249;
-    const real t251 = t244 + t250;
-    S_I[11] += t251;
-    const real t252 = r[1] * t251;
-    const real t253 = r[2] * t223;
-    const real t254 = t252 - t253;
-    S_I[12] += t254;
-    const real t255 = r[2] * t189;
-    const real t256 = r[0] * t251;
-    const real t257 = t255 - t256;
-    S_I[13] += t257;
-    const real t258 = t227 - t190;
-    S_I[14] += t258;
-    const real t259 = r[1] * t254;
-    const real t260 = r[2] * t226;
-    const real t261 = t259 - t260;
-    S_I[15] += t261;
-    const real t262 = r[1] * t257;
-    const real t263 = r[2] * t228;
-    const real t264 = t262 - t263;
-    S_I[16] += t264;
-    const real t265 = r[1] * t258;
-    const real t266 = r[2] * t231;
-    const real t267 = t265 - t266;
-    S_I[17] += t267;
-    const real t268 = r[2] * t195;
-    const real t269 = r[0] * t257;
-    const real t270 = t268 - t269;
-    S_I[18] += t270;
-    const real t271 = r[2] * t198;
-    const real t272 = r[0] * t258;
-    const real t273 = t271 - t272;
-    S_I[19] += t273;
-    const real t274 = r[0] * t231;
-    const real t275 = r[1] * t198;
-    const real t276 = t274 - t275;
-    S_I[20] += t276;
-    const real t277 = S[3] * t123;
-    const real t278 = S[4] * t119;
-    const real t279 = t277 + t278;
-    const real t280 = S[5] * t117;
-    const real t281 = t279 + t280;
-    const real t282 = e[0] + t281;
-    const real t283 = Rc[0] * t282;
-    const real t284 = S[8] * t123;
-    const real t285 = S[9] * t119;
-    const real t286 = t284 + t285;
-    const real t287 = S[10] * t117;
-    const real t288 = t286 + t287;
-    const real t289 = e[1] + t288;
-    const real t290 = Rc[1] * t289;
-    const real t291 = t283 + t290;
-    const real t292 = S[12] * t123;
-    const real t293 = S[13] * t119;
-    const real t294 = t292 + t293;
-    const real t295 = S[14] * t117;
-    const real t296 = t294 + t295;
-    const real t297 = e[2] + t296;
-    const real t298 = Rc[2] * t297;
-    const real t299 = t291 + t298;
-    e_I[0] += t299;
-    const real t300 = Rc[3] * t282;
-    const real t301 = Rc[4] * t289;
-    const real t302 = t300 + t301;
-    const real t303 = Rc[5] * t297;
-    const real t304 = t302 + t303;
-    e_I[1] += t304;
-    const real t305 = Rc[6] * t282;
-    const real t306 = Rc[7] * t289;
-    const real t307 = t305 + t306;
-    const real t308 = Rc[8] * t297;
-    const real t309 = t307 + t308;
-    e_I[2] += t309;
-    const real t310 = Rc[0] * tau[0];
-    const real t311 = Rc[1] * tau[1];
-    const real t312 = t310 + t311;
-    const real t313 = Rc[2] * tau[2];
-    const real t314 = t312 + t313;
-    const real t315 = Rc[6] * r[1];
-    const real t316 = Rc[3] * r[2];
-    const real t317 = t315 - t316;
-    const real t318 = t282 * t317;
-    const real t319 = Rc[7] * r[1];
-    const real t320 = Rc[4] * r[2];
-    const real t321 = t319 - t320;
-    const real t322 = t289 * t321;
-    const real t323 = t318 + t322;
-    const real t324 = Rc[8] * r[1];
-    const real t325 = Rc[5] * r[2];
-    const real t326 = t324 - t325;
-    const real t327 = t297 * t326;
-    const real t328 = t323 + t327;
-    const real t329 = t314 + t328;
-    e_I[3] += t329;
-    const real t330 = Rc[3] * tau[0];
-    const real t331 = Rc[4] * tau[1];
-    const real t332 = t330 + t331;
-    const real t333 = Rc[5] * tau[2];
-    const real t334 = t332 + t333;
-    const real t335 = Rc[0] * r[2];
-    const real t336 = Rc[6] * r[0];
-    const real t337 = t335 - t336;
-    const real t338 = t282 * t337;
-    const real t339 = Rc[1] * r[2];
-    const real t340 = Rc[7] * r[0];
-    const real t341 = t339 - t340;
-    const real t342 = t289 * t341;
-    const real t343 = t338 + t342;
-    const real t344 = Rc[2] * r[2];
-    const real t345 = Rc[8] * r[0];
-    const real t346 = t344 - t345;
-    const real t347 = t297 * t346;
-    const real t348 = t343 + t347;
-    const real t349 = t334 + t348;
-    e_I[4] += t349;
-    const real t350 = Rc[6] * tau[0];
-    const real t351 = Rc[7] * tau[1];
-    const real t352 = t350 + t351;
-    const real t353 = Rc[8] * tau[2];
-    const real t354 = t352 + t353;
-    const real t355 = Rc[3] * r[0];
-    const real t356 = Rc[0] * r[1];
-    const real t357 = t355 - t356;
-    const real t358 = t282 * t357;
-    const real t359 = Rc[4] * r[0];
-    const real t360 = Rc[1] * r[1];
-    const real t361 = t359 - t360;
-    const real t362 = t289 * t361;
-    const real t363 = t358 + t362;
-    const real t364 = Rc[5] * r[0];
-    const real t365 = Rc[2] * r[1];
-    const real t366 = t364 - t365;
-    const real t367 = t297 * t366;
-    const real t368 = t363 + t367;
-    const real t369 = t354 + t368;
-    e_I[5] += t369;
-    return 0;
+  (void)p;
+  (void)q;
+  real t0 = 0.0 < S[15];
+  if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t2 = 1.0 / S[15];
+  real t3 = S[16] * t2;
+  real t5 = S[18] - S[16] * t3;
+  real t6 = S[18] * ((real)1 / (real)10000000000000) < t5;
+  if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t8 = S[17] * t2;
+  real t12 = S[19] - S[17] * t3;
+  real t13 = 1.0 / t5;
+  real t14 = t13 * t12;
+  real t16 = S[20] - S[17] * t8 - t12 * t14;
+  real t17 = S[20] * ((real)1 / (real)10000000000000) < t16;
+  if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t6 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t17 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t21 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t22 = (0.0 < floor_[1]) ? floor_[1] : t21;
+  if (!((t22 < S[15]))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t22 < S[18]))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t22 < S[20]))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  real t28 = S[4] - S[3] * t3;
+  real t30 = 1.0 / t16;
+  real t35 = t30 * (S[5] - S[3] * t8 - t14 * t28);
+  real t37 = t13 * t28 - t14 * t35;
+  real t41 = S[3] * t2 - t3 * t37 - t8 * t35;
+  G[0] = t41;
+  real t44 = S[9] - S[8] * t3;
+  real t50 = t30 * (S[10] - S[8] * t8 - t14 * t44);
+  real t52 = t13 * t44 - t14 * t50;
+  real t56 = S[8] * t2 - t3 * t52 - t8 * t50;
+  G[1] = t56;
+  real t59 = S[13] - S[12] * t3;
+  real t65 = t30 * (S[14] - S[12] * t8 - t14 * t59);
+  real t67 = t13 * t59 - t14 * t65;
+  real t71 = S[12] * t2 - t3 * t67 - t8 * t65;
+  G[2] = t71;
+  real t74 = S[16] - S[15] * t3;
+  real t80 = t30 * (S[17] - S[15] * t8 - t14 * t74);
+  real t82 = t13 * t74 - t14 * t80;
+  G[3] = S[15] * t2 - t3 * t82 - t8 * t80;
+  real t92 = t30 * (S[19] - S[16] * t8 - t5 * t14);
+  real t94 = t5 * t13 - t14 * t92;
+  G[4] = t3 - t3 * t94 - t8 * t92;
+  real t99 = t16 * t30;
+  real t101 = t14 - t14 * t99;
+  G[5] = t8 - t3 * t101 - t8 * t99;
+  G[6] = t37;
+  G[7] = t52;
+  G[8] = t67;
+  G[9] = t82;
+  G[10] = t94;
+  G[11] = t101;
+  G[12] = t35;
+  G[13] = t50;
+  G[14] = t65;
+  G[15] = t80;
+  G[16] = t92;
+  G[17] = t99;
+  real t106 = tau[0] - e[3];
+  real t110 = tau[1] - e[4] - t3 * t106;
+  real t117 = t30 * (tau[2] - e[5] - t8 * t106 - t14 * t110);
+  real t119 = t13 * t110 - t14 * t117;
+  real t123 = t2 * t106 - t3 * t119 - t8 * t117;
+  g[0] = t123;
+  g[1] = t119;
+  g[2] = t117;
+  real t129 = S[0] - (S[3] * t41 + S[4] * t37 + S[5] * t35);
+  real t136 = S[1] - (S[3] * t56 + S[4] * t52 + S[5] * t50);
+  real t144 = S[2] - (S[3] * t71 + S[4] * t67 + S[5] * t65);
+  real t146 = Rc[0] * t129 + Rc[1] * t136 + Rc[2] * t144;
+  real t154 = S[6] - (S[8] * t56 + S[9] * t52 + S[10] * t50);
+  real t162 = S[7] - (S[8] * t71 + S[9] * t67 + S[10] * t65);
+  real t164 = Rc[0] * t136 + Rc[1] * t154 + Rc[2] * t162;
+  real t175 = S[11] - (S[12] * t71 + S[13] * t67 + S[14] * t65);
+  real t177 = Rc[0] * t144 + Rc[1] * t162 + Rc[2] * t175;
+  real t179 = Rc[0] * t146 + Rc[1] * t164 + Rc[2] * t177;
+  S_I[0] += t179;
+  real t184 = Rc[3] * t146 + Rc[4] * t164 + Rc[5] * t177;
+  S_I[1] += t184;
+  real t189 = Rc[6] * t146 + Rc[7] * t164 + Rc[8] * t177;
+  S_I[2] += t189;
+  real t190 = r[1] * t189;
+  real t191 = r[2] * t184;
+  S_I[3] += t190 - t191;
+  real t195 = r[2] * t179 - r[0] * t189;
+  S_I[4] += t195;
+  real t198 = r[0] * t184 - r[1] * t179;
+  S_I[5] += t198;
+  real t203 = Rc[3] * t129 + Rc[4] * t136 + Rc[5] * t144;
+  real t209 = Rc[3] * t136 + Rc[4] * t154 + Rc[5] * t162;
+  real t216 = Rc[3] * t144 + Rc[4] * t162 + Rc[5] * t175;
+  real t218 = Rc[3] * t203 + Rc[4] * t209 + Rc[5] * t216;
+  S_I[6] += t218;
+  real t223 = Rc[6] * t203 + Rc[7] * t209 + Rc[8] * t216;
+  S_I[7] += t223;
+  real t226 = r[1] * t223 - r[2] * t218;
+  S_I[8] += t226;
+  real t227 = r[0] * t223;
+  real t228 = t191 - t227;
+  S_I[9] += t228;
+  real t231 = r[0] * t218 - r[1] * t184;
+  S_I[10] += t231;
+  real t251 = Rc[6] * (Rc[6] * t129 + Rc[7] * t136 + Rc[8] * t144) + Rc[7] * (Rc[6] * t136 + Rc[7] *
+    t154 + Rc[8] * t162) + Rc[8] * (Rc[6] * t144 + Rc[7] * t162 + Rc[8] * t175);
+  S_I[11] += t251;
+  real t254 = r[1] * t251 - r[2] * t223;
+  S_I[12] += t254;
+  real t257 = r[2] * t189 - r[0] * t251;
+  S_I[13] += t257;
+  real t258 = t227 - t190;
+  S_I[14] += t258;
+  S_I[15] += r[1] * t254 - r[2] * t226;
+  S_I[16] += r[1] * t257 - r[2] * t228;
+  S_I[17] += r[1] * t258 - r[2] * t231;
+  S_I[18] += r[2] * t195 - r[0] * t257;
+  S_I[19] += r[2] * t198 - r[0] * t258;
+  S_I[20] += r[0] * t231 - r[1] * t198;
+  real t282 = e[0] + (S[3] * t123 + S[4] * t119 + S[5] * t117);
+  real t289 = e[1] + (S[8] * t123 + S[9] * t119 + S[10] * t117);
+  real t297 = e[2] + (S[12] * t123 + S[13] * t119 + S[14] * t117);
+  e_I[0] += Rc[0] * t282 + Rc[1] * t289 + Rc[2] * t297;
+  e_I[1] += Rc[3] * t282 + Rc[4] * t289 + Rc[5] * t297;
+  e_I[2] += Rc[6] * t282 + Rc[7] * t289 + Rc[8] * t297;
+  e_I[3] += Rc[0] * tau[0] + Rc[1] * tau[1] + Rc[2] * tau[2] + (t282 * (Rc[6] * r[1] - Rc[3] * r[2])
+    + t289 * (Rc[7] * r[1] - Rc[4] * r[2]) + t297 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * tau[0] + Rc[4] * tau[1] + Rc[5] * tau[2] + (t282 * (Rc[0] * r[2] - Rc[6] * r[0])
+    + t289 * (Rc[1] * r[2] - Rc[7] * r[0]) + t297 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * tau[0] + Rc[7] * tau[1] + Rc[8] * tau[2] + (t282 * (Rc[3] * r[0] - Rc[0] * r[1])
+    + t289 * (Rc[4] * r[0] - Rc[1] * r[1]) + t297 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_ball_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_ball_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_condense_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_ball_condense_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_ball_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -969,128 +332,40 @@ static const mstmm_guard mstmm_hinge_ball_condense_guards[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_ball_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_ball_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    (void)q;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    delta[0] = t16;
-    delta[1] = t22;
-    delta[2] = t29;
-    const real t78 = t36 + t53;
-    delta[3] = t78;
-    const real t79 = t43 + t65;
-    delta[4] = t79;
-    const real t80 = t50 + t77;
-    delta[5] = t80;
-    return 0;
+  (void)p;
+  (void)q;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29;
+  delta[3] = t36 + t53;
+  delta[4] = t43 + t65;
+  delta[5] = t50 + t77;
+  return 0;
 }
 
-static int mstmm_hinge_ball_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_ball_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_recover_outputs[] = {
-    {"udot", 3, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
- * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
  * in  q[4] coordinates: w, x, y, z
  * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
@@ -1104,331 +379,138 @@ static const mstmm_port mstmm_hinge_ball_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[4] derivative of qdot
  */
-int mstmm_hinge_ball_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_ball_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    const real t0 = q[2] * q[2];
-    const real t1 = q[3] * q[3];
-    const real t2 = t0 + t1;
-    const real t3 = q[0] * q[0];
-    const real t4 = q[1] * q[1];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = q[1] * d_q[1];
-    const real t10 = t9 + t9;
-    const real t11 = q[0] * d_q[0];
-    const real t12 = t11 + t11;
-    const real t13 = t10 + t12;
-    const real t14 = q[2] * d_q[2];
-    const real t15 = t14 + t14;
-    const real t16 = t13 + t15;
-    const real t17 = q[3] * d_q[3];
-    const real t18 = t17 + t17;
-    const real t19 = t16 + t18;
-    const real t20 = t8 * t19;
-    const real t21 = t20 / t7;
-    const real t22 = 2.0 * t21;
-    const real t23 = t2 * t22;
-    const real t24 = t8 * 2.0;
-    const real t25 = t15 + t18;
-    const real t26 = t24 * t25;
-    const real t27 = t23 - t26;
-    d_R[0] = t27;
-    const real t28 = q[1] * d_q[2];
-    const real t29 = q[2] * d_q[1];
-    const real t30 = t28 + t29;
-    const real t31 = q[0] * d_q[3];
-    const real t32 = q[3] * d_q[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 - t33;
-    const real t35 = t24 * t34;
-    const real t36 = q[2] * q[1];
-    const real t37 = q[3] * q[0];
-    const real t38 = t36 - t37;
-    const real t39 = t38 * t22;
-    const real t40 = t35 - t39;
-    d_R[1] = t40;
-    const real t41 = q[1] * d_q[3];
-    const real t42 = q[3] * d_q[1];
-    const real t43 = t41 + t42;
-    const real t44 = q[0] * d_q[2];
-    const real t45 = q[2] * d_q[0];
-    const real t46 = t44 + t45;
-    const real t47 = t43 + t46;
-    const real t48 = t24 * t47;
-    const real t49 = q[2] * q[0];
-    const real t50 = q[3] * q[1];
-    const real t51 = t49 + t50;
-    const real t52 = t51 * t22;
-    const real t53 = t48 - t52;
-    d_R[2] = t53;
-    const real t54 = t33 + t30;
-    const real t55 = t24 * t54;
-    const real t56 = t36 + t37;
-    const real t57 = t56 * t22;
-    const real t58 = t55 - t57;
-    d_R[3] = t58;
-    const real t59 = t1 + t4;
-    const real t60 = t59 * t22;
-    const real t61 = t10 + t18;
-    const real t62 = t24 * t61;
-    const real t63 = t60 - t62;
-    d_R[4] = t63;
-    const real t64 = q[3] * d_q[2];
-    const real t65 = q[2] * d_q[3];
-    const real t66 = t64 + t65;
-    const real t67 = q[1] * d_q[0];
-    const real t68 = q[0] * d_q[1];
-    const real t69 = t67 + t68;
-    const real t70 = t66 - t69;
-    const real t71 = t24 * t70;
-    const real t72 = q[2] * q[3];
-    const real t73 = q[0] * q[1];
-    const real t74 = t72 - t73;
-    const real t75 = t74 * t22;
-    const real t76 = t71 - t75;
-    d_R[5] = t76;
-    const real t77 = t43 - t46;
-    const real t78 = t24 * t77;
-    const real t79 = t50 - t49;
-    const real t80 = t79 * t22;
-    const real t81 = t78 - t80;
-    d_R[6] = t81;
-    const real t82 = t69 + t66;
-    const real t83 = t24 * t82;
-    const real t84 = t72 + t73;
-    const real t85 = t84 * t22;
-    const real t86 = t83 - t85;
-    d_R[7] = t86;
-    const real t87 = t0 + t4;
-    const real t88 = t87 * t22;
-    const real t89 = t10 + t15;
-    const real t90 = t24 * t89;
-    const real t91 = t88 - t90;
-    d_R[8] = t91;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = 0.0;
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_H[6] = 0.0;
-    d_H[7] = 0.0;
-    d_H[8] = 0.0;
-    d_H[9] = 0.0;
-    d_H[10] = 0.0;
-    d_H[11] = 0.0;
-    d_H[12] = 0.0;
-    d_H[13] = 0.0;
-    d_H[14] = 0.0;
-    d_H[15] = 0.0;
-    d_H[16] = 0.0;
-    d_H[17] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = 0.0;
-    d_w[0] = d_u[0];
-    d_w[1] = d_u[1];
-    d_w[2] = d_u[2];
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    const real t92 = u[1] * d_q[2];
-    const real t93 = q[2] * d_u[1];
-    const real t94 = t92 + t93;
-    const real t95 = u[0] * d_q[1];
-    const real t96 = q[1] * d_u[0];
-    const real t97 = t95 + t96;
-    const real t98 = t94 + t97;
-    const real t99 = u[2] * d_q[3];
-    const real t100 = q[3] * d_u[2];
-    const real t101 = t99 + t100;
-    const real t102 = t98 + t101;
-    const real t103 = 0.5 * t102;
-    const real t104 = -t103;
-    d_qdot[0] = t104;
-    const real t105 = u[2] * d_q[2];
-    const real t106 = q[2] * d_u[2];
-    const real t107 = t105 + t106;
-    const real t108 = u[0] * d_q[0];
-    const real t109 = q[0] * d_u[0];
-    const real t110 = t108 + t109;
-    const real t111 = t107 + t110;
-    const real t112 = u[1] * d_q[3];
-    const real t113 = q[3] * d_u[1];
-    const real t114 = t112 + t113;
-    const real t115 = t111 - t114;
-    const real t116 = 0.5 * t115;
-    d_qdot[1] = t116;
-    const real t117 = u[1] * d_q[0];
-    const real t118 = q[0] * d_u[1];
-    const real t119 = t117 + t118;
-    const real t120 = u[2] * d_q[1];
-    const real t121 = q[1] * d_u[2];
-    const real t122 = t120 + t121;
-    const real t123 = t119 - t122;
-    const real t124 = u[0] * d_q[3];
-    const real t125 = q[3] * d_u[0];
-    const real t126 = t124 + t125;
-    const real t127 = t123 + t126;
-    const real t128 = 0.5 * t127;
-    d_qdot[2] = t128;
-    const real t129 = u[1] * d_q[1];
-    const real t130 = q[1] * d_u[1];
-    const real t131 = t129 + t130;
-    const real t132 = u[2] * d_q[0];
-    const real t133 = q[0] * d_u[2];
-    const real t134 = t132 + t133;
-    const real t135 = t131 + t134;
-    const real t136 = u[0] * d_q[2];
-    const real t137 = q[2] * d_u[0];
-    const real t138 = t136 + t137;
-    const real t139 = t135 - t138;
-    const real t140 = 0.5 * t139;
-    d_qdot[3] = t140;
-    return 0;
+  (void)p;
+  real t0 = q[2] * q[2];
+  real t1 = q[3] * q[3];
+  real t4 = q[1] * q[1];
+  real t7 = t1 + (t0 + (q[0] * q[0] + t4));
+  real t8 = 1.0 / t7;
+  real t9 = q[1] * d_q[1];
+  real t10 = t9 + t9;
+  real t11 = q[0] * d_q[0];
+  real t14 = q[2] * d_q[2];
+  real t15 = t14 + t14;
+  real t17 = q[3] * d_q[3];
+  real t18 = t17 + t17;
+  real t22 = 2.0 * (t8 * (t10 + (t11 + t11) + t15 + t18) / t7);
+  real t24 = t8 * 2.0;
+  d_R[0] = (t0 + t1) * t22 - t24 * (t15 + t18);
+  real t30 = q[1] * d_q[2] + q[2] * d_q[1];
+  real t33 = q[0] * d_q[3] + q[3] * d_q[0];
+  real t36 = q[2] * q[1];
+  real t37 = q[3] * q[0];
+  d_R[1] = t24 * (t30 - t33) - (t36 - t37) * t22;
+  real t43 = q[1] * d_q[3] + q[3] * d_q[1];
+  real t46 = q[0] * d_q[2] + q[2] * d_q[0];
+  real t49 = q[2] * q[0];
+  real t50 = q[3] * q[1];
+  d_R[2] = t24 * (t43 + t46) - (t49 + t50) * t22;
+  d_R[3] = t24 * (t33 + t30) - (t36 + t37) * t22;
+  d_R[4] = (t1 + t4) * t22 - t24 * (t10 + t18);
+  real t66 = q[3] * d_q[2] + q[2] * d_q[3];
+  real t69 = q[1] * d_q[0] + q[0] * d_q[1];
+  real t72 = q[2] * q[3];
+  real t73 = q[0] * q[1];
+  d_R[5] = t24 * (t66 - t69) - (t72 - t73) * t22;
+  d_R[6] = t24 * (t43 - t46) - (t50 - t49) * t22;
+  d_R[7] = t24 * (t69 + t66) - (t72 + t73) * t22;
+  d_R[8] = (t0 + t4) * t22 - t24 * (t10 + t15);
+  d_d[0] = d_d[1] = d_d[2] = d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = d_H[6] = d_H[7] =
+    d_H[8] = d_H[9] = d_H[10] = d_H[11] = d_H[12] = d_H[13] = d_H[14] = d_H[15] = d_H[16] = d_H[17]
+    = d_v[0] = d_v[1] = d_v[2] = 0.0;
+  d_w[0] = d_u[0];
+  d_w[1] = d_u[1];
+  d_w[2] = d_u[2];
+  d_c[0] = d_c[1] = d_c[2] = d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = -(0.5 * (u[1] * d_q[2] + q[2] * d_u[1] + (u[0] * d_q[1] + q[1] * d_u[0]) + (u[2] *
+    d_q[3] + q[3] * d_u[2])));
+  d_qdot[1] = 0.5 * (u[2] * d_q[2] + q[2] * d_u[2] + (u[0] * d_q[0] + q[0] * d_u[0]) - (u[1] *
+    d_q[3] + q[3] * d_u[1]));
+  d_qdot[2] = 0.5 * (u[1] * d_q[0] + q[0] * d_u[1] - (u[2] * d_q[1] + q[1] * d_u[2]) + (u[0] *
+    d_q[3] + q[3] * d_u[0]));
+  d_qdot[3] = 0.5 * (u[1] * d_q[1] + q[1] * d_u[1] + (u[2] * d_q[0] + q[0] * d_u[2]) - (u[0] *
+    d_q[2] + q[2] * d_u[0]));
+  return 0;
 }
 
-static int mstmm_hinge_ball_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_ball_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"d_q", 4, "", 0, 0},
-    {"d_u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 18, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2],
+  out[3], out[4], out[5], out[6]))
 
 /* hinge by q
- * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
  * in  q[4] coordinates: w, x, y, z
  * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
  * out J[4][4] qdot by q, transposed
  */
-int mstmm_hinge_ball_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_ball_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    J[0] = 0.0;
-    const real t0 = u[0] * 0.5;
-    J[1] = t0;
-    const real t1 = u[1] * 0.5;
-    J[2] = t1;
-    const real t2 = u[2] * 0.5;
-    J[3] = t2;
-    const real t3 = -t0;
-    J[4] = t3;
-    J[5] = 0.0;
-    const real t4 = -t2;
-    J[6] = t4;
-    J[7] = t1;
-    const real t5 = -t1;
-    J[8] = t5;
-    J[9] = t2;
-    J[10] = 0.0;
-    J[11] = t3;
-    J[12] = t4;
-    J[13] = t5;
-    J[14] = t0;
-    J[15] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  J[0] = 0.0;
+  real t0 = u[0] * 0.5;
+  J[1] = t0;
+  real t1 = u[1] * 0.5;
+  J[2] = t1;
+  real t2 = u[2] * 0.5;
+  J[3] = t2;
+  real t3 = -t0;
+  J[4] = t3;
+  J[5] = 0.0;
+  real t4 = -t2;
+  J[6] = t4;
+  J[7] = t1;
+  real t5 = -t1;
+  J[8] = t5;
+  J[9] = t2;
+  J[10] = 0.0;
+  J[11] = t3;
+  J[12] = t4;
+  J[13] = t5;
+  J[14] = t0;
+  J[15] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_ball_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_ball_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_rates_by_coordinates_outputs[] = {
-    {"J", 16, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
- * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
  * in  q[4] coordinates: w, x, y, z
  * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
  * out J[3][4] qdot by u, transposed
  */
-int mstmm_hinge_ball_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_ball_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)u;
-    const real t0 = q[1] * 0.5;
-    const real t1 = -t0;
-    J[0] = t1;
-    const real t2 = q[0] * 0.5;
-    J[1] = t2;
-    const real t3 = q[3] * 0.5;
-    J[2] = t3;
-    const real t4 = q[2] * 0.5;
-    const real t5 = -t4;
-    J[3] = t5;
-    J[4] = t5;
-    const real t6 = -t3;
-    J[5] = t6;
-    J[6] = t2;
-    J[7] = t0;
-    J[8] = t6;
-    J[9] = t4;
-    J[10] = t1;
-    J[11] = t2;
-    return 0;
+  (void)p;
+  (void)u;
+  real t0 = q[1] * 0.5;
+  real t1 = -t0;
+  J[0] = t1;
+  real t2 = q[0] * 0.5;
+  J[1] = t2;
+  real t3 = q[3] * 0.5;
+  J[2] = t3;
+  real t4 = q[2] * 0.5;
+  real t5 = -t4;
+  J[3] = t5;
+  J[4] = t5;
+  real t6 = -t3;
+  J[5] = t6;
+  J[6] = t2;
+  J[7] = t0;
+  J[8] = t6;
+  J[9] = t4;
+  J[10] = t1;
+  J[11] = t2;
+  return 0;
 }
 
-static int mstmm_hinge_ball_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_ball_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_rates_by_speeds_outputs[] = {
-    {"J", 12, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
- * source: Rui, Wang, Zhang, ch. 5, (5.39)-(5.43)
  * in  p[0] parameters
  * in  q[4] coordinates: w, x, y, z
  * in  u[3] speeds: wx [rad/s], wy [rad/s], wz [rad/s]
@@ -1447,313 +529,107 @@ static const mstmm_port mstmm_hinge_ball_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_ball_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_ball_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    (void)p;
-    const real t0 = q[2] * q[2];
-    const real t1 = q[3] * q[3];
-    const real t2 = t0 + t1;
-    const real t3 = q[0] * q[0];
-    const real t4 = q[1] * q[1];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = t8 * 2.0;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    R[0] = t11;
-    const real t12 = q[1] * q[2];
-    const real t13 = q[0] * q[3];
-    const real t14 = t12 - t13;
-    const real t15 = t9 * t14;
-    R[1] = t15;
-    const real t16 = q[0] * q[2];
-    const real t17 = q[1] * q[3];
-    const real t18 = t16 + t17;
-    const real t19 = t9 * t18;
-    R[2] = t19;
-    const real t20 = t12 + t13;
-    const real t21 = t9 * t20;
-    R[3] = t21;
-    const real t22 = t1 + t4;
-    const real t23 = t9 * t22;
-    const real t24 = 1.0 - t23;
-    R[4] = t24;
-    const real t25 = q[2] * q[3];
-    const real t26 = q[0] * q[1];
-    const real t27 = t25 - t26;
-    const real t28 = t9 * t27;
-    R[5] = t28;
-    const real t29 = t17 - t16;
-    const real t30 = t9 * t29;
-    R[6] = t30;
-    const real t31 = t25 + t26;
-    const real t32 = t9 * t31;
-    R[7] = t32;
-    const real t33 = t0 + t4;
-    const real t34 = t9 * t33;
-    const real t35 = 1.0 - t34;
-    R[8] = t35;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 1.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 1.0;
-    H[14] = 0.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    w[0] = u[0];
-    w[1] = u[1];
-    w[2] = u[2];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    const real t36 = q[3] * u[2];
-    const real t37 = q[1] * u[0];
-    const real t38 = q[2] * u[1];
-    const real t39 = t37 + t38;
-    const real t40 = t36 + t39;
-    const real t41 = t40 * 0.5;
-    const real t42 = -t41;
-    qdot[0] = t42;
-    const real t43 = q[0] * u[0];
-    const real t44 = q[2] * u[2];
-    const real t45 = t43 + t44;
-    const real t46 = q[3] * u[1];
-    const real t47 = t45 - t46;
-    const real t48 = 0.5 * t47;
-    qdot[1] = t48;
-    const real t49 = q[3] * u[0];
-    const real t50 = q[0] * u[1];
-    const real t51 = q[1] * u[2];
-    const real t52 = t50 - t51;
-    const real t53 = t49 + t52;
-    const real t54 = 0.5 * t53;
-    qdot[2] = t54;
-    const real t55 = q[0] * u[2];
-    const real t56 = q[1] * u[1];
-    const real t57 = t55 + t56;
-    const real t58 = q[2] * u[0];
-    const real t59 = t57 - t58;
-    const real t60 = 0.5 * t59;
-    qdot[3] = t60;
-    const real t61 = t11 * Rt[0];
-    const real t62 = t21 * Rt[1];
-    const real t63 = t61 + t62;
-    const real t64 = t30 * Rt[2];
-    const real t65 = t63 + t64;
-    Rc[0] = t65;
-    const real t66 = t15 * Rt[0];
-    const real t67 = t24 * Rt[1];
-    const real t68 = t66 + t67;
-    const real t69 = t32 * Rt[2];
-    const real t70 = t68 + t69;
-    Rc[1] = t70;
-    const real t71 = t19 * Rt[0];
-    const real t72 = t28 * Rt[1];
-    const real t73 = t71 + t72;
-    const real t74 = t35 * Rt[2];
-    const real t75 = t73 + t74;
-    Rc[2] = t75;
-    const real t76 = t11 * Rt[3];
-    const real t77 = t21 * Rt[4];
-    const real t78 = t76 + t77;
-    const real t79 = t30 * Rt[5];
-    const real t80 = t78 + t79;
-    Rc[3] = t80;
-    const real t81 = t15 * Rt[3];
-    const real t82 = t24 * Rt[4];
-    const real t83 = t81 + t82;
-    const real t84 = t32 * Rt[5];
-    const real t85 = t83 + t84;
-    Rc[4] = t85;
-    const real t86 = t19 * Rt[3];
-    const real t87 = t28 * Rt[4];
-    const real t88 = t86 + t87;
-    const real t89 = t35 * Rt[5];
-    const real t90 = t88 + t89;
-    Rc[5] = t90;
-    const real t91 = t11 * Rt[6];
-    const real t92 = t21 * Rt[7];
-    const real t93 = t91 + t92;
-    const real t94 = t30 * Rt[8];
-    const real t95 = t93 + t94;
-    Rc[6] = t95;
-    const real t96 = t15 * Rt[6];
-    const real t97 = t24 * Rt[7];
-    const real t98 = t96 + t97;
-    const real t99 = t32 * Rt[8];
-    const real t100 = t98 + t99;
-    Rc[7] = t100;
-    const real t101 = t19 * Rt[6];
-    const real t102 = t28 * Rt[7];
-    const real t103 = t101 + t102;
-    const real t104 = t35 * Rt[8];
-    const real t105 = t103 + t104;
-    Rc[8] = t105;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t106 = motion_I[0] * t65;
-    const real t107 = motion_I[1] * t80;
-    const real t108 = t106 + t107;
-    const real t109 = motion_I[2] * t95;
-    const real t110 = t108 + t109;
-    const real t111 = u[0] + t110;
-    motion[0] = t111;
-    const real t112 = motion_I[0] * t70;
-    const real t113 = motion_I[1] * t85;
-    const real t114 = t112 + t113;
-    const real t115 = motion_I[2] * t100;
-    const real t116 = t114 + t115;
-    const real t117 = u[1] + t116;
-    motion[1] = t117;
-    const real t118 = motion_I[0] * t75;
-    const real t119 = motion_I[1] * t90;
-    const real t120 = t118 + t119;
-    const real t121 = motion_I[2] * t105;
-    const real t122 = t120 + t121;
-    const real t123 = u[2] + t122;
-    motion[2] = t123;
-    const real t124 = motion_I[3] * t65;
-    const real t125 = motion_I[4] * t80;
-    const real t126 = t124 + t125;
-    const real t127 = motion_I[5] * t95;
-    const real t128 = t126 + t127;
-    const real t129 = u[2] * t116;
-    const real t130 = u[1] * t122;
-    const real t131 = t129 - t130;
-    const real t132 = s[0] + t131;
-    const real t133 = t128 + t132;
-    motion[3] = t133;
-    const real t134 = motion_I[3] * t70;
-    const real t135 = motion_I[4] * t85;
-    const real t136 = t134 + t135;
-    const real t137 = motion_I[5] * t100;
-    const real t138 = t136 + t137;
-    const real t139 = u[0] * t122;
-    const real t140 = u[2] * t110;
-    const real t141 = t139 - t140;
-    const real t142 = s[1] + t141;
-    const real t143 = t138 + t142;
-    motion[4] = t143;
-    const real t144 = motion_I[3] * t75;
-    const real t145 = motion_I[4] * t90;
-    const real t146 = t144 + t145;
-    const real t147 = motion_I[5] * t105;
-    const real t148 = t146 + t147;
-    const real t149 = u[1] * t110;
-    const real t150 = u[0] * t116;
-    const real t151 = t149 - t150;
-    const real t152 = s[2] + t151;
-    const real t153 = t148 + t152;
-    motion[5] = t153;
-    const real t154 = motion_I[0] * motion_I[1];
-    const real t155 = t154 - motion_I[5];
-    const real t156 = ro[1] * t155;
-    const real t157 = motion_I[1] * motion_I[1];
-    const real t158 = motion_I[2] * motion_I[2];
-    const real t159 = t157 + t158;
-    const real t160 = ro[0] * t159;
-    const real t161 = t156 - t160;
-    const real t162 = motion_I[0] * motion_I[2];
-    const real t163 = motion_I[4] + t162;
-    const real t164 = ro[2] * t163;
-    const real t165 = t161 + t164;
-    const real t166 = motion_I[6] + t165;
-    const real t167 = t65 * t166;
-    const real t168 = motion_I[5] + t154;
-    const real t169 = ro[0] * t168;
-    const real t170 = motion_I[0] * motion_I[0];
-    const real t171 = t158 + t170;
-    const real t172 = ro[1] * t171;
-    const real t173 = t169 - t172;
-    const real t174 = motion_I[1] * motion_I[2];
-    const real t175 = t174 - motion_I[3];
-    const real t176 = ro[2] * t175;
-    const real t177 = t173 + t176;
-    const real t178 = motion_I[7] + t177;
-    const real t179 = t80 * t178;
-    const real t180 = t167 + t179;
-    const real t181 = t162 - motion_I[4];
-    const real t182 = ro[0] * t181;
-    const real t183 = motion_I[3] + t174;
-    const real t184 = ro[1] * t183;
-    const real t185 = t182 + t184;
-    const real t186 = t157 + t170;
-    const real t187 = ro[2] * t186;
-    const real t188 = t185 - t187;
-    const real t189 = motion_I[8] + t188;
-    const real t190 = t95 * t189;
-    const real t191 = t180 + t190;
-    motion[6] = t191;
-    const real t192 = t70 * t166;
-    const real t193 = t85 * t178;
-    const real t194 = t192 + t193;
-    const real t195 = t100 * t189;
-    const real t196 = t194 + t195;
-    motion[7] = t196;
-    const real t197 = t75 * t166;
-    const real t198 = t90 * t178;
-    const real t199 = t197 + t198;
-    const real t200 = t105 * t189;
-    const real t201 = t199 + t200;
-    motion[8] = t201;
-    return 0;
+  (void)p;
+  real t0 = q[2] * q[2];
+  real t1 = q[3] * q[3];
+  real t4 = q[1] * q[1];
+  real t9 = 1.0 / (t1 + (t0 + (q[0] * q[0] + t4))) * 2.0;
+  real t11 = 1.0 - (t0 + t1) * t9;
+  R[0] = t11;
+  real t12 = q[1] * q[2];
+  real t13 = q[0] * q[3];
+  real t15 = t9 * (t12 - t13);
+  R[1] = t15;
+  real t16 = q[0] * q[2];
+  real t17 = q[1] * q[3];
+  real t19 = t9 * (t16 + t17);
+  R[2] = t19;
+  real t21 = t9 * (t12 + t13);
+  R[3] = t21;
+  real t24 = 1.0 - t9 * (t1 + t4);
+  R[4] = t24;
+  real t25 = q[2] * q[3];
+  real t26 = q[0] * q[1];
+  real t28 = t9 * (t25 - t26);
+  R[5] = t28;
+  real t30 = t9 * (t17 - t16);
+  R[6] = t30;
+  real t32 = t9 * (t25 + t26);
+  R[7] = t32;
+  real t35 = 1.0 - t9 * (t0 + t4);
+  R[8] = t35;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = H[7] = H[8] = 0.0;
+  H[9] = 1.0;
+  H[10] = H[11] = H[12] = 0.0;
+  H[13] = 1.0;
+  H[14] = H[15] = H[16] = 0.0;
+  H[17] = 1.0;
+  v[0] = v[1] = v[2] = 0.0;
+  w[0] = u[0];
+  w[1] = u[1];
+  w[2] = u[2];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = -((q[3] * u[2] + (q[1] * u[0] + q[2] * u[1])) * 0.5);
+  qdot[1] = 0.5 * (q[0] * u[0] + q[2] * u[2] - q[3] * u[1]);
+  qdot[2] = 0.5 * (q[3] * u[0] + (q[0] * u[1] - q[1] * u[2]));
+  qdot[3] = 0.5 * (q[0] * u[2] + q[1] * u[1] - q[2] * u[0]);
+  real t65 = t11 * Rt[0] + t21 * Rt[1] + t30 * Rt[2];
+  Rc[0] = t65;
+  real t70 = t15 * Rt[0] + t24 * Rt[1] + t32 * Rt[2];
+  Rc[1] = t70;
+  real t75 = t19 * Rt[0] + t28 * Rt[1] + t35 * Rt[2];
+  Rc[2] = t75;
+  real t80 = t11 * Rt[3] + t21 * Rt[4] + t30 * Rt[5];
+  Rc[3] = t80;
+  real t85 = t15 * Rt[3] + t24 * Rt[4] + t32 * Rt[5];
+  Rc[4] = t85;
+  real t90 = t19 * Rt[3] + t28 * Rt[4] + t35 * Rt[5];
+  Rc[5] = t90;
+  real t95 = t11 * Rt[6] + t21 * Rt[7] + t30 * Rt[8];
+  Rc[6] = t95;
+  real t100 = t15 * Rt[6] + t24 * Rt[7] + t32 * Rt[8];
+  Rc[7] = t100;
+  real t105 = t19 * Rt[6] + t28 * Rt[7] + t35 * Rt[8];
+  Rc[8] = t105;
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t110 = motion_I[0] * t65 + motion_I[1] * t80 + motion_I[2] * t95;
+  motion[0] = u[0] + t110;
+  real t116 = motion_I[0] * t70 + motion_I[1] * t85 + motion_I[2] * t100;
+  motion[1] = u[1] + t116;
+  real t122 = motion_I[0] * t75 + motion_I[1] * t90 + motion_I[2] * t105;
+  motion[2] = u[2] + t122;
+  motion[3] = motion_I[3] * t65 + motion_I[4] * t80 + motion_I[5] * t95 + (s[0] + (u[2] * t116 -
+    u[1] * t122));
+  motion[4] = motion_I[3] * t70 + motion_I[4] * t85 + motion_I[5] * t100 + (s[1] + (u[0] * t122 -
+    u[2] * t110));
+  motion[5] = motion_I[3] * t75 + motion_I[4] * t90 + motion_I[5] * t105 + (s[2] + (u[1] * t110 -
+    u[0] * t116));
+  real t154 = motion_I[0] * motion_I[1];
+  real t157 = motion_I[1] * motion_I[1];
+  real t158 = motion_I[2] * motion_I[2];
+  real t162 = motion_I[0] * motion_I[2];
+  real t166 = motion_I[6] + (ro[1] * (t154 - motion_I[5]) - ro[0] * (t157 + t158) + ro[2] *
+    (motion_I[4] + t162));
+  real t170 = motion_I[0] * motion_I[0];
+  real t174 = motion_I[1] * motion_I[2];
+  real t178 = motion_I[7] + (ro[0] * (motion_I[5] + t154) - ro[1] * (t158 + t170) + ro[2] * (t174 -
+    motion_I[3]));
+  real t189 = motion_I[8] + (ro[0] * (t162 - motion_I[4]) + ro[1] * (motion_I[3] + t174) - ro[2] *
+    (t157 + t170));
+  motion[6] = t65 * t166 + t80 * t178 + t95 * t189;
+  motion[7] = t70 * t166 + t85 * t178 + t100 * t189;
+  motion[8] = t75 * t166 + t90 * t178 + t105 * t189;
+  return 0;
 }
 
-static int mstmm_hinge_ball_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_ball_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 4, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1775,617 +651,184 @@ static const mstmm_port mstmm_hinge_ball_body_motion_outputs[] = {
  * out W[3][3] slopes of the rows by load, rotors and laws
  * out H[6][3] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_ball_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_ball_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)sq;
-    const real t0 = q[3] * q[3];
-    const real t1 = q[2] * q[2];
-    const real t2 = q[0] * q[0];
-    const real t3 = q[1] * q[1];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = 1.0 / t6;
-    const real t8 = t7 * 2.0;
-    const real t9 = q[2] * q[3];
-    const real t10 = q[0] * q[1];
-    const real t11 = t9 + t10;
-    const real t12 = t8 * t11;
-    const real t13 = q[3] * along[1];
-    const real t14 = q[1] * along[3];
-    const real t15 = t13 + t14;
-    const real t16 = q[2] * along[0];
-    const real t17 = q[0] * along[2];
-    const real t18 = t16 + t17;
-    const real t19 = t15 - t18;
-    const real t20 = t8 * t19;
-    const real t21 = q[1] * q[3];
-    const real t22 = q[0] * q[2];
-    const real t23 = t21 - t22;
-    const real t24 = q[1] * along[1];
-    const real t25 = t24 + t24;
-    const real t26 = q[0] * along[0];
-    const real t27 = t26 + t26;
-    const real t28 = t25 + t27;
-    const real t29 = q[2] * along[2];
-    const real t30 = t29 + t29;
-    const real t31 = t28 + t30;
-    const real t32 = q[3] * along[3];
-    const real t33 = t32 + t32;
-    const real t34 = t31 + t33;
-    const real t35 = t7 * t34;
-    const real t36 = t35 / t6;
-    const real t37 = 2.0 * t36;
-    const real t38 = t23 * t37;
-    const real t39 = t20 - t38;
-    const real t40 = t12 * t39;
-    const real t41 = q[1] * q[2];
-    const real t42 = q[0] * q[3];
-    const real t43 = t41 - t42;
-    const real t44 = t8 * t43;
-    const real t45 = t1 + t0;
-    const real t46 = t45 * t37;
-    const real t47 = t30 + t33;
-    const real t48 = t8 * t47;
-    const real t49 = t46 - t48;
-    const real t50 = t44 * t49;
-    const real t51 = t0 + t3;
-    const real t52 = t8 * t51;
-    const real t53 = 1.0 - t52;
-    const real t54 = q[3] * along[0];
-    const real t55 = q[0] * along[3];
-    const real t56 = t54 + t55;
-    const real t57 = q[2] * along[1];
-    const real t58 = q[1] * along[2];
-    const real t59 = t57 + t58;
-    const real t60 = t56 + t59;
-    const real t61 = t8 * t60;
-    const real t62 = t41 + t42;
-    const real t63 = t62 * t37;
-    const real t64 = t61 - t63;
-    const real t65 = t53 * t64;
-    const real t66 = t50 + t65;
-    const real t67 = t40 + t66;
-    const real t68 = motion[1] - u[1];
-    const real t69 = t67 * t68;
-    const real t70 = t8 * t23;
-    const real t71 = t1 + t3;
-    const real t72 = t71 * t37;
-    const real t73 = t25 + t30;
-    const real t74 = t8 * t73;
-    const real t75 = t72 - t74;
-    const real t76 = t70 * t75;
-    const real t77 = t45 * t8;
-    const real t78 = 1.0 - t77;
-    const real t79 = t15 + t18;
-    const real t80 = t8 * t79;
-    const real t81 = t22 + t21;
-    const real t82 = t81 * t37;
-    const real t83 = t80 - t82;
-    const real t84 = t78 * t83;
-    const real t85 = t8 * t62;
-    const real t86 = q[3] * along[2];
-    const real t87 = q[2] * along[3];
-    const real t88 = t86 + t87;
-    const real t89 = q[1] * along[0];
-    const real t90 = q[0] * along[1];
-    const real t91 = t89 + t90;
-    const real t92 = t88 - t91;
-    const real t93 = t8 * t92;
-    const real t94 = t9 - t10;
-    const real t95 = t94 * t37;
-    const real t96 = t93 - t95;
-    const real t97 = t85 * t96;
-    const real t98 = t84 + t97;
-    const real t99 = t76 + t98;
-    const real t100 = motion[2] - u[2];
-    const real t101 = t99 * t100;
-    const real t102 = t69 - t101;
-    const real t103 = rate[0] + t102;
-    B[0] = t103;
-    const real t104 = t8 * t71;
-    const real t105 = 1.0 - t104;
-    const real t106 = t91 + t88;
-    const real t107 = t8 * t106;
-    const real t108 = t11 * t37;
-    const real t109 = t107 - t108;
-    const real t110 = t105 * t109;
-    const real t111 = t8 * t81;
-    const real t112 = t59 - t56;
-    const real t113 = t8 * t112;
-    const real t114 = t43 * t37;
-    const real t115 = t113 - t114;
-    const real t116 = t111 * t115;
-    const real t117 = t8 * t94;
-    const real t118 = t51 * t37;
-    const real t119 = t25 + t33;
-    const real t120 = t8 * t119;
-    const real t121 = t118 - t120;
-    const real t122 = t117 * t121;
-    const real t123 = t116 + t122;
-    const real t124 = t110 + t123;
-    const real t125 = t124 * t100;
-    const real t126 = motion[0] - u[0];
-    const real t127 = t67 * t126;
-    const real t128 = t125 - t127;
-    B[1] = t128;
-    const real t129 = t99 * t126;
-    const real t130 = t124 * t68;
-    const real t131 = t129 - t130;
-    B[2] = t131;
-    const real t132 = u[2] * t128;
-    const real t133 = u[1] * t131;
-    const real t134 = t132 - t133;
-    const real t135 = u[2] * t126;
-    const real t136 = u[0] * t100;
-    const real t137 = t135 - t136;
-    const real t138 = t137 - s[1];
-    const real t139 = motion[4] + t138;
-    const real t140 = t67 * t139;
-    const real t141 = u[0] * t68;
-    const real t142 = u[1] * t126;
-    const real t143 = t141 - t142;
-    const real t144 = t143 - s[2];
-    const real t145 = motion[5] + t144;
-    const real t146 = t99 * t145;
-    const real t147 = t140 - t146;
-    const real t148 = scale[0] + t147;
-    const real t149 = t134 + t148;
-    B[3] = t149;
-    const real t150 = u[0] * t131;
-    const real t151 = u[2] * t102;
-    const real t152 = t150 - t151;
-    const real t153 = t124 * t145;
-    const real t154 = rate[0] * t100;
-    const real t155 = u[1] * t100;
-    const real t156 = u[2] * t68;
-    const real t157 = t155 - t156;
-    const real t158 = t157 - s[0];
-    const real t159 = motion[3] + t158;
-    const real t160 = t67 * t159;
-    const real t161 = t154 - t160;
-    const real t162 = t153 + t161;
-    const real t163 = t152 + t162;
-    B[4] = t163;
-    const real t164 = u[1] * t102;
-    const real t165 = u[0] * t128;
-    const real t166 = t164 - t165;
-    const real t167 = t99 * t159;
-    const real t168 = rate[0] * t68;
-    const real t169 = t167 - t168;
-    const real t170 = t124 * t139;
-    const real t171 = t169 - t170;
-    const real t172 = t166 + t171;
-    B[5] = t172;
-    const real t173 = motion[7] * t67;
-    const real t174 = motion[8] * t99;
-    const real t175 = t173 - t174;
-    B[6] = t175;
-    const real t176 = motion[8] * t124;
-    const real t177 = motion[6] * t67;
-    const real t178 = t176 - t177;
-    B[7] = t178;
-    const real t179 = motion[6] * t99;
-    const real t180 = motion[7] * t124;
-    const real t181 = t179 - t180;
-    B[8] = t181;
-    const real t182 = q[3] * along[5];
-    const real t183 = q[1] * along[7];
-    const real t184 = t182 + t183;
-    const real t185 = q[2] * along[4];
-    const real t186 = q[0] * along[6];
-    const real t187 = t185 + t186;
-    const real t188 = t184 - t187;
-    const real t189 = t8 * t188;
-    const real t190 = q[1] * along[5];
-    const real t191 = t190 + t190;
-    const real t192 = q[0] * along[4];
-    const real t193 = t192 + t192;
-    const real t194 = t191 + t193;
-    const real t195 = q[2] * along[6];
-    const real t196 = t195 + t195;
-    const real t197 = t194 + t196;
-    const real t198 = q[3] * along[7];
-    const real t199 = t198 + t198;
-    const real t200 = t197 + t199;
-    const real t201 = t7 * t200;
-    const real t202 = t201 / t6;
-    const real t203 = 2.0 * t202;
-    const real t204 = t23 * t203;
-    const real t205 = t189 - t204;
-    const real t206 = t12 * t205;
-    const real t207 = t45 * t203;
-    const real t208 = t196 + t199;
-    const real t209 = t8 * t208;
-    const real t210 = t207 - t209;
-    const real t211 = t44 * t210;
-    const real t212 = q[3] * along[4];
-    const real t213 = q[0] * along[7];
-    const real t214 = t212 + t213;
-    const real t215 = q[2] * along[5];
-    const real t216 = q[1] * along[6];
-    const real t217 = t215 + t216;
-    const real t218 = t214 + t217;
-    const real t219 = t8 * t218;
-    const real t220 = t62 * t203;
-    const real t221 = t219 - t220;
-    const real t222 = t53 * t221;
-    const real t223 = t211 + t222;
-    const real t224 = t206 + t223;
-    const real t225 = t68 * t224;
-    const real t226 = t71 * t203;
-    const real t227 = t191 + t196;
-    const real t228 = t8 * t227;
-    const real t229 = t226 - t228;
-    const real t230 = t70 * t229;
-    const real t231 = t184 + t187;
-    const real t232 = t8 * t231;
-    const real t233 = t81 * t203;
-    const real t234 = t232 - t233;
-    const real t235 = t78 * t234;
-    const real t236 = q[3] * along[6];
-    const real t237 = q[2] * along[7];
-    const real t238 = t236 + t237;
-    const real t239 = q[1] * along[4];
-    const real t240 = q[0] * along[5];
-    const real t241 = t239 + t240;
-    const real t242 = t238 - t241;
-    const real t243 = t8 * t242;
-    const real t244 = t94 * t203;
-    const real t245 = t243 - t244;
-    const real t246 = t85 * t245;
-    const real t247 = t235 + t246;
-    const real t248 = t230 + t247;
-    const real t249 = t100 * t248;
-    const real t250 = t225 - t249;
-    B[9] = t250;
-    const real t251 = t241 + t238;
-    const real t252 = t8 * t251;
-    const real t253 = t11 * t203;
-    const real t254 = t252 - t253;
-    const real t255 = t105 * t254;
-    const real t256 = t217 - t214;
-    const real t257 = t8 * t256;
-    const real t258 = t43 * t203;
-    const real t259 = t257 - t258;
-    const real t260 = t111 * t259;
-    const real t261 = t51 * t203;
-    const real t262 = t191 + t199;
-    const real t263 = t8 * t262;
-    const real t264 = t261 - t263;
-    const real t265 = t117 * t264;
-    const real t266 = t260 + t265;
-    const real t267 = t255 + t266;
-    const real t268 = t100 * t267;
-    const real t269 = t126 * t224;
-    const real t270 = t268 - t269;
-    const real t271 = rate[0] + t270;
-    B[10] = t271;
-    const real t272 = t126 * t248;
-    const real t273 = t68 * t267;
-    const real t274 = t272 - t273;
-    B[11] = t274;
-    const real t275 = u[2] * t270;
-    const real t276 = u[1] * t274;
-    const real t277 = t275 - t276;
-    const real t278 = t139 * t224;
-    const real t279 = t278 - t154;
-    const real t280 = t145 * t248;
-    const real t281 = t279 - t280;
-    const real t282 = t277 + t281;
-    B[12] = t282;
-    const real t283 = u[0] * t274;
-    const real t284 = u[2] * t250;
-    const real t285 = t283 - t284;
-    const real t286 = t145 * t267;
-    const real t287 = t159 * t224;
-    const real t288 = t286 - t287;
-    const real t289 = scale[0] + t288;
-    const real t290 = t285 + t289;
-    B[13] = t290;
-    const real t291 = u[1] * t250;
-    const real t292 = u[0] * t270;
-    const real t293 = t291 - t292;
-    const real t294 = t159 * t248;
-    const real t295 = rate[0] * t126;
-    const real t296 = t294 + t295;
-    const real t297 = t139 * t267;
-    const real t298 = t296 - t297;
-    const real t299 = t293 + t298;
-    B[14] = t299;
-    const real t300 = motion[7] * t224;
-    const real t301 = motion[8] * t248;
-    const real t302 = t300 - t301;
-    B[15] = t302;
-    const real t303 = motion[8] * t267;
-    const real t304 = motion[6] * t224;
-    const real t305 = t303 - t304;
-    B[16] = t305;
-    const real t306 = motion[6] * t248;
-    const real t307 = motion[7] * t267;
-    const real t308 = t306 - t307;
-    B[17] = t308;
-    const real t309 = q[3] * along[9];
-    const real t310 = q[1] * along[11];
-    const real t311 = t309 + t310;
-    const real t312 = q[2] * along[8];
-    const real t313 = q[0] * along[10];
-    const real t314 = t312 + t313;
-    const real t315 = t311 - t314;
-    const real t316 = t8 * t315;
-    const real t317 = q[1] * along[9];
-    const real t318 = t317 + t317;
-    const real t319 = q[0] * along[8];
-    const real t320 = t319 + t319;
-    const real t321 = t318 + t320;
-    const real t322 = q[2] * along[10];
-    const real t323 = t322 + t322;
-    const real t324 = t321 + t323;
-    const real t325 = q[3] * along[11];
-    const real t326 = t325 + t325;
-    const real t327 = t324 + t326;
-    const real t328 = t7 * t327;
-    const real t329 = t328 / t6;
-    const real t330 = 2.0 * t329;
-    const real t331 = t23 * t330;
-    const real t332 = t316 - t331;
-    const real t333 = t12 * t332;
-    const real t334 = t45 * t330;
-    const real t335 = t323 + t326;
-    const real t336 = t8 * t335;
-    const real t337 = t334 - t336;
-    const real t338 = t44 * t337;
-    const real t339 = q[3] * along[8];
-    const real t340 = q[0] * along[11];
-    const real t341 = t339 + t340;
-    const real t342 = q[2] * along[9];
-    const real t343 = q[1] * along[10];
-    const real t344 = t342 + t343;
-    const real t345 = t341 + t344;
-    const real t346 = t8 * t345;
-    const real t347 = t62 * t330;
-    const real t348 = t346 - t347;
-    const real t349 = t53 * t348;
-    const real t350 = t338 + t349;
-    const real t351 = t333 + t350;
-    const real t352 = t68 * t351;
-    const real t353 = t71 * t330;
-    const real t354 = t318 + t323;
-    const real t355 = t8 * t354;
-    const real t356 = t353 - t355;
-    const real t357 = t70 * t356;
-    const real t358 = t311 + t314;
-    const real t359 = t8 * t358;
-    const real t360 = t81 * t330;
-    const real t361 = t359 - t360;
-    const real t362 = t78 * t361;
-    const real t363 = q[3] * along[10];
-    const real t364 = q[2] * along[11];
-    const real t365 = t363 + t364;
-    const real t366 = q[1] * along[8];
-    const real t367 = q[0] * along[9];
-    const real t368 = t366 + t367;
-    const real t369 = t365 - t368;
-    const real t370 = t8 * t369;
-    const real t371 = t94 * t330;
-    const real t372 = t370 - t371;
-    const real t373 = t85 * t372;
-    const real t374 = t362 + t373;
-    const real t375 = t357 + t374;
-    const real t376 = t100 * t375;
-    const real t377 = t352 - t376;
-    B[18] = t377;
-    const real t378 = t368 + t365;
-    const real t379 = t8 * t378;
-    const real t380 = t11 * t330;
-    const real t381 = t379 - t380;
-    const real t382 = t105 * t381;
-    const real t383 = t344 - t341;
-    const real t384 = t8 * t383;
-    const real t385 = t43 * t330;
-    const real t386 = t384 - t385;
-    const real t387 = t111 * t386;
-    const real t388 = t51 * t330;
-    const real t389 = t318 + t326;
-    const real t390 = t8 * t389;
-    const real t391 = t388 - t390;
-    const real t392 = t117 * t391;
-    const real t393 = t387 + t392;
-    const real t394 = t382 + t393;
-    const real t395 = t100 * t394;
-    const real t396 = t126 * t351;
-    const real t397 = t395 - t396;
-    B[19] = t397;
-    const real t398 = t126 * t375;
-    const real t399 = t68 * t394;
-    const real t400 = t398 - t399;
-    const real t401 = rate[0] + t400;
-    B[20] = t401;
-    const real t402 = u[2] * t397;
-    const real t403 = u[1] * t400;
-    const real t404 = t402 - t403;
-    const real t405 = t139 * t351;
-    const real t406 = t168 + t405;
-    const real t407 = t145 * t375;
-    const real t408 = t406 - t407;
-    const real t409 = t404 + t408;
-    B[21] = t409;
-    const real t410 = u[0] * t400;
-    const real t411 = u[2] * t377;
-    const real t412 = t410 - t411;
-    const real t413 = t145 * t394;
-    const real t414 = t159 * t351;
-    const real t415 = t295 + t414;
-    const real t416 = t413 - t415;
-    const real t417 = t412 + t416;
-    B[22] = t417;
-    const real t418 = u[1] * t377;
-    const real t419 = u[0] * t397;
-    const real t420 = t418 - t419;
-    const real t421 = t159 * t375;
-    const real t422 = t139 * t394;
-    const real t423 = t421 - t422;
-    const real t424 = scale[0] + t423;
-    const real t425 = t420 + t424;
-    B[23] = t425;
-    const real t426 = motion[7] * t351;
-    const real t427 = motion[8] * t375;
-    const real t428 = t426 - t427;
-    B[24] = t428;
-    const real t429 = motion[8] * t394;
-    const real t430 = motion[6] * t351;
-    const real t431 = t429 - t430;
-    B[25] = t431;
-    const real t432 = motion[6] * t375;
-    const real t433 = motion[7] * t394;
-    const real t434 = t432 - t433;
-    B[26] = t434;
-    const real t435 = f[2] * t99;
-    const real t436 = f[1] * t67;
-    const real t437 = t435 - t436;
-    G[0] = t437;
-    const real t438 = f[0] * t67;
-    const real t439 = f[2] * t124;
-    const real t440 = t438 - t439;
-    G[1] = t440;
-    const real t441 = f[1] * t124;
-    const real t442 = f[0] * t99;
-    const real t443 = t441 - t442;
-    G[2] = t443;
-    const real t444 = f[5] * t99;
-    const real t445 = f[4] * t67;
-    const real t446 = t444 - t445;
-    G[3] = t446;
-    const real t447 = f[3] * t67;
-    const real t448 = f[5] * t124;
-    const real t449 = t447 - t448;
-    G[4] = t449;
-    const real t450 = f[4] * t124;
-    const real t451 = f[3] * t99;
-    const real t452 = t450 - t451;
-    G[5] = t452;
-    const real t453 = f[2] * t248;
-    const real t454 = f[1] * t224;
-    const real t455 = t453 - t454;
-    G[6] = t455;
-    const real t456 = f[0] * t224;
-    const real t457 = f[2] * t267;
-    const real t458 = t456 - t457;
-    G[7] = t458;
-    const real t459 = f[1] * t267;
-    const real t460 = f[0] * t248;
-    const real t461 = t459 - t460;
-    G[8] = t461;
-    const real t462 = f[5] * t248;
-    const real t463 = f[4] * t224;
-    const real t464 = t462 - t463;
-    G[9] = t464;
-    const real t465 = f[3] * t224;
-    const real t466 = f[5] * t267;
-    const real t467 = t465 - t466;
-    G[10] = t467;
-    const real t468 = f[4] * t267;
-    const real t469 = f[3] * t248;
-    const real t470 = t468 - t469;
-    G[11] = t470;
-    const real t471 = f[2] * t375;
-    const real t472 = f[1] * t351;
-    const real t473 = t471 - t472;
-    G[12] = t473;
-    const real t474 = f[0] * t351;
-    const real t475 = f[2] * t394;
-    const real t476 = t474 - t475;
-    G[13] = t476;
-    const real t477 = f[1] * t394;
-    const real t478 = f[0] * t375;
-    const real t479 = t477 - t478;
-    G[14] = t479;
-    const real t480 = f[5] * t375;
-    const real t481 = f[4] * t351;
-    const real t482 = t480 - t481;
-    G[15] = t482;
-    const real t483 = f[3] * t351;
-    const real t484 = f[5] * t394;
-    const real t485 = t483 - t484;
-    G[16] = t485;
-    const real t486 = f[4] * t394;
-    const real t487 = f[3] * t375;
-    const real t488 = t486 - t487;
-    G[17] = t488;
-    const real t489 = J[0] * scale[0];
-    const real t490 = t489 - laws[0];
-    W[0] = t490;
-    const real t491 = -laws[1];
-    W[1] = t491;
-    const real t492 = -laws[2];
-    W[2] = t492;
-    const real t493 = -laws[3];
-    W[3] = t493;
-    const real t494 = J[1] * scale[0];
-    const real t495 = t494 - laws[4];
-    W[4] = t495;
-    const real t496 = -laws[5];
-    W[5] = t496;
-    const real t497 = -laws[6];
-    W[6] = t497;
-    const real t498 = -laws[7];
-    W[7] = t498;
-    const real t499 = J[2] * scale[0];
-    const real t500 = t499 - laws[8];
-    W[8] = t500;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 1.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 1.0;
-    H[14] = 0.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 1.0;
-    return 0;
+  (void)p;
+  (void)sq;
+  real t0 = q[3] * q[3];
+  real t1 = q[2] * q[2];
+  real t3 = q[1] * q[1];
+  real t6 = t0 + (t1 + (q[0] * q[0] + t3));
+  real t7 = 1.0 / t6;
+  real t8 = t7 * 2.0;
+  real t9 = q[2] * q[3];
+  real t10 = q[0] * q[1];
+  real t11 = t9 + t10;
+  real t12 = t8 * t11;
+  real t15 = q[3] * along[1] + q[1] * along[3];
+  real t18 = q[2] * along[0] + q[0] * along[2];
+  real t21 = q[1] * q[3];
+  real t22 = q[0] * q[2];
+  real t23 = t21 - t22;
+  real t24 = q[1] * along[1];
+  real t25 = t24 + t24;
+  real t26 = q[0] * along[0];
+  real t29 = q[2] * along[2];
+  real t30 = t29 + t29;
+  real t32 = q[3] * along[3];
+  real t33 = t32 + t32;
+  real t37 = 2.0 * (t7 * (t25 + (t26 + t26) + t30 + t33) / t6);
+  real t41 = q[1] * q[2];
+  real t42 = q[0] * q[3];
+  real t43 = t41 - t42;
+  real t44 = t8 * t43;
+  real t45 = t1 + t0;
+  real t51 = t0 + t3;
+  real t53 = 1.0 - t8 * t51;
+  real t56 = q[3] * along[0] + q[0] * along[3];
+  real t59 = q[2] * along[1] + q[1] * along[2];
+  real t62 = t41 + t42;
+  real t67 = t12 * (t8 * (t15 - t18) - t23 * t37) + (t44 * (t45 * t37 - t8 * (t30 + t33)) + t53 *
+    (t8 * (t56 + t59) - t62 * t37));
+  real t68 = motion[1] - u[1];
+  real t70 = t8 * t23;
+  real t71 = t1 + t3;
+  real t78 = 1.0 - t45 * t8;
+  real t81 = t22 + t21;
+  real t85 = t8 * t62;
+  real t88 = q[3] * along[2] + q[2] * along[3];
+  real t91 = q[1] * along[0] + q[0] * along[1];
+  real t94 = t9 - t10;
+  real t99 = t70 * (t71 * t37 - t8 * (t25 + t30)) + (t78 * (t8 * (t15 + t18) - t81 * t37) + t85 *
+    (t8 * (t88 - t91) - t94 * t37));
+  real t100 = motion[2] - u[2];
+  real t102 = t67 * t68 - t99 * t100;
+  B[0] = rate[0] + t102;
+  real t105 = 1.0 - t8 * t71;
+  real t111 = t8 * t81;
+  real t117 = t8 * t94;
+  real t124 = t105 * (t8 * (t91 + t88) - t11 * t37) + (t111 * (t8 * (t59 - t56) - t43 * t37) + t117
+    * (t51 * t37 - t8 * (t25 + t33)));
+  real t126 = motion[0] - u[0];
+  real t128 = t124 * t100 - t67 * t126;
+  B[1] = t128;
+  real t131 = t99 * t126 - t124 * t68;
+  B[2] = t131;
+  real t139 = motion[4] + (u[2] * t126 - u[0] * t100 - s[1]);
+  real t145 = motion[5] + (u[0] * t68 - u[1] * t126 - s[2]);
+  B[3] = u[2] * t128 - u[1] * t131 + (scale[0] + (t67 * t139 - t99 * t145));
+  real t154 = rate[0] * t100;
+  real t159 = motion[3] + (u[1] * t100 - u[2] * t68 - s[0]);
+  B[4] = u[0] * t131 - u[2] * t102 + (t124 * t145 + (t154 - t67 * t159));
+  real t168 = rate[0] * t68;
+  B[5] = u[1] * t102 - u[0] * t128 + (t99 * t159 - t168 - t124 * t139);
+  B[6] = motion[7] * t67 - motion[8] * t99;
+  B[7] = motion[8] * t124 - motion[6] * t67;
+  B[8] = motion[6] * t99 - motion[7] * t124;
+  real t184 = q[3] * along[5] + q[1] * along[7];
+  real t187 = q[2] * along[4] + q[0] * along[6];
+  real t190 = q[1] * along[5];
+  real t191 = t190 + t190;
+  real t192 = q[0] * along[4];
+  real t195 = q[2] * along[6];
+  real t196 = t195 + t195;
+  real t198 = q[3] * along[7];
+  real t199 = t198 + t198;
+  real t203 = 2.0 * (t7 * (t191 + (t192 + t192) + t196 + t199) / t6);
+  real t214 = q[3] * along[4] + q[0] * along[7];
+  real t217 = q[2] * along[5] + q[1] * along[6];
+  real t224 = t12 * (t8 * (t184 - t187) - t23 * t203) + (t44 * (t45 * t203 - t8 * (t196 + t199)) +
+    t53 * (t8 * (t214 + t217) - t62 * t203));
+  real t238 = q[3] * along[6] + q[2] * along[7];
+  real t241 = q[1] * along[4] + q[0] * along[5];
+  real t248 = t70 * (t71 * t203 - t8 * (t191 + t196)) + (t78 * (t8 * (t184 + t187) - t81 * t203) +
+    t85 * (t8 * (t238 - t241) - t94 * t203));
+  real t250 = t68 * t224 - t100 * t248;
+  B[9] = t250;
+  real t267 = t105 * (t8 * (t241 + t238) - t11 * t203) + (t111 * (t8 * (t217 - t214) - t43 * t203) +
+    t117 * (t51 * t203 - t8 * (t191 + t199)));
+  real t270 = t100 * t267 - t126 * t224;
+  B[10] = rate[0] + t270;
+  real t274 = t126 * t248 - t68 * t267;
+  B[11] = t274;
+  B[12] = u[2] * t270 - u[1] * t274 + (t139 * t224 - t154 - t145 * t248);
+  B[13] = u[0] * t274 - u[2] * t250 + (scale[0] + (t145 * t267 - t159 * t224));
+  real t295 = rate[0] * t126;
+  B[14] = u[1] * t250 - u[0] * t270 + (t159 * t248 + t295 - t139 * t267);
+  B[15] = motion[7] * t224 - motion[8] * t248;
+  B[16] = motion[8] * t267 - motion[6] * t224;
+  B[17] = motion[6] * t248 - motion[7] * t267;
+  real t311 = q[3] * along[9] + q[1] * along[11];
+  real t314 = q[2] * along[8] + q[0] * along[10];
+  real t317 = q[1] * along[9];
+  real t318 = t317 + t317;
+  real t319 = q[0] * along[8];
+  real t322 = q[2] * along[10];
+  real t323 = t322 + t322;
+  real t325 = q[3] * along[11];
+  real t326 = t325 + t325;
+  real t330 = 2.0 * (t7 * (t318 + (t319 + t319) + t323 + t326) / t6);
+  real t341 = q[3] * along[8] + q[0] * along[11];
+  real t344 = q[2] * along[9] + q[1] * along[10];
+  real t351 = t12 * (t8 * (t311 - t314) - t23 * t330) + (t44 * (t45 * t330 - t8 * (t323 + t326)) +
+    t53 * (t8 * (t341 + t344) - t62 * t330));
+  real t365 = q[3] * along[10] + q[2] * along[11];
+  real t368 = q[1] * along[8] + q[0] * along[9];
+  real t375 = t70 * (t71 * t330 - t8 * (t318 + t323)) + (t78 * (t8 * (t311 + t314) - t81 * t330) +
+    t85 * (t8 * (t365 - t368) - t94 * t330));
+  real t377 = t68 * t351 - t100 * t375;
+  B[18] = t377;
+  real t394 = t105 * (t8 * (t368 + t365) - t11 * t330) + (t111 * (t8 * (t344 - t341) - t43 * t330) +
+    t117 * (t51 * t330 - t8 * (t318 + t326)));
+  real t397 = t100 * t394 - t126 * t351;
+  B[19] = t397;
+  real t400 = t126 * t375 - t68 * t394;
+  B[20] = rate[0] + t400;
+  B[21] = u[2] * t397 - u[1] * t400 + (t168 + t139 * t351 - t145 * t375);
+  B[22] = u[0] * t400 - u[2] * t377 + (t145 * t394 - (t295 + t159 * t351));
+  B[23] = u[1] * t377 - u[0] * t397 + (scale[0] + (t159 * t375 - t139 * t394));
+  B[24] = motion[7] * t351 - motion[8] * t375;
+  B[25] = motion[8] * t394 - motion[6] * t351;
+  B[26] = motion[6] * t375 - motion[7] * t394;
+  G[0] = f[2] * t99 - f[1] * t67;
+  G[1] = f[0] * t67 - f[2] * t124;
+  G[2] = f[1] * t124 - f[0] * t99;
+  G[3] = f[5] * t99 - f[4] * t67;
+  G[4] = f[3] * t67 - f[5] * t124;
+  G[5] = f[4] * t124 - f[3] * t99;
+  G[6] = f[2] * t248 - f[1] * t224;
+  G[7] = f[0] * t224 - f[2] * t267;
+  G[8] = f[1] * t267 - f[0] * t248;
+  G[9] = f[5] * t248 - f[4] * t224;
+  G[10] = f[3] * t224 - f[5] * t267;
+  G[11] = f[4] * t267 - f[3] * t248;
+  G[12] = f[2] * t375 - f[1] * t351;
+  G[13] = f[0] * t351 - f[2] * t394;
+  G[14] = f[1] * t394 - f[0] * t375;
+  G[15] = f[5] * t375 - f[4] * t351;
+  G[16] = f[3] * t351 - f[5] * t394;
+  G[17] = f[4] * t394 - f[3] * t375;
+  W[0] = J[0] * scale[0] - laws[0];
+  W[1] = -laws[1];
+  W[2] = -laws[2];
+  W[3] = -laws[3];
+  W[4] = J[1] * scale[0] - laws[4];
+  W[5] = -laws[5];
+  W[6] = -laws[6];
+  W[7] = -laws[7];
+  W[8] = J[2] * scale[0] - laws[8];
+  H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = H[7] = H[8] = 0.0;
+  H[9] = 1.0;
+  H[10] = H[11] = H[12] = 0.0;
+  H[13] = 1.0;
+  H[14] = H[15] = H[16] = 0.0;
+  H[17] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_ball_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_ball_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_ball_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"laws", 9, "", 0, 0},
-    {"along", 12, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_ball_directions_outputs[] = {
-    {"B", 27, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"W", 9, "", 0, 0},
-    {"H", 18, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_ball_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_ball_q_names[] = {
     "w", "x", "y", "z",
@@ -2404,121 +847,67 @@ static const char *const mstmm_hinge_ball_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_ball_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_ball_hinge,
-        .call = mstmm_hinge_ball_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_ball_hinge_inputs,
-        .outputs = mstmm_hinge_ball_hinge_outputs,
-        .ir_hash = "a25f79457fc846ad57c99c502c61613346cdc136f94c4ae48027b33206bcaeac",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_ball_forward,
-        .call = mstmm_hinge_ball_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_ball_forward_inputs,
-        .outputs = mstmm_hinge_ball_forward_outputs,
-        .ir_hash = "561d0077aba63d2f458d22f386c8da84e89be94c5217f13082780af1b978a960",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_ball_condense,
-        .call = mstmm_hinge_ball_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_ball_condense_inputs,
-        .outputs = mstmm_hinge_ball_condense_outputs,
-        .ir_hash = "4d60674c3aa22c9648e284ab9b7fee8b0d0d3451abd606cd3f4bdc0ce6c37d3e",
-        .n_guards = 9,
-        .guards = mstmm_hinge_ball_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_ball_recover,
-        .call = mstmm_hinge_ball_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_ball_recover_inputs,
-        .outputs = mstmm_hinge_ball_recover_outputs,
-        .ir_hash = "04c1da75a12821fbb28b521392f0116d40fd4a72e4cc3b54c4534011d72da072",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_ball_hinge_slope,
-        .call = mstmm_hinge_ball_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_ball_hinge_slope_inputs,
-        .outputs = mstmm_hinge_ball_hinge_slope_outputs,
-        .ir_hash = "87c7a3a89f0eb3da74e1c84ffbf4b0235eb50c5cb125a95fc8166f28be762dfa",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_ball_rates_by_coordinates,
-        .call = mstmm_hinge_ball_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_ball_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_ball_rates_by_coordinates_outputs,
-        .ir_hash = "c4d37145330d5962083fc978fff63ba347e0b61a1b1b25d702a73a20dbb29b75",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_ball_rates_by_speeds,
-        .call = mstmm_hinge_ball_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_ball_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_ball_rates_by_speeds_outputs,
-        .ir_hash = "d13221510d31e90b77cd6d8c14b106fe83d09a3f7ac5cabac13d1d6bee02dfc0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_ball_body_motion,
-        .call = mstmm_hinge_ball_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_ball_body_motion_inputs,
-        .outputs = mstmm_hinge_ball_body_motion_outputs,
-        .ir_hash = "239ad935da777dea0cd54510b521635041cad729779c0782512bf2605fffd598",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_ball_directions,
-        .call = mstmm_hinge_ball_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_ball_directions_inputs,
-        .outputs = mstmm_hinge_ball_directions_outputs,
-        .ir_hash = "dc43523e7c2fd797bd9de94d89ed1245d16ca897d6f8557e5bcf03dc4ae1d50c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_ball_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0, 0},
+    {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m",
+    0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 4, "", 0, 0}},
+    "145c0a59c9d8d3267758ae19b87d6d476edbfc845da3f846642c5b940be6d9ad", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_ball_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "", 0,
+    0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}, {"s", 3,
+    "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m",
+    0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 4, "", 0, 0}},
+    "a379509006dd881c0e41c5d03acd9b15c343d58e7b9692c089f12d4f1595c0fc", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_ball_condense), 8, 4, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 4, "", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"G", 18, "", 0, 0}, {"g", 3, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "c4988b46ed9298cd7b22601a9bc6a05565ffcb155d19f654b3f7a3ae0e75727c", 9, (const
+    mstmm_guard[]){{1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_ball_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "", 0,
+    0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 4, "", 0, 0}, {"G", 18, "", 0, 0}, {"g", 3,
+    "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 3, "", 0, 0}, {"delta", 6,
+    "", 0, 0}}, "e1dab7786c73be7d71f61185a6e174ec68a827dd57095f81db85c5ed185cdeb0", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_ball_hinge_slope), 5, 7, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}, {"d_q", 4, "", 0, 0}, {"d_u", 3, "", 0, 0}},
+    (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 18, "", 0, 0}, {"d_v",
+    3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot", 4, "",
+    0, 0}}, "409e2b091c7f3460537c281fb26f991ec1e23fb1065b91755c7d20639e3721e2", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_ball_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 16, "", 0, 0}},
+    "829344840d37bffc06657fb4c6f7e6e6db6995857d476ab7295303c88a4fceda", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_ball_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 12, "", 0, 0}},
+    "8a22c9857496843dff760eff9552e6b6123914064bcf7c6340fe9a17c454697c", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_ball_body_motion), 7, 10, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 3, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 4, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "27fd9d69a761e66569ea5758b067c44aeaf006eb050bcbdead042fbe6a8a87f3", 0,
+    NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_ball_directions), 12, 4, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "", 0, 0}, {"s", 3, "", 0, 0}, {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"laws", 9, "", 0, 0}, {"along", 12,
+    "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1, "1/s", 0, 0}}, (const
+    mstmm_port[]){{"B", 27, "", 0, 0}, {"G", 18, "", 0, 0}, {"W", 9, "", 0, 0}, {"H", 18, "", 0,
+    0}}, "5279599bc9c1bd8b09745f500a9b30e4c8fb78a69999cc650345b281eac86999", 0, NULL},
 };
 
 const mstmm_element mstmm_hinge_ball = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "ball",
-    .hash = "5daa38496191ea57c9f2cae84026c024fc69d8b9b79b089f7f0d4e12e27a5ad3",
+    .hash = "bcc68b135f31434e217458b35226ba366072ad08c60f8f8f0a03a40607aa3e3d",
     .nq = 4,
     .nu = 3,
     .np = 0,

@@ -8,40 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_cylindrical;
-int mstmm_hinge_cylindrical_hinge(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict R, real *restrict d, real *restrict H, real *restrict v,
-    real *restrict w, real *restrict c, real *restrict qdot);
-int mstmm_hinge_cylindrical_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_cylindrical_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_cylindrical_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_cylindrical_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the cylindrical hinge
  * in  p[0] parameters
  * in  q[2] coordinates: displacement [m], angle [rad]
@@ -54,76 +20,37 @@ int mstmm_hinge_cylindrical_directions(const real *restrict p, const real *restr
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[2] coordinate rates
  */
-int mstmm_hinge_cylindrical_hinge(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict R, real *restrict d, real *restrict H, real *restrict v,
-    real *restrict w, real *restrict c, real *restrict qdot)
+int mstmm_hinge_cylindrical_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v,
+    out_t w, out_t c, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    R[0] = t0;
-    const real t1 = sin(q[1]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = q[0];
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 1.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = u[0];
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[1];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    return 0;
+  (void)p;
+  real t0 = cos(q[1]);
+  R[0] = t0;
+  real t1 = sin(q[1]);
+  R[1] = -t1;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = 0.0;
+  d[2] = q[0];
+  H[0] = H[1] = H[2] = H[3] = 0.0;
+  H[4] = 1.0;
+  H[5] = H[6] = H[7] = H[8] = H[9] = H[10] = 0.0;
+  H[11] = 1.0;
+  v[0] = v[1] = 0.0;
+  v[2] = u[0];
+  w[0] = w[1] = 0.0;
+  w[2] = u[1];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3],
+  out[4], out[5], out[6]))
 
 /* bias motion outboard of the cylindrical hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -140,177 +67,63 @@ static const mstmm_port mstmm_hinge_cylindrical_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[2] coordinate rates
  */
-int mstmm_hinge_cylindrical_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_cylindrical_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    const real t1 = Rt[0] * t0;
-    const real t2 = sin(q[1]);
-    const real t3 = Rt[1] * t2;
-    const real t4 = t1 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[1] * t0;
-    const real t6 = Rt[0] * t2;
-    const real t7 = t5 - t6;
-    Rc[1] = t7;
-    Rc[2] = Rt[2];
-    const real t8 = Rt[3] * t0;
-    const real t9 = Rt[4] * t2;
-    const real t10 = t8 + t9;
-    Rc[3] = t10;
-    const real t11 = Rt[4] * t0;
-    const real t12 = Rt[3] * t2;
-    const real t13 = t11 - t12;
-    Rc[4] = t13;
-    Rc[5] = Rt[5];
-    const real t14 = Rt[6] * t0;
-    const real t15 = Rt[7] * t2;
-    const real t16 = t14 + t15;
-    Rc[6] = t16;
-    const real t17 = Rt[7] * t0;
-    const real t18 = Rt[6] * t2;
-    const real t19 = t17 - t18;
-    Rc[7] = t19;
-    Rc[8] = Rt[8];
-    const real t20 = Rt[2] * q[0];
-    const real t21 = ro[0] + t20;
-    r[0] = t21;
-    const real t22 = Rt[5] * q[0];
-    const real t23 = ro[1] + t22;
-    r[1] = t23;
-    const real t24 = Rt[8] * q[0];
-    const real t25 = ro[2] + t24;
-    r[2] = t25;
-    const real t26 = motion_I[0] * t4;
-    const real t27 = motion_I[1] * t10;
-    const real t28 = t26 + t27;
-    const real t29 = motion_I[2] * t16;
-    const real t30 = t28 + t29;
-    motion[0] = t30;
-    const real t31 = motion_I[0] * t7;
-    const real t32 = motion_I[1] * t13;
-    const real t33 = t31 + t32;
-    const real t34 = motion_I[2] * t19;
-    const real t35 = t33 + t34;
-    motion[1] = t35;
-    const real t36 = Rt[2] * motion_I[0];
-    const real t37 = Rt[5] * motion_I[1];
-    const real t38 = t36 + t37;
-    const real t39 = Rt[8] * motion_I[2];
-    const real t40 = t38 + t39;
-    const real t41 = u[1] + t40;
-    motion[2] = t41;
-    const real t42 = motion_I[3] * t4;
-    const real t43 = motion_I[4] * t10;
-    const real t44 = t42 + t43;
-    const real t45 = motion_I[5] * t16;
-    const real t46 = t44 + t45;
-    const real t47 = u[1] * t35;
-    const real t48 = t46 + t47;
-    motion[3] = t48;
-    const real t49 = motion_I[3] * t7;
-    const real t50 = motion_I[4] * t13;
-    const real t51 = t49 + t50;
-    const real t52 = motion_I[5] * t19;
-    const real t53 = t51 + t52;
-    const real t54 = u[1] * t30;
-    const real t55 = t53 - t54;
-    motion[4] = t55;
-    const real t56 = Rt[2] * motion_I[3];
-    const real t57 = Rt[5] * motion_I[4];
-    const real t58 = t56 + t57;
-    const real t59 = Rt[8] * motion_I[5];
-    const real t60 = t58 + t59;
-    const real t61 = s[1] + t60;
-    motion[5] = t61;
-    const real t62 = motion_I[0] * motion_I[1];
-    const real t63 = t62 - motion_I[5];
-    const real t64 = t23 * t63;
-    const real t65 = motion_I[1] * motion_I[1];
-    const real t66 = motion_I[2] * motion_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = t21 * t67;
-    const real t69 = t64 - t68;
-    const real t70 = motion_I[0] * motion_I[2];
-    const real t71 = motion_I[4] + t70;
-    const real t72 = t25 * t71;
-    const real t73 = t69 + t72;
-    const real t74 = motion_I[6] + t73;
-    const real t75 = t4 * t74;
-    const real t76 = motion_I[5] + t62;
-    const real t77 = t21 * t76;
-    const real t78 = motion_I[0] * motion_I[0];
-    const real t79 = t66 + t78;
-    const real t80 = t23 * t79;
-    const real t81 = t77 - t80;
-    const real t82 = motion_I[1] * motion_I[2];
-    const real t83 = t82 - motion_I[3];
-    const real t84 = t25 * t83;
-    const real t85 = t81 + t84;
-    const real t86 = motion_I[7] + t85;
-    const real t87 = t10 * t86;
-    const real t88 = t75 + t87;
-    const real t89 = t70 - motion_I[4];
-    const real t90 = t21 * t89;
-    const real t91 = motion_I[3] + t82;
-    const real t92 = t23 * t91;
-    const real t93 = t90 + t92;
-    const real t94 = t65 + t78;
-    const real t95 = t25 * t94;
-    const real t96 = t93 - t95;
-    const real t97 = motion_I[8] + t96;
-    const real t98 = t16 * t97;
-    const real t99 = t88 + t98;
-    const real t100 = u[0] * t35;
-    const real t101 = 2.0 * t100;
-    const real t102 = t99 + t101;
-    motion[6] = t102;
-    const real t103 = t7 * t74;
-    const real t104 = t13 * t86;
-    const real t105 = t103 + t104;
-    const real t106 = t19 * t97;
-    const real t107 = t105 + t106;
-    const real t108 = u[0] * t30;
-    const real t109 = 2.0 * t108;
-    const real t110 = t107 - t109;
-    motion[7] = t110;
-    const real t111 = Rt[2] * t74;
-    const real t112 = Rt[5] * t86;
-    const real t113 = t111 + t112;
-    const real t114 = Rt[8] * t97;
-    const real t115 = t113 + t114;
-    const real t116 = s[0] + t115;
-    motion[8] = t116;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    return 0;
+  (void)p;
+  real t0 = cos(q[1]);
+  real t2 = sin(q[1]);
+  real t4 = Rt[0] * t0 + Rt[1] * t2;
+  Rc[0] = t4;
+  real t7 = Rt[1] * t0 - Rt[0] * t2;
+  Rc[1] = t7;
+  Rc[2] = Rt[2];
+  real t10 = Rt[3] * t0 + Rt[4] * t2;
+  Rc[3] = t10;
+  real t13 = Rt[4] * t0 - Rt[3] * t2;
+  Rc[4] = t13;
+  Rc[5] = Rt[5];
+  real t16 = Rt[6] * t0 + Rt[7] * t2;
+  Rc[6] = t16;
+  real t19 = Rt[7] * t0 - Rt[6] * t2;
+  Rc[7] = t19;
+  Rc[8] = Rt[8];
+  real t21 = ro[0] + Rt[2] * q[0];
+  r[0] = t21;
+  real t23 = ro[1] + Rt[5] * q[0];
+  r[1] = t23;
+  real t25 = ro[2] + Rt[8] * q[0];
+  r[2] = t25;
+  real t30 = motion_I[0] * t4 + motion_I[1] * t10 + motion_I[2] * t16;
+  motion[0] = t30;
+  real t35 = motion_I[0] * t7 + motion_I[1] * t13 + motion_I[2] * t19;
+  motion[1] = t35;
+  motion[2] = u[1] + (Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2]);
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t10 + motion_I[5] * t16 + u[1] * t35;
+  motion[4] = motion_I[3] * t7 + motion_I[4] * t13 + motion_I[5] * t19 - u[1] * t30;
+  motion[5] = s[1] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t62 = motion_I[0] * motion_I[1];
+  real t65 = motion_I[1] * motion_I[1];
+  real t66 = motion_I[2] * motion_I[2];
+  real t70 = motion_I[0] * motion_I[2];
+  real t74 = motion_I[6] + (t23 * (t62 - motion_I[5]) - t21 * (t65 + t66) + t25 * (motion_I[4] +
+    t70));
+  real t78 = motion_I[0] * motion_I[0];
+  real t82 = motion_I[1] * motion_I[2];
+  real t86 = motion_I[7] + (t21 * (motion_I[5] + t62) - t23 * (t66 + t78) + t25 * (t82 -
+    motion_I[3]));
+  real t97 = motion_I[8] + (t21 * (t70 - motion_I[4]) + t23 * (motion_I[3] + t82) - t25 * (t65 +
+    t78));
+  motion[6] = t4 * t74 + t10 * t86 + t16 * t97 + 2.0 * (u[0] * t35);
+  motion[7] = t7 * t74 + t13 * t86 + t19 * t97 - 2.0 * (u[0] * t30);
+  motion[8] = s[0] + (Rt[2] * t74 + Rt[5] * t86 + Rt[8] * t97);
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -328,485 +141,146 @@ static const mstmm_port mstmm_hinge_cylindrical_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_cylindrical_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_cylindrical_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[11];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t1 = S[20] * ((real)1 / (real)10000000000000);
-    const real t2 = 1.0 / S[11];
-    const real t3 = S[14] * t2;
-    const real t4 = S[14] * t3;
-    const real t5 = S[20] - t4;
-    const real t6 = t1 < t5;
-    if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t7 = 0.0 < floor_[0];
-    const real t8 = S[0] + S[6];
-    const real t9 = S[11] + t8;
-    const real t10 = ((real)1 / (real)300000000000000) * t9;
-    const real t11 = t7 != 0 ? floor_[0] : t10;
-    const real t12 = t11 < S[11];
-    if (!(t12 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
-    const real t13 = 0.0 < floor_[1];
-    const real t14 = S[15] + S[18];
-    const real t15 = S[20] + t14;
-    const real t16 = ((real)1 / (real)300000000000000) * t15;
-    const real t17 = t13 != 0 ? floor_[1] : t16;
-    const real t18 = t17 < S[20];
-    if (!(t18 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
-    const real t19 = S[2] * t2;
-    const real t20 = 1.0 / t5;
-    const real t21 = S[2] * t3;
-    const real t22 = S[5] - t21;
-    const real t23 = t20 * t22;
-    const real t24 = t3 * t23;
-    const real t25 = t19 - t24;
-    G[0] = t25;
-    const real t26 = S[7] * t2;
-    const real t27 = S[7] * t3;
-    const real t28 = S[10] - t27;
-    const real t29 = t20 * t28;
-    const real t30 = t3 * t29;
-    const real t31 = t26 - t30;
-    G[1] = t31;
-    const real t32 = S[11] * t2;
-    const real t33 = S[11] * t3;
-    const real t34 = S[14] - t33;
-    const real t35 = t20 * t34;
-    const real t36 = t3 * t35;
-    const real t37 = t32 - t36;
-    G[2] = t37;
-    const real t38 = S[12] * t2;
-    const real t39 = S[12] * t3;
-    const real t40 = S[17] - t39;
-    const real t41 = t20 * t40;
-    const real t42 = t3 * t41;
-    const real t43 = t38 - t42;
-    G[3] = t43;
-    const real t44 = S[13] * t2;
-    const real t45 = S[13] * t3;
-    const real t46 = S[19] - t45;
-    const real t47 = t20 * t46;
-    const real t48 = t3 * t47;
-    const real t49 = t44 - t48;
-    G[4] = t49;
-    const real t50 = t5 * t20;
-    const real t51 = t3 * t50;
-    const real t52 = t3 - t51;
-    G[5] = t52;
-    G[6] = t23;
-    G[7] = t29;
-    G[8] = t35;
-    G[9] = t41;
-    G[10] = t47;
-    G[11] = t50;
-    const real t53 = tau[0] - e[2];
-    const real t54 = t2 * t53;
-    const real t55 = tau[1] - e[5];
-    const real t56 = t3 * t53;
-    const real t57 = t55 - t56;
-    const real t58 = t20 * t57;
-    const real t59 = t3 * t58;
-    const real t60 = t54 - t59;
-    g[0] = t60;
-    g[1] = t58;
-    const real t61 = S[2] * t25;
-    const real t62 = S[5] * t23;
-    const real t63 = t61 + t62;
-    const real t64 = S[0] - t63;
-    const real t65 = Rc[0] * t64;
-    const real t66 = S[2] * t31;
-    const real t67 = S[5] * t29;
-    const real t68 = t66 + t67;
-    const real t69 = S[1] - t68;
-    const real t70 = Rc[1] * t69;
-    const real t71 = t65 + t70;
-    const real t72 = Rc[0] * t71;
-    const real t73 = Rc[0] * t69;
-    const real t74 = S[7] * t31;
-    const real t75 = S[10] * t29;
-    const real t76 = t74 + t75;
-    const real t77 = S[6] - t76;
-    const real t78 = Rc[1] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = Rc[1] * t79;
-    const real t81 = t72 + t80;
-    S_I[0] += t81;
-    const real t82 = Rc[3] * t71;
-    const real t83 = Rc[4] * t79;
-    const real t84 = t82 + t83;
-    S_I[1] += t84;
-    const real t85 = Rc[6] * t71;
-    const real t86 = Rc[7] * t79;
-    const real t87 = t85 + t86;
-    S_I[2] += t87;
-    const real t88 = S[2] * t43;
-    const real t89 = S[5] * t41;
-    const real t90 = t88 + t89;
-    const real t91 = S[3] - t90;
-    const real t92 = Rc[0] * t91;
-    const real t93 = S[7] * t43;
-    const real t94 = S[10] * t41;
-    const real t95 = t93 + t94;
-    const real t96 = S[8] - t95;
-    const real t97 = Rc[1] * t96;
-    const real t98 = t92 + t97;
-    const real t99 = Rc[0] * t98;
-    const real t100 = S[2] * t49;
-    const real t101 = S[5] * t47;
-    const real t102 = t100 + t101;
-    const real t103 = S[4] - t102;
-    const real t104 = Rc[0] * t103;
-    const real t105 = S[7] * t49;
-    const real t106 = S[10] * t47;
-    const real t107 = t105 + t106;
-    const real t108 = S[9] - t107;
-    const real t109 = Rc[1] * t108;
-    const real t110 = t104 + t109;
-    const real t111 = Rc[1] * t110;
-    const real t112 = t99 + t111;
-    const real t113 = r[1] * t87;
-    const real t114 = r[2] * t84;
-    const real t115 = t113 - t114;
-    const real t116 = t112 + t115;
-    S_I[3] += t116;
-    const real t117 = Rc[3] * t98;
-    const real t118 = Rc[4] * t110;
-    const real t119 = t117 + t118;
-    const real t120 = r[2] * t81;
-    const real t121 = r[0] * t87;
-    const real t122 = t120 - t121;
-    const real t123 = t119 + t122;
-    S_I[4] += t123;
-    const real t124 = Rc[6] * t98;
-    const real t125 = Rc[7] * t110;
-    const real t126 = t124 + t125;
-    const real t127 = r[0] * t84;
-    const real t128 = r[1] * t81;
-    const real t129 = t127 - t128;
-    const real t130 = t126 + t129;
-    S_I[5] += t130;
-    const real t131 = Rc[3] * t64;
-    const real t132 = Rc[4] * t69;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[3] * t133;
-    const real t135 = Rc[3] * t69;
-    const real t136 = Rc[4] * t77;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[4] * t137;
-    const real t139 = t134 + t138;
-    S_I[6] += t139;
-    const real t140 = Rc[6] * t133;
-    const real t141 = Rc[7] * t137;
-    const real t142 = t140 + t141;
-    S_I[7] += t142;
-    const real t143 = Rc[3] * t91;
-    const real t144 = Rc[4] * t96;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[0] * t145;
-    const real t147 = Rc[3] * t103;
-    const real t148 = Rc[4] * t108;
-    const real t149 = t147 + t148;
-    const real t150 = Rc[1] * t149;
-    const real t151 = t146 + t150;
-    const real t152 = r[1] * t142;
-    const real t153 = r[2] * t139;
-    const real t154 = t152 - t153;
-    const real t155 = t151 + t154;
-    S_I[8] += t155;
-    const real t156 = Rc[3] * t145;
-    const real t157 = Rc[4] * t149;
-    const real t158 = t156 + t157;
-    const real t159 = r[0] * t142;
-    const real t160 = t114 - t159;
-    const real t161 = t158 + t160;
-    S_I[9] += t161;
-    const real t162 = Rc[6] * t145;
-    const real t163 = Rc[7] * t149;
-    const real t164 = t162 + t163;
-    const real t165 = r[0] * t139;
-    const real t166 = r[1] * t84;
-    const real t167 = t165 - t166;
-    const real t168 = t164 + t167;
-    S_I[10] += t168;
-    const real t169 = Rc[6] * t64;
-    const real t170 = Rc[7] * t69;
-    const real t171 = t169 + t170;
-    const real t172 = Rc[6] * t171;
-    const real t173 = Rc[6] * t69;
-    const real t174 = Rc[7] * t77;
-    const real t175 = t173 + t174;
-    const real t176 = Rc[7] * t175;
-    const real t177 = t172 + t176;
-    S_I[11] += t177;
-    const real t178 = Rc[6] * t91;
-    const real t179 = Rc[7] * t96;
-    const real t180 = t178 + t179;
-    const real t181 = Rc[0] * t180;
-    const real t182 = Rc[6] * t103;
-    const real t183 = Rc[7] * t108;
-    const real t184 = t182 + t183;
-    const real t185 = Rc[1] * t184;
-    const real t186 = t181 + t185;
-    const real t187 = r[1] * t177;
-    const real t188 = r[2] * t142;
-    const real t189 = t187 - t188;
-    const real t190 = t186 + t189;
-    S_I[12] += t190;
-    const real t191 = Rc[3] * t180;
-    const real t192 = Rc[4] * t184;
-    const real t193 = t191 + t192;
-    const real t194 = r[2] * t87;
-    const real t195 = r[0] * t177;
-    const real t196 = t194 - t195;
-    const real t197 = t193 + t196;
-    S_I[13] += t197;
-    const real t198 = Rc[6] * t180;
-    const real t199 = Rc[7] * t184;
-    const real t200 = t198 + t199;
-    const real t201 = t159 - t113;
-    const real t202 = t200 + t201;
-    S_I[14] += t202;
-    const real t203 = S[12] * t43;
-    const real t204 = S[17] * t41;
-    const real t205 = t203 + t204;
-    const real t206 = S[15] - t205;
-    const real t207 = Rc[0] * t206;
-    const real t208 = S[12] * t49;
-    const real t209 = S[17] * t47;
-    const real t210 = t208 + t209;
-    const real t211 = S[16] - t210;
-    const real t212 = Rc[1] * t211;
-    const real t213 = t207 + t212;
-    const real t214 = Rc[0] * t213;
-    const real t215 = Rc[0] * t211;
-    const real t216 = S[13] * t49;
-    const real t217 = S[19] * t47;
-    const real t218 = t216 + t217;
-    const real t219 = S[18] - t218;
-    const real t220 = Rc[1] * t219;
-    const real t221 = t215 + t220;
-    const real t222 = Rc[1] * t221;
-    const real t223 = t214 + t222;
-    const real t224 = r[1] * t190;
-    const real t225 = r[2] * t155;
-    const real t226 = t224 - t225;
-    const real t227 = r[1] * t186;
-    const real t228 = r[2] * t151;
-    const real t229 = t227 - t228;
-    const real t230 = t226 + t229;
-    const real t231 = t223 + t230;
-    S_I[15] += t231;
-    const real t232 = Rc[3] * t213;
-    const real t233 = Rc[4] * t221;
-    const real t234 = t232 + t233;
-    const real t235 = r[1] * t197;
-    const real t236 = r[2] * t161;
-    const real t237 = t235 - t236;
-    const real t238 = r[2] * t112;
-    const real t239 = r[0] * t186;
-    const real t240 = t238 - t239;
-    const real t241 = t237 + t240;
-    const real t242 = t234 + t241;
-    S_I[16] += t242;
-    const real t243 = Rc[6] * t213;
-    const real t244 = Rc[7] * t221;
-    const real t245 = t243 + t244;
-    const real t246 = r[1] * t202;
-    const real t247 = r[2] * t168;
-    const real t248 = t246 - t247;
-    const real t249 = r[0] * t151;
-    const real t250 = r[1] * t112;
-    const real t251 = t249 - t250;
-    const real t252 = t248 + t251;
-    const real t253 = t245 + t252;
-    S_I[17] += t253;
-    const real t254 = Rc[3] * t206;
-    const real t255 = Rc[4] * t211;
-    const real t256 = t254 + t255;
-    const real t257 = Rc[3] * t256;
-    const real t258 = Rc[3] * t211;
-    const real t259 = Rc[4] * t219;
-    const real t260 = t258 + t259;
-    const real t261 = Rc[4] * t260;
-    const real t262 = t257 + t261;
-    const real t263 = r[2] * t123;
-    const real t264 = r[0] * t197;
-    const real t265 = t263 - t264;
-    const real t266 = r[2] * t119;
-    const real t267 = r[0] * t193;
-    const real t268 = t266 - t267;
-    const real t269 = t265 + t268;
-    const real t270 = t262 + t269;
-    S_I[18] += t270;
-    const real t271 = Rc[6] * t256;
-    const real t272 = Rc[7] * t260;
-    const real t273 = t271 + t272;
-    const real t274 = r[2] * t130;
-    const real t275 = r[0] * t202;
-    const real t276 = t274 - t275;
-    const real t277 = r[0] * t158;
-    const real t278 = r[1] * t119;
-    const real t279 = t277 - t278;
-    const real t280 = t276 + t279;
-    const real t281 = t273 + t280;
-    S_I[19] += t281;
-    const real t282 = Rc[6] * t206;
-    const real t283 = Rc[7] * t211;
-    const real t284 = t282 + t283;
-    const real t285 = Rc[6] * t284;
-    const real t286 = Rc[6] * t211;
-    const real t287 = Rc[7] * t219;
-    const real t288 = t286 + t287;
-    const real t289 = Rc[7] * t288;
-    const real t290 = t285 + t289;
-    const real t291 = r[0] * t168;
-    const real t292 = r[1] * t130;
-    const real t293 = t291 - t292;
-    const real t294 = r[0] * t164;
-    const real t295 = r[1] * t126;
-    const real t296 = t294 - t295;
-    const real t297 = t293 + t296;
-    const real t298 = t290 + t297;
-    S_I[20] += t298;
-    const real t299 = S[2] * t60;
-    const real t300 = S[5] * t58;
-    const real t301 = t299 + t300;
-    const real t302 = e[0] + t301;
-    const real t303 = Rc[0] * t302;
-    const real t304 = S[7] * t60;
-    const real t305 = S[10] * t58;
-    const real t306 = t304 + t305;
-    const real t307 = e[1] + t306;
-    const real t308 = Rc[1] * t307;
-    const real t309 = t303 + t308;
-    const real t310 = Rc[2] * tau[0];
-    const real t311 = t309 + t310;
-    e_I[0] += t311;
-    const real t312 = Rc[3] * t302;
-    const real t313 = Rc[4] * t307;
-    const real t314 = t312 + t313;
-    const real t315 = Rc[5] * tau[0];
-    const real t316 = t314 + t315;
-    e_I[1] += t316;
-    const real t317 = Rc[6] * t302;
-    const real t318 = Rc[7] * t307;
-    const real t319 = t317 + t318;
-    const real t320 = Rc[8] * tau[0];
-    const real t321 = t319 + t320;
-    e_I[2] += t321;
-    const real t322 = S[12] * t60;
-    const real t323 = S[17] * t58;
-    const real t324 = t322 + t323;
-    const real t325 = e[3] + t324;
-    const real t326 = Rc[0] * t325;
-    const real t327 = S[13] * t60;
-    const real t328 = S[19] * t58;
-    const real t329 = t327 + t328;
-    const real t330 = e[4] + t329;
-    const real t331 = Rc[1] * t330;
-    const real t332 = t326 + t331;
-    const real t333 = Rc[2] * tau[1];
-    const real t334 = t332 + t333;
-    const real t335 = Rc[6] * r[1];
-    const real t336 = Rc[3] * r[2];
-    const real t337 = t335 - t336;
-    const real t338 = t302 * t337;
-    const real t339 = Rc[7] * r[1];
-    const real t340 = Rc[4] * r[2];
-    const real t341 = t339 - t340;
-    const real t342 = t307 * t341;
-    const real t343 = t338 + t342;
-    const real t344 = Rc[8] * r[1];
-    const real t345 = Rc[5] * r[2];
-    const real t346 = t344 - t345;
-    const real t347 = tau[0] * t346;
-    const real t348 = t343 + t347;
-    const real t349 = t334 + t348;
-    e_I[3] += t349;
-    const real t350 = Rc[3] * t325;
-    const real t351 = Rc[4] * t330;
-    const real t352 = t350 + t351;
-    const real t353 = Rc[5] * tau[1];
-    const real t354 = t352 + t353;
-    const real t355 = Rc[0] * r[2];
-    const real t356 = Rc[6] * r[0];
-    const real t357 = t355 - t356;
-    const real t358 = t302 * t357;
-    const real t359 = Rc[1] * r[2];
-    const real t360 = Rc[7] * r[0];
-    const real t361 = t359 - t360;
-    const real t362 = t307 * t361;
-    const real t363 = t358 + t362;
-    const real t364 = Rc[2] * r[2];
-    const real t365 = Rc[8] * r[0];
-    const real t366 = t364 - t365;
-    const real t367 = tau[0] * t366;
-    const real t368 = t363 + t367;
-    const real t369 = t354 + t368;
-    e_I[4] += t369;
-    const real t370 = Rc[6] * t325;
-    const real t371 = Rc[7] * t330;
-    const real t372 = t370 + t371;
-    const real t373 = Rc[8] * tau[1];
-    const real t374 = t372 + t373;
-    const real t375 = Rc[3] * r[0];
-    const real t376 = Rc[0] * r[1];
-    const real t377 = t375 - t376;
-    const real t378 = t302 * t377;
-    const real t379 = Rc[4] * r[0];
-    const real t380 = Rc[1] * r[1];
-    const real t381 = t379 - t380;
-    const real t382 = t307 * t381;
-    const real t383 = t378 + t382;
-    const real t384 = Rc[5] * r[0];
-    const real t385 = Rc[2] * r[1];
-    const real t386 = t384 - t385;
-    const real t387 = tau[0] * t386;
-    const real t388 = t383 + t387;
-    const real t389 = t374 + t388;
-    e_I[5] += t389;
-    return 0;
+  (void)p;
+  (void)q;
+  real t0 = 0.0 < S[11];
+  if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t2 = 1.0 / S[11];
+  real t3 = S[14] * t2;
+  real t5 = S[20] - S[14] * t3;
+  real t6 = S[20] * ((real)1 / (real)10000000000000) < t5;
+  if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t0 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t6 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t10 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  if (!((((0.0 < floor_[0]) ? floor_[0] : t10) < S[11]))) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+  real t16 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  if (!((((0.0 < floor_[1]) ? floor_[1] : t16) < S[20]))) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+  real t20 = 1.0 / t5;
+  real t23 = t20 * (S[5] - S[2] * t3);
+  real t25 = S[2] * t2 - t3 * t23;
+  G[0] = t25;
+  real t29 = t20 * (S[10] - S[7] * t3);
+  real t31 = S[7] * t2 - t3 * t29;
+  G[1] = t31;
+  real t35 = t20 * (S[14] - S[11] * t3);
+  G[2] = S[11] * t2 - t3 * t35;
+  real t41 = t20 * (S[17] - S[12] * t3);
+  real t43 = S[12] * t2 - t3 * t41;
+  G[3] = t43;
+  real t47 = t20 * (S[19] - S[13] * t3);
+  real t49 = S[13] * t2 - t3 * t47;
+  G[4] = t49;
+  real t50 = t5 * t20;
+  G[5] = t3 - t3 * t50;
+  G[6] = t23;
+  G[7] = t29;
+  G[8] = t35;
+  G[9] = t41;
+  G[10] = t47;
+  G[11] = t50;
+  real t53 = tau[0] - e[2];
+  real t58 = t20 * (tau[1] - e[5] - t3 * t53);
+  real t60 = t2 * t53 - t3 * t58;
+  g[0] = t60;
+  g[1] = t58;
+  real t64 = S[0] - (S[2] * t25 + S[5] * t23);
+  real t69 = S[1] - (S[2] * t31 + S[5] * t29);
+  real t71 = Rc[0] * t64 + Rc[1] * t69;
+  real t77 = S[6] - (S[7] * t31 + S[10] * t29);
+  real t79 = Rc[0] * t69 + Rc[1] * t77;
+  real t81 = Rc[0] * t71 + Rc[1] * t79;
+  S_I[0] += t81;
+  real t84 = Rc[3] * t71 + Rc[4] * t79;
+  S_I[1] += t84;
+  real t87 = Rc[6] * t71 + Rc[7] * t79;
+  S_I[2] += t87;
+  real t91 = S[3] - (S[2] * t43 + S[5] * t41);
+  real t96 = S[8] - (S[7] * t43 + S[10] * t41);
+  real t98 = Rc[0] * t91 + Rc[1] * t96;
+  real t103 = S[4] - (S[2] * t49 + S[5] * t47);
+  real t108 = S[9] - (S[7] * t49 + S[10] * t47);
+  real t110 = Rc[0] * t103 + Rc[1] * t108;
+  real t112 = Rc[0] * t98 + Rc[1] * t110;
+  real t113 = r[1] * t87;
+  real t114 = r[2] * t84;
+  S_I[3] += t112 + (t113 - t114);
+  real t119 = Rc[3] * t98 + Rc[4] * t110;
+  real t123 = t119 + (r[2] * t81 - r[0] * t87);
+  S_I[4] += t123;
+  real t126 = Rc[6] * t98 + Rc[7] * t110;
+  real t130 = t126 + (r[0] * t84 - r[1] * t81);
+  S_I[5] += t130;
+  real t133 = Rc[3] * t64 + Rc[4] * t69;
+  real t137 = Rc[3] * t69 + Rc[4] * t77;
+  real t139 = Rc[3] * t133 + Rc[4] * t137;
+  S_I[6] += t139;
+  real t142 = Rc[6] * t133 + Rc[7] * t137;
+  S_I[7] += t142;
+  real t145 = Rc[3] * t91 + Rc[4] * t96;
+  real t149 = Rc[3] * t103 + Rc[4] * t108;
+  real t151 = Rc[0] * t145 + Rc[1] * t149;
+  real t155 = t151 + (r[1] * t142 - r[2] * t139);
+  S_I[8] += t155;
+  real t158 = Rc[3] * t145 + Rc[4] * t149;
+  real t159 = r[0] * t142;
+  real t161 = t158 + (t114 - t159);
+  S_I[9] += t161;
+  real t164 = Rc[6] * t145 + Rc[7] * t149;
+  real t168 = t164 + (r[0] * t139 - r[1] * t84);
+  S_I[10] += t168;
+  real t177 = Rc[6] * (Rc[6] * t64 + Rc[7] * t69) + Rc[7] * (Rc[6] * t69 + Rc[7] * t77);
+  S_I[11] += t177;
+  real t180 = Rc[6] * t91 + Rc[7] * t96;
+  real t184 = Rc[6] * t103 + Rc[7] * t108;
+  real t186 = Rc[0] * t180 + Rc[1] * t184;
+  real t190 = t186 + (r[1] * t177 - r[2] * t142);
+  S_I[12] += t190;
+  real t193 = Rc[3] * t180 + Rc[4] * t184;
+  real t197 = t193 + (r[2] * t87 - r[0] * t177);
+  S_I[13] += t197;
+  real t202 = Rc[6] * t180 + Rc[7] * t184 + (t159 - t113);
+  S_I[14] += t202;
+  real t206 = S[15] - (S[12] * t43 + S[17] * t41);
+  real t211 = S[16] - (S[12] * t49 + S[17] * t47);
+  real t213 = Rc[0] * t206 + Rc[1] * t211;
+  real t219 = S[18] - (S[13] * t49 + S[19] * t47);
+  real t221 = Rc[0] * t211 + Rc[1] * t219;
+  S_I[15] += Rc[0] * t213 + Rc[1] * t221 + (r[1] * t190 - r[2] * t155 + (r[1] * t186 - r[2] *
+    t151));
+  S_I[16] += Rc[3] * t213 + Rc[4] * t221 + (r[1] * t197 - r[2] * t161 + (r[2] * t112 - r[0] *
+    t186));
+  S_I[17] += Rc[6] * t213 + Rc[7] * t221 + (r[1] * t202 - r[2] * t168 + (r[0] * t151 - r[1] *
+    t112));
+  real t256 = Rc[3] * t206 + Rc[4] * t211;
+  real t260 = Rc[3] * t211 + Rc[4] * t219;
+  S_I[18] += Rc[3] * t256 + Rc[4] * t260 + (r[2] * t123 - r[0] * t197 + (r[2] * t119 - r[0] *
+    t193));
+  S_I[19] += Rc[6] * t256 + Rc[7] * t260 + (r[2] * t130 - r[0] * t202 + (r[0] * t158 - r[1] *
+    t119));
+  S_I[20] += Rc[6] * (Rc[6] * t206 + Rc[7] * t211) + Rc[7] * (Rc[6] * t211 + Rc[7] * t219) + (r[0] *
+    t168 - r[1] * t130 + (r[0] * t164 - r[1] * t126));
+  real t302 = e[0] + (S[2] * t60 + S[5] * t58);
+  real t307 = e[1] + (S[7] * t60 + S[10] * t58);
+  e_I[0] += Rc[0] * t302 + Rc[1] * t307 + Rc[2] * tau[0];
+  e_I[1] += Rc[3] * t302 + Rc[4] * t307 + Rc[5] * tau[0];
+  e_I[2] += Rc[6] * t302 + Rc[7] * t307 + Rc[8] * tau[0];
+  real t325 = e[3] + (S[12] * t60 + S[17] * t58);
+  real t330 = e[4] + (S[13] * t60 + S[19] * t58);
+  e_I[3] += Rc[0] * t325 + Rc[1] * t330 + Rc[2] * tau[1] + (t302 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t307 * (Rc[7] * r[1] - Rc[4] * r[2]) + tau[0] * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t325 + Rc[4] * t330 + Rc[5] * tau[1] + (t302 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t307 * (Rc[1] * r[2] - Rc[7] * r[0]) + tau[0] * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t325 + Rc[7] * t330 + Rc[8] * tau[1] + (t302 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t307 * (Rc[4] * r[0] - Rc[1] * r[1]) + tau[0] * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_condense_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_cylindrical_condense_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -821,111 +295,35 @@ static const mstmm_guard mstmm_hinge_cylindrical_condense_guards[] = {
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_cylindrical_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_cylindrical_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    (void)q;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    delta[0] = t16;
-    delta[1] = t22;
-    const real t66 = t29 + t53;
-    delta[2] = t66;
-    delta[3] = t36;
-    delta[4] = t43;
-    const real t67 = t50 + t65;
-    delta[5] = t67;
-    return 0;
+  (void)p;
+  (void)q;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29 + t53;
+  delta[3] = t36;
+  delta[4] = t43;
+  delta[5] = t50 + t65;
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_recover_outputs[] = {
-    {"udot", 2, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[0] parameters
@@ -941,83 +339,33 @@ static const mstmm_port mstmm_hinge_cylindrical_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[2] derivative of qdot
  */
-int mstmm_hinge_cylindrical_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_cylindrical_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R,
+    out_t d_d, out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    (void)u;
-    const real t0 = sin(q[1]);
-    const real t1 = t0 * d_q[1];
-    const real t2 = -t1;
-    d_R[0] = t2;
-    const real t3 = cos(q[1]);
-    const real t4 = t3 * d_q[1];
-    const real t5 = -t4;
-    d_R[1] = t5;
-    d_R[2] = 0.0;
-    d_R[3] = t4;
-    d_R[4] = t2;
-    d_R[5] = 0.0;
-    d_R[6] = 0.0;
-    d_R[7] = 0.0;
-    d_R[8] = 0.0;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = d_q[0];
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_H[6] = 0.0;
-    d_H[7] = 0.0;
-    d_H[8] = 0.0;
-    d_H[9] = 0.0;
-    d_H[10] = 0.0;
-    d_H[11] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = d_u[0];
-    d_w[0] = 0.0;
-    d_w[1] = 0.0;
-    d_w[2] = d_u[1];
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    d_qdot[0] = d_u[0];
-    d_qdot[1] = d_u[1];
-    return 0;
+  (void)p;
+  (void)u;
+  real t2 = -(sin(q[1]) * d_q[1]);
+  d_R[0] = t2;
+  real t4 = cos(q[1]) * d_q[1];
+  d_R[1] = -t4;
+  d_R[2] = 0.0;
+  d_R[3] = t4;
+  d_R[4] = t2;
+  d_R[5] = d_R[6] = d_R[7] = d_R[8] = d_d[0] = d_d[1] = 0.0;
+  d_d[2] = d_q[0];
+  d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = d_H[6] = d_H[7] = d_H[8] = d_H[9] = d_H[10]
+    = d_H[11] = d_v[0] = d_v[1] = 0.0;
+  d_v[2] = d_u[0];
+  d_w[0] = d_w[1] = 0.0;
+  d_w[2] = d_u[1];
+  d_c[0] = d_c[1] = d_c[2] = d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = d_u[0];
+  d_qdot[1] = d_u[1];
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"d_q", 2, "", 0, 0},
-    {"d_u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 12, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[0] parameters
@@ -1025,34 +373,16 @@ static const mstmm_port mstmm_hinge_cylindrical_hinge_slope_outputs[] = {
  * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
  * out J[2][2] qdot by q, transposed
  */
-int mstmm_hinge_cylindrical_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_cylindrical_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = J[1] = J[2] = J[3] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_rates_by_coordinates_outputs[] = {
-    {"J", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[0] parameters
@@ -1060,34 +390,18 @@ static const mstmm_port mstmm_hinge_cylindrical_rates_by_coordinates_outputs[] =
  * in  u[2] speeds: displacement_rate [m/s], angle_rate [rad/s]
  * out J[2][2] qdot by u, transposed
  */
-int mstmm_hinge_cylindrical_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_cylindrical_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  J[1] = J[2] = 0.0;
+  J[3] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_outputs[] = {
-    {"J", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[0] parameters
@@ -1108,221 +422,82 @@ static const mstmm_port mstmm_hinge_cylindrical_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_cylindrical_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_cylindrical_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s,
+    in_t motion_I, out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc,
+    out_t r, out_t motion)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    R[0] = t0;
-    const real t1 = sin(q[1]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = q[0];
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 1.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = u[0];
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[1];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    const real t3 = t0 * Rt[0];
-    const real t4 = t1 * Rt[1];
-    const real t5 = t3 + t4;
-    Rc[0] = t5;
-    const real t6 = t0 * Rt[1];
-    const real t7 = t1 * Rt[0];
-    const real t8 = t6 - t7;
-    Rc[1] = t8;
-    Rc[2] = Rt[2];
-    const real t9 = t0 * Rt[3];
-    const real t10 = t1 * Rt[4];
-    const real t11 = t9 + t10;
-    Rc[3] = t11;
-    const real t12 = t0 * Rt[4];
-    const real t13 = t1 * Rt[3];
-    const real t14 = t12 - t13;
-    Rc[4] = t14;
-    Rc[5] = Rt[5];
-    const real t15 = t0 * Rt[6];
-    const real t16 = t1 * Rt[7];
-    const real t17 = t15 + t16;
-    Rc[6] = t17;
-    const real t18 = t0 * Rt[7];
-    const real t19 = t1 * Rt[6];
-    const real t20 = t18 - t19;
-    Rc[7] = t20;
-    Rc[8] = Rt[8];
-    const real t21 = q[0] * Rt[2];
-    const real t22 = ro[0] + t21;
-    r[0] = t22;
-    const real t23 = q[0] * Rt[5];
-    const real t24 = ro[1] + t23;
-    r[1] = t24;
-    const real t25 = q[0] * Rt[8];
-    const real t26 = ro[2] + t25;
-    r[2] = t26;
-    const real t27 = motion_I[0] * t5;
-    const real t28 = motion_I[1] * t11;
-    const real t29 = t27 + t28;
-    const real t30 = motion_I[2] * t17;
-    const real t31 = t29 + t30;
-    motion[0] = t31;
-    const real t32 = motion_I[0] * t8;
-    const real t33 = motion_I[1] * t14;
-    const real t34 = t32 + t33;
-    const real t35 = motion_I[2] * t20;
-    const real t36 = t34 + t35;
-    motion[1] = t36;
-    const real t37 = Rt[2] * motion_I[0];
-    const real t38 = Rt[5] * motion_I[1];
-    const real t39 = t37 + t38;
-    const real t40 = Rt[8] * motion_I[2];
-    const real t41 = t39 + t40;
-    const real t42 = u[1] + t41;
-    motion[2] = t42;
-    const real t43 = motion_I[3] * t5;
-    const real t44 = motion_I[4] * t11;
-    const real t45 = t43 + t44;
-    const real t46 = motion_I[5] * t17;
-    const real t47 = t45 + t46;
-    const real t48 = u[1] * t36;
-    const real t49 = t47 + t48;
-    motion[3] = t49;
-    const real t50 = motion_I[3] * t8;
-    const real t51 = motion_I[4] * t14;
-    const real t52 = t50 + t51;
-    const real t53 = motion_I[5] * t20;
-    const real t54 = t52 + t53;
-    const real t55 = u[1] * t31;
-    const real t56 = t54 - t55;
-    motion[4] = t56;
-    const real t57 = Rt[2] * motion_I[3];
-    const real t58 = Rt[5] * motion_I[4];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * motion_I[5];
-    const real t61 = t59 + t60;
-    const real t62 = s[1] + t61;
-    motion[5] = t62;
-    const real t63 = motion_I[0] * motion_I[1];
-    const real t64 = t63 - motion_I[5];
-    const real t65 = t24 * t64;
-    const real t66 = motion_I[1] * motion_I[1];
-    const real t67 = motion_I[2] * motion_I[2];
-    const real t68 = t66 + t67;
-    const real t69 = t22 * t68;
-    const real t70 = t65 - t69;
-    const real t71 = motion_I[0] * motion_I[2];
-    const real t72 = motion_I[4] + t71;
-    const real t73 = t26 * t72;
-    const real t74 = t70 + t73;
-    const real t75 = motion_I[6] + t74;
-    const real t76 = t5 * t75;
-    const real t77 = motion_I[5] + t63;
-    const real t78 = t22 * t77;
-    const real t79 = motion_I[0] * motion_I[0];
-    const real t80 = t67 + t79;
-    const real t81 = t24 * t80;
-    const real t82 = t78 - t81;
-    const real t83 = motion_I[1] * motion_I[2];
-    const real t84 = t83 - motion_I[3];
-    const real t85 = t26 * t84;
-    const real t86 = t82 + t85;
-    const real t87 = motion_I[7] + t86;
-    const real t88 = t11 * t87;
-    const real t89 = t76 + t88;
-    const real t90 = t71 - motion_I[4];
-    const real t91 = t22 * t90;
-    const real t92 = motion_I[3] + t83;
-    const real t93 = t24 * t92;
-    const real t94 = t91 + t93;
-    const real t95 = t66 + t79;
-    const real t96 = t26 * t95;
-    const real t97 = t94 - t96;
-    const real t98 = motion_I[8] + t97;
-    const real t99 = t17 * t98;
-    const real t100 = t89 + t99;
-    const real t101 = u[0] * t36;
-    const real t102 = t101 * 2.0;
-    const real t103 = t100 + t102;
-    motion[6] = t103;
-    const real t104 = t8 * t75;
-    const real t105 = t14 * t87;
-    const real t106 = t104 + t105;
-    const real t107 = t20 * t98;
-    const real t108 = t106 + t107;
-    const real t109 = u[0] * t31;
-    const real t110 = 2.0 * t109;
-    const real t111 = t108 - t110;
-    motion[7] = t111;
-    const real t112 = Rt[2] * t75;
-    const real t113 = Rt[5] * t87;
-    const real t114 = t112 + t113;
-    const real t115 = Rt[8] * t98;
-    const real t116 = t114 + t115;
-    const real t117 = s[0] + t116;
-    motion[8] = t117;
-    return 0;
+  (void)p;
+  real t0 = cos(q[1]);
+  R[0] = t0;
+  real t1 = sin(q[1]);
+  R[1] = -t1;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = 0.0;
+  d[2] = q[0];
+  H[0] = H[1] = H[2] = H[3] = 0.0;
+  H[4] = 1.0;
+  H[5] = H[6] = H[7] = H[8] = H[9] = H[10] = 0.0;
+  H[11] = 1.0;
+  v[0] = v[1] = 0.0;
+  v[2] = u[0];
+  w[0] = w[1] = 0.0;
+  w[2] = u[1];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  real t5 = t0 * Rt[0] + t1 * Rt[1];
+  Rc[0] = t5;
+  real t8 = t0 * Rt[1] - t1 * Rt[0];
+  Rc[1] = t8;
+  Rc[2] = Rt[2];
+  real t11 = t0 * Rt[3] + t1 * Rt[4];
+  Rc[3] = t11;
+  real t14 = t0 * Rt[4] - t1 * Rt[3];
+  Rc[4] = t14;
+  Rc[5] = Rt[5];
+  real t17 = t0 * Rt[6] + t1 * Rt[7];
+  Rc[6] = t17;
+  real t20 = t0 * Rt[7] - t1 * Rt[6];
+  Rc[7] = t20;
+  Rc[8] = Rt[8];
+  real t22 = ro[0] + q[0] * Rt[2];
+  r[0] = t22;
+  real t24 = ro[1] + q[0] * Rt[5];
+  r[1] = t24;
+  real t26 = ro[2] + q[0] * Rt[8];
+  r[2] = t26;
+  real t31 = motion_I[0] * t5 + motion_I[1] * t11 + motion_I[2] * t17;
+  motion[0] = t31;
+  real t36 = motion_I[0] * t8 + motion_I[1] * t14 + motion_I[2] * t20;
+  motion[1] = t36;
+  motion[2] = u[1] + (Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2]);
+  motion[3] = motion_I[3] * t5 + motion_I[4] * t11 + motion_I[5] * t17 + u[1] * t36;
+  motion[4] = motion_I[3] * t8 + motion_I[4] * t14 + motion_I[5] * t20 - u[1] * t31;
+  motion[5] = s[1] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t63 = motion_I[0] * motion_I[1];
+  real t66 = motion_I[1] * motion_I[1];
+  real t67 = motion_I[2] * motion_I[2];
+  real t71 = motion_I[0] * motion_I[2];
+  real t75 = motion_I[6] + (t24 * (t63 - motion_I[5]) - t22 * (t66 + t67) + t26 * (motion_I[4] +
+    t71));
+  real t79 = motion_I[0] * motion_I[0];
+  real t83 = motion_I[1] * motion_I[2];
+  real t87 = motion_I[7] + (t22 * (motion_I[5] + t63) - t24 * (t67 + t79) + t26 * (t83 -
+    motion_I[3]));
+  real t98 = motion_I[8] + (t22 * (t71 - motion_I[4]) + t24 * (motion_I[3] + t83) - t26 * (t66 +
+    t79));
+  motion[6] = t5 * t75 + t11 * t87 + t17 * t98 + u[0] * t36 * 2.0;
+  motion[7] = t8 * t75 + t14 * t87 + t20 * t98 - 2.0 * (u[0] * t31);
+  motion[8] = s[0] + (Rt[2] * t75 + Rt[5] * t87 + Rt[8] * t98);
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 2, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1344,150 +519,59 @@ static const mstmm_port mstmm_hinge_cylindrical_body_motion_outputs[] = {
  * out W[2][2] slopes of the rows by load, rotors and laws
  * out H[6][2] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_cylindrical_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_cylindrical_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)q;
-    (void)s;
-    (void)along;
-    B[0] = 0.0;
-    B[1] = 0.0;
-    B[2] = 0.0;
-    B[3] = 0.0;
-    B[4] = 0.0;
-    B[5] = 0.0;
-    const real t0 = 1.0 / sq[0];
-    const real t1 = u[1] * motion[0];
-    const real t2 = motion[4] + t1;
-    const real t3 = t0 * t2;
-    const real t4 = motion[1] * rate[0];
-    const real t5 = 2.0 * t4;
-    const real t6 = motion[2] - u[1];
-    const real t7 = motion[0] * t0;
-    const real t8 = t6 * t7;
-    const real t9 = t5 + t8;
-    const real t10 = t3 + t9;
-    B[6] = t10;
-    const real t11 = motion[1] * t0;
-    const real t12 = t6 * t11;
-    const real t13 = motion[0] * rate[0];
-    const real t14 = 2.0 * t13;
-    const real t15 = t12 - t14;
-    const real t16 = u[1] * motion[1];
-    const real t17 = motion[3] - t16;
-    const real t18 = t0 * t17;
-    const real t19 = t15 - t18;
-    B[7] = t19;
-    const real t20 = motion[0] * t7;
-    const real t21 = motion[1] * t11;
-    const real t22 = t20 + t21;
-    const real t23 = scale[0] - t22;
-    B[8] = t23;
-    B[9] = t11;
-    const real t24 = -t7;
-    B[10] = t24;
-    B[11] = rate[0];
-    const real t25 = t3 + t4;
-    const real t26 = u[1] * t7;
-    const real t27 = t25 - t26;
-    B[12] = t27;
-    const real t28 = u[1] * t11;
-    const real t29 = t13 + t18;
-    const real t30 = t28 + t29;
-    const real t31 = -t30;
-    B[13] = t31;
-    B[14] = scale[0];
-    const real t32 = u[0] * motion[0];
-    const real t33 = 2.0 * t32;
-    const real t34 = motion[7] + t33;
-    const real t35 = t0 * t34;
-    const real t36 = u[0] * 2.0;
-    const real t37 = t36 * t7;
-    const real t38 = t35 - t37;
-    B[15] = t38;
-    const real t39 = t36 * t11;
-    const real t40 = u[0] * motion[1];
-    const real t41 = 2.0 * t40;
-    const real t42 = motion[6] - t41;
-    const real t43 = t0 * t42;
-    const real t44 = t39 + t43;
-    const real t45 = -t44;
-    B[16] = t45;
-    B[17] = 0.0;
-    G[0] = 0.0;
-    G[1] = 0.0;
-    G[2] = 0.0;
-    const real t46 = f[1] * t0;
-    const real t47 = -t46;
-    G[3] = t47;
-    const real t48 = f[0] * t0;
-    G[4] = t48;
-    G[5] = 0.0;
-    G[6] = t47;
-    G[7] = t48;
-    G[8] = 0.0;
-    const real t49 = f[4] * t0;
-    const real t50 = -t49;
-    G[9] = t50;
-    const real t51 = f[3] * t0;
-    G[10] = t51;
-    G[11] = 0.0;
-    const real t52 = J[0] * scale[0];
-    const real t53 = t52 - laws[0];
-    W[0] = t53;
-    const real t54 = -laws[1];
-    W[1] = t54;
-    const real t55 = -laws[2];
-    W[2] = t55;
-    const real t56 = J[1] * scale[0];
-    const real t57 = t56 - laws[3];
-    W[3] = t57;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 1.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)s;
+  (void)along;
+  B[0] = B[1] = B[2] = B[3] = B[4] = B[5] = 0.0;
+  real t0 = 1.0 / sq[0];
+  real t3 = t0 * (motion[4] + u[1] * motion[0]);
+  real t4 = motion[1] * rate[0];
+  real t6 = motion[2] - u[1];
+  real t7 = motion[0] * t0;
+  B[6] = t3 + (2.0 * t4 + t6 * t7);
+  real t11 = motion[1] * t0;
+  real t13 = motion[0] * rate[0];
+  real t18 = t0 * (motion[3] - u[1] * motion[1]);
+  B[7] = t6 * t11 - 2.0 * t13 - t18;
+  B[8] = scale[0] - (motion[0] * t7 + motion[1] * t11);
+  B[9] = t11;
+  B[10] = -t7;
+  B[11] = rate[0];
+  B[12] = t3 + t4 - u[1] * t7;
+  B[13] = -(u[1] * t11 + (t13 + t18));
+  B[14] = scale[0];
+  real t36 = u[0] * 2.0;
+  B[15] = t0 * (motion[7] + 2.0 * (u[0] * motion[0])) - t36 * t7;
+  B[16] = -(t36 * t11 + t0 * (motion[6] - 2.0 * (u[0] * motion[1])));
+  B[17] = G[0] = G[1] = G[2] = 0.0;
+  real t47 = -(f[1] * t0);
+  G[3] = t47;
+  real t48 = f[0] * t0;
+  G[4] = t48;
+  G[5] = 0.0;
+  G[6] = t47;
+  G[7] = t48;
+  G[8] = 0.0;
+  G[9] = -(f[4] * t0);
+  G[10] = f[3] * t0;
+  G[11] = 0.0;
+  W[0] = J[0] * scale[0] - laws[0];
+  W[1] = -laws[1];
+  W[2] = -laws[2];
+  W[3] = J[1] * scale[0] - laws[3];
+  H[0] = H[1] = H[2] = H[3] = 0.0;
+  H[4] = 1.0;
+  H[5] = H[6] = H[7] = H[8] = H[9] = H[10] = 0.0;
+  H[11] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_cylindrical_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_cylindrical_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_cylindrical_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"laws", 4, "", 0, 0},
-    {"along", 4, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_cylindrical_directions_outputs[] = {
-    {"B", 18, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"W", 4, "", 0, 0},
-    {"H", 12, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_cylindrical_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_cylindrical_q_names[] = {
     "displacement", "angle",
@@ -1506,121 +590,67 @@ static const char *const mstmm_hinge_cylindrical_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_cylindrical_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_hinge,
-        .call = mstmm_hinge_cylindrical_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_cylindrical_hinge_inputs,
-        .outputs = mstmm_hinge_cylindrical_hinge_outputs,
-        .ir_hash = "65ef8b0fe9897697e4c345cab86ba799a002908027b15ef4ea4fb607123ed7eb",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_forward,
-        .call = mstmm_hinge_cylindrical_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_cylindrical_forward_inputs,
-        .outputs = mstmm_hinge_cylindrical_forward_outputs,
-        .ir_hash = "a1177f61aadf1da2ef9a51e9cf3edebc8d405ecfc4a4b9ea52bae9cdc1e69fec",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_condense,
-        .call = mstmm_hinge_cylindrical_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_cylindrical_condense_inputs,
-        .outputs = mstmm_hinge_cylindrical_condense_outputs,
-        .ir_hash = "61429a55482b6e48340acaaabd67da8b00a4ac7ced13ce415a957fe3c4656262",
-        .n_guards = 6,
-        .guards = mstmm_hinge_cylindrical_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_recover,
-        .call = mstmm_hinge_cylindrical_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_cylindrical_recover_inputs,
-        .outputs = mstmm_hinge_cylindrical_recover_outputs,
-        .ir_hash = "2d2fc08b216dc8d03045dc3307caf6086dc61fd49efe8bbfab1cbde1d009a8e1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_hinge_slope,
-        .call = mstmm_hinge_cylindrical_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_cylindrical_hinge_slope_inputs,
-        .outputs = mstmm_hinge_cylindrical_hinge_slope_outputs,
-        .ir_hash = "6747216c99aa04f1dd8524e74455ccc53c41d50b5e586c5e5901815607a601fe",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_rates_by_coordinates,
-        .call = mstmm_hinge_cylindrical_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_cylindrical_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_cylindrical_rates_by_coordinates_outputs,
-        .ir_hash = "f0e0afdbfdfd566c854a9bccbae6f0e5e26bc1fe897eecfcf3e7f1014d106049",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_rates_by_speeds,
-        .call = mstmm_hinge_cylindrical_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_cylindrical_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_cylindrical_rates_by_speeds_outputs,
-        .ir_hash = "d579704cb3933e114f679917855ac7a65e3109b6ada3a6dab994ebfc795ed7bd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_body_motion,
-        .call = mstmm_hinge_cylindrical_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_cylindrical_body_motion_inputs,
-        .outputs = mstmm_hinge_cylindrical_body_motion_outputs,
-        .ir_hash = "9bf891c468b41f508b203345a5a7d9e174b1944952cd53c17040bbae3f5aa4c8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_cylindrical_directions,
-        .call = mstmm_hinge_cylindrical_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_cylindrical_directions_inputs,
-        .outputs = mstmm_hinge_cylindrical_directions_outputs,
-        .ir_hash = "75f22788a370184c59fb3a5c3a7562f6b910bc182b3e71bb3a1d334fcaad073c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "",
+    0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 2, "", 0, 0}},
+    "2ad48784ca2ac096fd08e70de15adb2788d8e73958e15000e0ab5e9ad30dcb40", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_forward), 7, 4, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0},
+    {"s", 2, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r",
+    3, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 2, "", 0, 0}},
+    "0e07db921c2facdd97baf3d8a2af034168c3a367b3b7f83c4ddf65ae9a0a03a2", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_condense), 8, 4, (const mstmm_port[]){{"Rc",
+    9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 12, "", 0, 0}, {"g", 2, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "a1fe227f58f1f102c247a0932794acc4996de211e3e0a0741b08099fb1dd1cad", 6, (const
+    mstmm_guard[]){{1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 2 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_recover), 7, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"G", 12, "", 0, 0},
+    {"g", 2, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 2, "", 0, 0},
+    {"delta", 6, "", 0, 0}}, "d6002854889276cc27dbdd2b7898d9910be5a57e12590d3ad3fac16f0c9baba4", 0,
+    NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_hinge_slope), 5, 7, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"d_q", 2, "", 0, 0},
+    {"d_u", 2, "", 0, 0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H",
+    12, "", 0, 0}, {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0,
+    0}, {"d_qdot", 2, "", 0, 0}},
+    "9f2f4f055d86c9751f14450eda6f8ceccfddc54b9c157d1430472c9b0cc6b236", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_rates_by_coordinates), 3, 1,
+    (const mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 4, "", 0, 0}},
+    "8831b011bd4eedc0aec732a992347dd88c7399dce0efaad0bc5dce4149ef3e15", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 4, "", 0, 0}},
+    "fb6f92c1566a6897d4e2f5540adbc8aba2e505210adc06654915bbd936d55a3f", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_body_motion), 7, 10, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0}, {"s", 2, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R",
+    9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s",
+    0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}, {"qdot", 2, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m",
+    0, 0}, {"motion", 9, "", 0, 0}},
+    "2ada70683ec37ba4ede8fd294ee94d32c870e889f3312cd667306d849e127962", 0, NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_cylindrical_directions), 12, 4, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"s", 2, "", 0, 0},
+    {"motion", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"laws", 4,
+    "", 0, 0}, {"along", 4, "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1,
+    "1/s", 0, 0}}, (const mstmm_port[]){{"B", 18, "", 0, 0}, {"G", 12, "", 0, 0}, {"W", 4, "", 0,
+    0}, {"H", 12, "", 0, 0}}, "cc3217a9ac36866b05631a757b2462bcddfe920d51477e6eb082909ace6ab5d9", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_hinge_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "cylindrical",
-    .hash = "3f669a307ad0a5521ad8cbd56b4cb33f5866a9cff2234edc8f7756eb17e1bdd4",
+    .hash = "9443652c48316b0234675f5f3f521a8b75cf120a3d56d018b9d5c71861486b83",
     .nq = 2,
     .nu = 2,
     .np = 0,

@@ -7,31 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_fixed;
-int mstmm_hinge_fixed_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_fixed_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_fixed_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_fixed_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-
 /* relative motion of the fixed hinge
  * in  p[0] parameters
  * in  q[0] coordinates
@@ -44,63 +19,26 @@ int mstmm_hinge_fixed_body_motion(const real *restrict p, const real *restrict q
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[0] coordinate rates
  */
-int mstmm_hinge_fixed_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_fixed_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    (void)H;
-    (void)qdot;
-    R[0] = 1.0;
-    R[1] = 0.0;
-    R[2] = 0.0;
-    R[3] = 0.0;
-    R[4] = 1.0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = 0.0;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
+  (void)p;
+  (void)q;
+  (void)u;
+  (void)H;
+  (void)qdot;
+  R[0] = 1.0;
+  R[1] = R[2] = R[3] = 0.0;
+  R[4] = 1.0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = d[2] = v[0] = v[1] = v[2] = w[0] = w[1] = w[2] = c[0] = c[1] = c[2] = c[3] = c[4] =
     c[5] = 0.0;
-    return 0;
+  return 0;
 }
 
-static int mstmm_hinge_fixed_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_fixed_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_fixed_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 0, "", 0, 0},
-    {"u", 0, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_fixed_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 0, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_fixed_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the fixed hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -117,140 +55,52 @@ static const mstmm_port mstmm_hinge_fixed_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[0] coordinate rates
  */
-int mstmm_hinge_fixed_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_fixed_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    (void)s;
-    (void)qdot;
-    Rc[0] = Rt[0];
-    Rc[1] = Rt[1];
-    Rc[2] = Rt[2];
-    Rc[3] = Rt[3];
-    Rc[4] = Rt[4];
-    Rc[5] = Rt[5];
-    Rc[6] = Rt[6];
-    Rc[7] = Rt[7];
-    Rc[8] = Rt[8];
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t0 = Rt[0] * motion_I[0];
-    const real t1 = Rt[3] * motion_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[6] * motion_I[2];
-    const real t4 = t2 + t3;
-    motion[0] = t4;
-    const real t5 = Rt[1] * motion_I[0];
-    const real t6 = Rt[4] * motion_I[1];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[7] * motion_I[2];
-    const real t9 = t7 + t8;
-    motion[1] = t9;
-    const real t10 = Rt[2] * motion_I[0];
-    const real t11 = Rt[5] * motion_I[1];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[8] * motion_I[2];
-    const real t14 = t12 + t13;
-    motion[2] = t14;
-    const real t15 = Rt[0] * motion_I[3];
-    const real t16 = Rt[3] * motion_I[4];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[6] * motion_I[5];
-    const real t19 = t17 + t18;
-    motion[3] = t19;
-    const real t20 = Rt[1] * motion_I[3];
-    const real t21 = Rt[4] * motion_I[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[7] * motion_I[5];
-    const real t24 = t22 + t23;
-    motion[4] = t24;
-    const real t25 = Rt[2] * motion_I[3];
-    const real t26 = Rt[5] * motion_I[4];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[8] * motion_I[5];
-    const real t29 = t27 + t28;
-    motion[5] = t29;
-    const real t30 = motion_I[0] * motion_I[1];
-    const real t31 = t30 - motion_I[5];
-    const real t32 = ro[1] * t31;
-    const real t33 = motion_I[1] * motion_I[1];
-    const real t34 = motion_I[2] * motion_I[2];
-    const real t35 = t33 + t34;
-    const real t36 = ro[0] * t35;
-    const real t37 = t32 - t36;
-    const real t38 = motion_I[0] * motion_I[2];
-    const real t39 = motion_I[4] + t38;
-    const real t40 = ro[2] * t39;
-    const real t41 = t37 + t40;
-    const real t42 = motion_I[6] + t41;
-    const real t43 = Rt[0] * t42;
-    const real t44 = motion_I[5] + t30;
-    const real t45 = ro[0] * t44;
-    const real t46 = motion_I[0] * motion_I[0];
-    const real t47 = t34 + t46;
-    const real t48 = ro[1] * t47;
-    const real t49 = t45 - t48;
-    const real t50 = motion_I[1] * motion_I[2];
-    const real t51 = t50 - motion_I[3];
-    const real t52 = ro[2] * t51;
-    const real t53 = t49 + t52;
-    const real t54 = motion_I[7] + t53;
-    const real t55 = Rt[3] * t54;
-    const real t56 = t43 + t55;
-    const real t57 = t38 - motion_I[4];
-    const real t58 = ro[0] * t57;
-    const real t59 = motion_I[3] + t50;
-    const real t60 = ro[1] * t59;
-    const real t61 = t58 + t60;
-    const real t62 = t33 + t46;
-    const real t63 = ro[2] * t62;
-    const real t64 = t61 - t63;
-    const real t65 = motion_I[8] + t64;
-    const real t66 = Rt[6] * t65;
-    const real t67 = t56 + t66;
-    motion[6] = t67;
-    const real t68 = Rt[1] * t42;
-    const real t69 = Rt[4] * t54;
-    const real t70 = t68 + t69;
-    const real t71 = Rt[7] * t65;
-    const real t72 = t70 + t71;
-    motion[7] = t72;
-    const real t73 = Rt[2] * t42;
-    const real t74 = Rt[5] * t54;
-    const real t75 = t73 + t74;
-    const real t76 = Rt[8] * t65;
-    const real t77 = t75 + t76;
-    motion[8] = t77;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  (void)s;
+  (void)qdot;
+  Rc[0] = Rt[0];
+  Rc[1] = Rt[1];
+  Rc[2] = Rt[2];
+  Rc[3] = Rt[3];
+  Rc[4] = Rt[4];
+  Rc[5] = Rt[5];
+  Rc[6] = Rt[6];
+  Rc[7] = Rt[7];
+  Rc[8] = Rt[8];
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  motion[0] = Rt[0] * motion_I[0] + Rt[3] * motion_I[1] + Rt[6] * motion_I[2];
+  motion[1] = Rt[1] * motion_I[0] + Rt[4] * motion_I[1] + Rt[7] * motion_I[2];
+  motion[2] = Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2];
+  motion[3] = Rt[0] * motion_I[3] + Rt[3] * motion_I[4] + Rt[6] * motion_I[5];
+  motion[4] = Rt[1] * motion_I[3] + Rt[4] * motion_I[4] + Rt[7] * motion_I[5];
+  motion[5] = Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5];
+  real t30 = motion_I[0] * motion_I[1];
+  real t33 = motion_I[1] * motion_I[1];
+  real t34 = motion_I[2] * motion_I[2];
+  real t38 = motion_I[0] * motion_I[2];
+  real t42 = motion_I[6] + (ro[1] * (t30 - motion_I[5]) - ro[0] * (t33 + t34) + ro[2] * (motion_I[4]
+    + t38));
+  real t46 = motion_I[0] * motion_I[0];
+  real t50 = motion_I[1] * motion_I[2];
+  real t54 = motion_I[7] + (ro[0] * (motion_I[5] + t30) - ro[1] * (t34 + t46) + ro[2] * (t50 -
+    motion_I[3]));
+  real t65 = motion_I[8] + (ro[0] * (t38 - motion_I[4]) + ro[1] * (motion_I[3] + t50) - ro[2] * (t33
+    + t46));
+  motion[6] = Rt[0] * t42 + Rt[3] * t54 + Rt[6] * t65;
+  motion[7] = Rt[1] * t42 + Rt[4] * t54 + Rt[7] * t65;
+  motion[8] = Rt[2] * t42 + Rt[5] * t54 + Rt[8] * t65;
+  return 0;
 }
 
-static int mstmm_hinge_fixed_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_fixed_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_fixed_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 0, "", 0, 0},
-    {"u", 0, "", 0, 0},
-    {"s", 0, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_fixed_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 0, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_fixed_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -268,466 +118,104 @@ static const mstmm_port mstmm_hinge_fixed_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_fixed_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_fixed_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    (void)q;
-    (void)floor_;
-    (void)tau;
-    (void)G;
-    (void)g;
-    const real t0 = Rc[0] * S[0];
-    const real t1 = Rc[1] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[2] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = Rc[0] * t4;
-    const real t6 = Rc[0] * S[1];
-    const real t7 = Rc[1] * S[6];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[2] * S[7];
-    const real t10 = t8 + t9;
-    const real t11 = Rc[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[0] * S[2];
-    const real t14 = Rc[1] * S[7];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[2] * S[11];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[2] * t17;
-    const real t19 = t12 + t18;
-    S_I[0] += t19;
-    const real t20 = Rc[3] * t4;
-    const real t21 = Rc[4] * t10;
-    const real t22 = t20 + t21;
-    const real t23 = Rc[5] * t17;
-    const real t24 = t22 + t23;
-    S_I[1] += t24;
-    const real t25 = Rc[6] * t4;
-    const real t26 = Rc[7] * t10;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t17;
-    const real t29 = t27 + t28;
-    S_I[2] += t29;
-    const real t30 = Rc[0] * S[3];
-    const real t31 = Rc[1] * S[8];
-    const real t32 = t30 + t31;
-    const real t33 = Rc[2] * S[12];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[0] * t34;
-    const real t36 = Rc[0] * S[4];
-    const real t37 = Rc[1] * S[9];
-    const real t38 = t36 + t37;
-    const real t39 = Rc[2] * S[13];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[1] * t40;
-    const real t42 = t35 + t41;
-    const real t43 = Rc[0] * S[5];
-    const real t44 = Rc[1] * S[10];
-    const real t45 = t43 + t44;
-    const real t46 = Rc[2] * S[14];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[2] * t47;
-    const real t49 = t42 + t48;
-    const real t50 = r[1] * t29;
-    const real t51 = r[2] * t24;
-    const real t52 = t50 - t51;
-    const real t53 = t49 + t52;
-    S_I[3] += t53;
-    const real t54 = Rc[3] * t34;
-    const real t55 = Rc[4] * t40;
-    const real t56 = t54 + t55;
-    const real t57 = Rc[5] * t47;
-    const real t58 = t56 + t57;
-    const real t59 = r[2] * t19;
-    const real t60 = r[0] * t29;
-    const real t61 = t59 - t60;
-    const real t62 = t58 + t61;
-    S_I[4] += t62;
-    const real t63 = Rc[6] * t34;
-    const real t64 = Rc[7] * t40;
-    const real t65 = t63 + t64;
-    const real t66 = Rc[8] * t47;
-    const real t67 = t65 + t66;
-    const real t68 = r[0] * t24;
-    const real t69 = r[1] * t19;
-    const real t70 = t68 - t69;
-    const real t71 = t67 + t70;
-    S_I[5] += t71;
-    const real t72 = Rc[3] * S[0];
-    const real t73 = Rc[4] * S[1];
-    const real t74 = t72 + t73;
-    const real t75 = Rc[5] * S[2];
-    const real t76 = t74 + t75;
-    const real t77 = Rc[3] * t76;
-    const real t78 = Rc[3] * S[1];
-    const real t79 = Rc[4] * S[6];
-    const real t80 = t78 + t79;
-    const real t81 = Rc[5] * S[7];
-    const real t82 = t80 + t81;
-    const real t83 = Rc[4] * t82;
-    const real t84 = t77 + t83;
-    const real t85 = Rc[3] * S[2];
-    const real t86 = Rc[4] * S[7];
-    const real t87 = t85 + t86;
-    const real t88 = Rc[5] * S[11];
-    const real t89 = t87 + t88;
-    const real t90 = Rc[5] * t89;
-    const real t91 = t84 + t90;
-    S_I[6] += t91;
-    const real t92 = Rc[6] * t76;
-    const real t93 = Rc[7] * t82;
-    const real t94 = t92 + t93;
-    const real t95 = Rc[8] * t89;
-    const real t96 = t94 + t95;
-    S_I[7] += t96;
-    const real t97 = Rc[3] * S[3];
-    const real t98 = Rc[4] * S[8];
-    const real t99 = t97 + t98;
-    const real t100 = Rc[5] * S[12];
-    const real t101 = t99 + t100;
-    const real t102 = Rc[0] * t101;
-    const real t103 = Rc[3] * S[4];
-    const real t104 = Rc[4] * S[9];
-    const real t105 = t103 + t104;
-    const real t106 = Rc[5] * S[13];
-    const real t107 = t105 + t106;
-    const real t108 = Rc[1] * t107;
-    const real t109 = t102 + t108;
-    const real t110 = Rc[3] * S[5];
-    const real t111 = Rc[4] * S[10];
-    const real t112 = t110 + t111;
-    const real t113 = Rc[5] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = Rc[2] * t114;
-    const real t116 = t109 + t115;
-    const real t117 = r[1] * t96;
-    const real t118 = r[2] * t91;
-    const real t119 = t117 - t118;
-    const real t120 = t116 + t119;
-    S_I[8] += t120;
-    const real t121 = Rc[3] * t101;
-    const real t122 = Rc[4] * t107;
-    const real t123 = t121 + t122;
-    const real t124 = Rc[5] * t114;
-    const real t125 = t123 + t124;
-    const real t126 = r[0] * t96;
-    const real t127 = t51 - t126;
-    const real t128 = t125 + t127;
-    S_I[9] += t128;
-    const real t129 = Rc[6] * t101;
-    const real t130 = Rc[7] * t107;
-    const real t131 = t129 + t130;
-    const real t132 = Rc[8] * t114;
-    const real t133 = t131 + t132;
-    const real t134 = r[0] * t91;
-    const real t135 = r[1] * t24;
-    const real t136 = t134 - t135;
-    const real t137 = t133 + t136;
-    S_I[10] += t137;
-    const real t138 = Rc[6] * S[0];
-    const real t139 = Rc[7] * S[1];
-    const real t140 = t138 + t139;
-    const real t141 = Rc[8] * S[2];
-    const real t142 = t140 + t141;
-    const real t143 = Rc[6] * t142;
-    const real t144 = Rc[6] * S[1];
-    const real t145 = Rc[7] * S[6];
-    const real t146 = t144 + t145;
-    const real t147 = Rc[8] * S[7];
-    const real t148 = t146 + t147;
-    const real t149 = Rc[7] * t148;
-    const real t150 = t143 + t149;
-    const real t151 = Rc[6] * S[2];
-    const real t152 = Rc[7] * S[7];
-    const real t153 = t151 + t152;
-    const real t154 = Rc[8] * S[11];
-    const real t155 = t153 + t154;
-    const real t156 = Rc[8] * t155;
-    const real t157 = t150 + t156;
-    S_I[11] += t157;
-    const real t158 = Rc[6] * S[3];
-    const real t159 = Rc[7] * S[8];
-    const real t160 = t158 + t159;
-    const real t161 = Rc[8] * S[12];
-    const real t162 = t160 + t161;
-    const real t163 = Rc[0] * t162;
-    const real t164 = Rc[6] * S[4];
-    const real t165 = Rc[7] * S[9];
-    const real t166 = t164 + t165;
-    const real t167 = Rc[8] * S[13];
-    const real t168 = t166 + t167;
-    const real t169 = Rc[1] * t168;
-    const real t170 = t163 + t169;
-    const real t171 = Rc[6] * S[5];
-    const real t172 = Rc[7] * S[10];
-    const real t173 = t171 + t172;
-    const real t174 = Rc[8] * S[14];
-    const real t175 = t173 + t174;
-    const real t176 = Rc[2] * t175;
-    const real t177 = t170 + t176;
-    const real t178 = r[1] * t157;
-    const real t179 = r[2] * t96;
-    const real t180 = t178 - t179;
-    const real t181 = t177 + t180;
-    S_I[12] += t181;
-    const real t182 = Rc[3] * t162;
-    const real t183 = Rc[4] * t168;
-    const real t184 = t182 + t183;
-    const real t185 = Rc[5] * t175;
-    const real t186 = t184 + t185;
-    const real t187 = r[2] * t29;
-    const real t188 = r[0] * t157;
-    const real t189 = t187 - t188;
-    const real t190 = t186 + t189;
-    S_I[13] += t190;
-    const real t191 = Rc[6] * t162;
-    const real t192 = Rc[7] * t168;
-    const real t193 = t191 + t192;
-    const real t194 = Rc[8] * t175;
-    const real t195 = t193 + t194;
-    const real t196 = t126 - t50;
-    const real t197 = t195 + t196;
-    S_I[14] += t197;
-    const real t198 = Rc[0] * S[15];
-    const real t199 = Rc[1] * S[16];
-    const real t200 = t198 + t199;
-    const real t201 = Rc[2] * S[17];
-    const real t202 = t200 + t201;
-    const real t203 = Rc[0] * t202;
-    const real t204 = Rc[0] * S[16];
-    const real t205 = Rc[1] * S[18];
-    const real t206 = t204 + t205;
-    const real t207 = Rc[2] * S[19];
-    const real t208 = t206 + t207;
-    const real t209 = Rc[1] * t208;
-    const real t210 = t203 + t209;
-    const real t211 = Rc[0] * S[17];
-    const real t212 = Rc[1] * S[19];
-    const real t213 = t211 + t212;
-    const real t214 = Rc[2] * S[20];
-    const real t215 = t213 + t214;
-    const real t216 = Rc[2] * t215;
-    const real t217 = t210 + t216;
-    const real t218 = r[1] * t181;
-    const real t219 = r[2] * t120;
-    const real t220 = t218 - t219;
-    const real t221 = r[1] * t177;
-    const real t222 = r[2] * t116;
-    const real t223 = t221 - t222;
-    const real t224 = t220 + t223;
-    const real t225 = t217 + t224;
-    S_I[15] += t225;
-    const real t226 = Rc[3] * t202;
-    const real t227 = Rc[4] * t208;
-    const real t228 = t226 + t227;
-    const real t229 = Rc[5] * t215;
-    const real t230 = t228 + t229;
-    const real t231 = r[1] * t190;
-    const real t232 = r[2] * t128;
-    const real t233 = t231 - t232;
-    const real t234 = r[2] * t49;
-    const real t235 = r[0] * t177;
-    const real t236 = t234 - t235;
-    const real t237 = t233 + t236;
-    const real t238 = t230 + t237;
-    S_I[16] += t238;
-    const real t239 = Rc[6] * t202;
-    const real t240 = Rc[7] * t208;
-    const real t241 = t239 + t240;
-    const real t242 = Rc[8] * t215;
-    const real t243 = t241 + t242;
-    const real t244 = r[1] * t197;
-    const real t245 = r[2] * t137;
-    const real t246 = t244 - t245;
-    const real t247 = r[0] * t116;
-    const real t248 = r[1] * t49;
-    const real t249 = t247 - t248;
-    const real t250 = t246 + t249;
-    const real t251 = t243 + t250;
-    S_I[17] += t251;
-    const real t252 = Rc[3] * S[15];
-    const real t253 = Rc[4] * S[16];
-    const real t254 = t252 + t253;
-    const real t255 = Rc[5] * S[17];
-    const real t256 = t254 + t255;
-    const real t257 = Rc[3] * t256;
-    const real t258 = Rc[3] * S[16];
-    const real t259 = Rc[4] * S[18];
-    const real t260 = t258 + t259;
-    const real t261 = Rc[5] * S[19];
-    const real t262 = t260 + t261;
-    const real t263 = Rc[4] * t262;
-    const real t264 = t257 + t263;
-    const real t265 = Rc[3] * S[17];
-    const real t266 = Rc[4] * S[19];
-    const real t267 = t265 + t266;
-    const real t268 = Rc[5] * S[20];
-    const real t269 = t267 + t268;
-    const real t270 = Rc[5] * t269;
-    const real t271 = t264 + t270;
-    const real t272 = r[2] * t62;
-    const real t273 = r[0] * t190;
-    const real t274 = t272 - t273;
-    const real t275 = r[2] * t58;
-    const real t276 = r[0] * t186;
-    const real t277 = t275 - t276;
-    const real t278 = t274 + t277;
-    const real t279 = t271 + t278;
-    S_I[18] += t279;
-    const real t280 = Rc[6] * t256;
-    const real t281 = Rc[7] * t262;
-    const real t282 = t280 + t281;
-    const real t283 = Rc[8] * t269;
-    const real t284 = t282 + t283;
-    const real t285 = r[2] * t71;
-    const real t286 = r[0] * t197;
-    const real t287 = t285 - t286;
-    const real t288 = r[0] * t125;
-    const real t289 = r[1] * t58;
-    const real t290 = t288 - t289;
-    const real t291 = t287 + t290;
-    const real t292 = t284 + t291;
-    S_I[19] += t292;
-    const real t293 = Rc[6] * S[15];
-    const real t294 = Rc[7] * S[16];
-    const real t295 = t293 + t294;
-    const real t296 = Rc[8] * S[17];
-    const real t297 = t295 + t296;
-    const real t298 = Rc[6] * t297;
-    const real t299 = Rc[6] * S[16];
-    const real t300 = Rc[7] * S[18];
-    const real t301 = t299 + t300;
-    const real t302 = Rc[8] * S[19];
-    const real t303 = t301 + t302;
-    const real t304 = Rc[7] * t303;
-    const real t305 = t298 + t304;
-    const real t306 = Rc[6] * S[17];
-    const real t307 = Rc[7] * S[19];
-    const real t308 = t306 + t307;
-    const real t309 = Rc[8] * S[20];
-    const real t310 = t308 + t309;
-    const real t311 = Rc[8] * t310;
-    const real t312 = t305 + t311;
-    const real t313 = r[0] * t137;
-    const real t314 = r[1] * t71;
-    const real t315 = t313 - t314;
-    const real t316 = r[0] * t133;
-    const real t317 = r[1] * t67;
-    const real t318 = t316 - t317;
-    const real t319 = t315 + t318;
-    const real t320 = t312 + t319;
-    S_I[20] += t320;
-    const real t321 = Rc[0] * e[0];
-    const real t322 = Rc[1] * e[1];
-    const real t323 = t321 + t322;
-    const real t324 = Rc[2] * e[2];
-    const real t325 = t323 + t324;
-    e_I[0] += t325;
-    const real t326 = Rc[3] * e[0];
-    const real t327 = Rc[4] * e[1];
-    const real t328 = t326 + t327;
-    const real t329 = Rc[5] * e[2];
-    const real t330 = t328 + t329;
-    e_I[1] += t330;
-    const real t331 = Rc[6] * e[0];
-    const real t332 = Rc[7] * e[1];
-    const real t333 = t331 + t332;
-    const real t334 = Rc[8] * e[2];
-    const real t335 = t333 + t334;
-    e_I[2] += t335;
-    const real t336 = Rc[0] * e[3];
-    const real t337 = Rc[1] * e[4];
-    const real t338 = t336 + t337;
-    const real t339 = Rc[2] * e[5];
-    const real t340 = t338 + t339;
-    const real t341 = Rc[6] * r[1];
-    const real t342 = Rc[3] * r[2];
-    const real t343 = t341 - t342;
-    const real t344 = e[0] * t343;
-    const real t345 = Rc[7] * r[1];
-    const real t346 = Rc[4] * r[2];
-    const real t347 = t345 - t346;
-    const real t348 = e[1] * t347;
-    const real t349 = t344 + t348;
-    const real t350 = Rc[8] * r[1];
-    const real t351 = Rc[5] * r[2];
-    const real t352 = t350 - t351;
-    const real t353 = e[2] * t352;
-    const real t354 = t349 + t353;
-    const real t355 = t340 + t354;
-    e_I[3] += t355;
-    const real t356 = Rc[3] * e[3];
-    const real t357 = Rc[4] * e[4];
-    const real t358 = t356 + t357;
-    const real t359 = Rc[5] * e[5];
-    const real t360 = t358 + t359;
-    const real t361 = Rc[0] * r[2];
-    const real t362 = Rc[6] * r[0];
-    const real t363 = t361 - t362;
-    const real t364 = e[0] * t363;
-    const real t365 = Rc[1] * r[2];
-    const real t366 = Rc[7] * r[0];
-    const real t367 = t365 - t366;
-    const real t368 = e[1] * t367;
-    const real t369 = t364 + t368;
-    const real t370 = Rc[2] * r[2];
-    const real t371 = Rc[8] * r[0];
-    const real t372 = t370 - t371;
-    const real t373 = e[2] * t372;
-    const real t374 = t369 + t373;
-    const real t375 = t360 + t374;
-    e_I[4] += t375;
-    const real t376 = Rc[6] * e[3];
-    const real t377 = Rc[7] * e[4];
-    const real t378 = t376 + t377;
-    const real t379 = Rc[8] * e[5];
-    const real t380 = t378 + t379;
-    const real t381 = Rc[3] * r[0];
-    const real t382 = Rc[0] * r[1];
-    const real t383 = t381 - t382;
-    const real t384 = e[0] * t383;
-    const real t385 = Rc[4] * r[0];
-    const real t386 = Rc[1] * r[1];
-    const real t387 = t385 - t386;
-    const real t388 = e[1] * t387;
-    const real t389 = t384 + t388;
-    const real t390 = Rc[5] * r[0];
-    const real t391 = Rc[2] * r[1];
-    const real t392 = t390 - t391;
-    const real t393 = e[2] * t392;
-    const real t394 = t389 + t393;
-    const real t395 = t380 + t394;
-    e_I[5] += t395;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)floor_;
+  (void)tau;
+  (void)G;
+  (void)g;
+  real t4 = Rc[0] * S[0] + Rc[1] * S[1] + Rc[2] * S[2];
+  real t10 = Rc[0] * S[1] + Rc[1] * S[6] + Rc[2] * S[7];
+  real t17 = Rc[0] * S[2] + Rc[1] * S[7] + Rc[2] * S[11];
+  real t19 = Rc[0] * t4 + Rc[1] * t10 + Rc[2] * t17;
+  S_I[0] += t19;
+  real t24 = Rc[3] * t4 + Rc[4] * t10 + Rc[5] * t17;
+  S_I[1] += t24;
+  real t29 = Rc[6] * t4 + Rc[7] * t10 + Rc[8] * t17;
+  S_I[2] += t29;
+  real t34 = Rc[0] * S[3] + Rc[1] * S[8] + Rc[2] * S[12];
+  real t40 = Rc[0] * S[4] + Rc[1] * S[9] + Rc[2] * S[13];
+  real t47 = Rc[0] * S[5] + Rc[1] * S[10] + Rc[2] * S[14];
+  real t49 = Rc[0] * t34 + Rc[1] * t40 + Rc[2] * t47;
+  real t50 = r[1] * t29;
+  real t51 = r[2] * t24;
+  S_I[3] += t49 + (t50 - t51);
+  real t58 = Rc[3] * t34 + Rc[4] * t40 + Rc[5] * t47;
+  real t62 = t58 + (r[2] * t19 - r[0] * t29);
+  S_I[4] += t62;
+  real t67 = Rc[6] * t34 + Rc[7] * t40 + Rc[8] * t47;
+  real t71 = t67 + (r[0] * t24 - r[1] * t19);
+  S_I[5] += t71;
+  real t76 = Rc[3] * S[0] + Rc[4] * S[1] + Rc[5] * S[2];
+  real t82 = Rc[3] * S[1] + Rc[4] * S[6] + Rc[5] * S[7];
+  real t89 = Rc[3] * S[2] + Rc[4] * S[7] + Rc[5] * S[11];
+  real t91 = Rc[3] * t76 + Rc[4] * t82 + Rc[5] * t89;
+  S_I[6] += t91;
+  real t96 = Rc[6] * t76 + Rc[7] * t82 + Rc[8] * t89;
+  S_I[7] += t96;
+  real t101 = Rc[3] * S[3] + Rc[4] * S[8] + Rc[5] * S[12];
+  real t107 = Rc[3] * S[4] + Rc[4] * S[9] + Rc[5] * S[13];
+  real t114 = Rc[3] * S[5] + Rc[4] * S[10] + Rc[5] * S[14];
+  real t116 = Rc[0] * t101 + Rc[1] * t107 + Rc[2] * t114;
+  real t120 = t116 + (r[1] * t96 - r[2] * t91);
+  S_I[8] += t120;
+  real t125 = Rc[3] * t101 + Rc[4] * t107 + Rc[5] * t114;
+  real t126 = r[0] * t96;
+  real t128 = t125 + (t51 - t126);
+  S_I[9] += t128;
+  real t133 = Rc[6] * t101 + Rc[7] * t107 + Rc[8] * t114;
+  real t137 = t133 + (r[0] * t91 - r[1] * t24);
+  S_I[10] += t137;
+  real t157 = Rc[6] * (Rc[6] * S[0] + Rc[7] * S[1] + Rc[8] * S[2]) + Rc[7] * (Rc[6] * S[1] + Rc[7] *
+    S[6] + Rc[8] * S[7]) + Rc[8] * (Rc[6] * S[2] + Rc[7] * S[7] + Rc[8] * S[11]);
+  S_I[11] += t157;
+  real t162 = Rc[6] * S[3] + Rc[7] * S[8] + Rc[8] * S[12];
+  real t168 = Rc[6] * S[4] + Rc[7] * S[9] + Rc[8] * S[13];
+  real t175 = Rc[6] * S[5] + Rc[7] * S[10] + Rc[8] * S[14];
+  real t177 = Rc[0] * t162 + Rc[1] * t168 + Rc[2] * t175;
+  real t181 = t177 + (r[1] * t157 - r[2] * t96);
+  S_I[12] += t181;
+  real t186 = Rc[3] * t162 + Rc[4] * t168 + Rc[5] * t175;
+  real t190 = t186 + (r[2] * t29 - r[0] * t157);
+  S_I[13] += t190;
+  real t197 = Rc[6] * t162 + Rc[7] * t168 + Rc[8] * t175 + (t126 - t50);
+  S_I[14] += t197;
+  real t202 = Rc[0] * S[15] + Rc[1] * S[16] + Rc[2] * S[17];
+  real t208 = Rc[0] * S[16] + Rc[1] * S[18] + Rc[2] * S[19];
+  real t215 = Rc[0] * S[17] + Rc[1] * S[19] + Rc[2] * S[20];
+  S_I[15] += Rc[0] * t202 + Rc[1] * t208 + Rc[2] * t215 + (r[1] * t181 - r[2] * t120 + (r[1] * t177
+    - r[2] * t116));
+  S_I[16] += Rc[3] * t202 + Rc[4] * t208 + Rc[5] * t215 + (r[1] * t190 - r[2] * t128 + (r[2] * t49 -
+    r[0] * t177));
+  S_I[17] += Rc[6] * t202 + Rc[7] * t208 + Rc[8] * t215 + (r[1] * t197 - r[2] * t137 + (r[0] * t116
+    - r[1] * t49));
+  real t256 = Rc[3] * S[15] + Rc[4] * S[16] + Rc[5] * S[17];
+  real t262 = Rc[3] * S[16] + Rc[4] * S[18] + Rc[5] * S[19];
+  real t269 = Rc[3] * S[17] + Rc[4] * S[19] + Rc[5] * S[20];
+  S_I[18] += Rc[3] * t256 + Rc[4] * t262 + Rc[5] * t269 + (r[2] * t62 - r[0] * t190 + (r[2] * t58 -
+    r[0] * t186));
+  S_I[19] += Rc[6] * t256 + Rc[7] * t262 + Rc[8] * t269 + (r[2] * t71 - r[0] * t197 + (r[0] * t125 -
+    r[1] * t58));
+  S_I[20] += Rc[6] * (Rc[6] * S[15] + Rc[7] * S[16] + Rc[8] * S[17]) + Rc[7] * (Rc[6] * S[16] +
+    Rc[7] * S[18] + Rc[8] * S[19]) + Rc[8] * (Rc[6] * S[17] + Rc[7] * S[19] + Rc[8] * S[20]) + (r[0]
+    * t137 - r[1] * t71 + (r[0] * t133 - r[1] * t67));
+  e_I[0] += Rc[0] * e[0] + Rc[1] * e[1] + Rc[2] * e[2];
+  e_I[1] += Rc[3] * e[0] + Rc[4] * e[1] + Rc[5] * e[2];
+  e_I[2] += Rc[6] * e[0] + Rc[7] * e[1] + Rc[8] * e[2];
+  e_I[3] += Rc[0] * e[3] + Rc[1] * e[4] + Rc[2] * e[5] + (e[0] * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    e[1] * (Rc[7] * r[1] - Rc[4] * r[2]) + e[2] * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * e[3] + Rc[4] * e[4] + Rc[5] * e[5] + (e[0] * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    e[1] * (Rc[1] * r[2] - Rc[7] * r[0]) + e[2] * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * e[3] + Rc[7] * e[4] + Rc[8] * e[5] + (e[0] * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    e[1] * (Rc[4] * r[0] - Rc[1] * r[1]) + e[2] * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_fixed_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_fixed_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_fixed_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 0, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 0, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_fixed_condense_outputs[] = {
-    {"G", 0, "", 0, 0},
-    {"g", 0, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_hinge_fixed_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with no free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -742,86 +230,28 @@ static const mstmm_port mstmm_hinge_fixed_condense_outputs[] = {
  * out udot[0] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_fixed_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_fixed_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    (void)q;
-    (void)G;
-    (void)g;
-    (void)udot;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    delta[0] = t16;
-    const real t17 = Rc[1] * t3;
-    const real t18 = Rc[4] * t8;
-    const real t19 = t17 + t18;
-    const real t20 = Rc[7] * t14;
-    const real t21 = t19 + t20;
-    delta[1] = t21;
-    const real t22 = Rc[2] * t3;
-    const real t23 = Rc[5] * t8;
-    const real t24 = t22 + t23;
-    const real t25 = Rc[8] * t14;
-    const real t26 = t24 + t25;
-    delta[2] = t26;
-    const real t27 = Rc[0] * delta_I[3];
-    const real t28 = Rc[3] * delta_I[4];
-    const real t29 = t27 + t28;
-    const real t30 = Rc[6] * delta_I[5];
-    const real t31 = t29 + t30;
-    delta[3] = t31;
-    const real t32 = Rc[1] * delta_I[3];
-    const real t33 = Rc[4] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[7] * delta_I[5];
-    const real t36 = t34 + t35;
-    delta[4] = t36;
-    const real t37 = Rc[2] * delta_I[3];
-    const real t38 = Rc[5] * delta_I[4];
-    const real t39 = t37 + t38;
-    const real t40 = Rc[8] * delta_I[5];
-    const real t41 = t39 + t40;
-    delta[5] = t41;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)G;
+  (void)g;
+  (void)udot;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  delta[0] = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  delta[1] = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  delta[2] = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  delta[3] = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  delta[4] = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  delta[5] = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  return 0;
 }
 
-static int mstmm_hinge_fixed_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_fixed_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_fixed_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 0, "", 0, 0},
-    {"G", 0, "", 0, 0},
-    {"g", 0, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_fixed_recover_outputs[] = {
-    {"udot", 0, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_fixed_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[0] parameters
@@ -837,68 +267,24 @@ static const mstmm_port mstmm_hinge_fixed_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[0] derivative of qdot
  */
-int mstmm_hinge_fixed_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_fixed_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    (void)d_q;
-    (void)d_u;
-    (void)d_H;
-    (void)d_qdot;
-    d_R[0] = 0.0;
-    d_R[1] = 0.0;
-    d_R[2] = 0.0;
-    d_R[3] = 0.0;
-    d_R[4] = 0.0;
-    d_R[5] = 0.0;
-    d_R[6] = 0.0;
-    d_R[7] = 0.0;
-    d_R[8] = 0.0;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = 0.0;
-    d_w[0] = 0.0;
-    d_w[1] = 0.0;
-    d_w[2] = 0.0;
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  (void)d_q;
+  (void)d_u;
+  (void)d_H;
+  (void)d_qdot;
+  d_R[0] = d_R[1] = d_R[2] = d_R[3] = d_R[4] = d_R[5] = d_R[6] = d_R[7] = d_R[8] = d_d[0] = d_d[1] =
+    d_d[2] = d_v[0] = d_v[1] = d_v[2] = d_w[0] = d_w[1] = d_w[2] = d_c[0] = d_c[1] = d_c[2] = d_c[3]
+    = d_c[4] = d_c[5] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_fixed_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_fixed_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_fixed_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 0, "", 0, 0},
-    {"u", 0, "", 0, 0},
-    {"d_q", 0, "", 0, 0},
-    {"d_u", 0, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_fixed_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 0, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 0, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_fixed_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* motion across the hinge and of its outboard body
  * in  p[0] parameters
@@ -919,253 +305,101 @@ static const mstmm_port mstmm_hinge_fixed_hinge_slope_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_fixed_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_fixed_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    (void)s;
-    (void)H;
-    (void)qdot;
-    R[0] = 1.0;
-    R[1] = 0.0;
-    R[2] = 0.0;
-    R[3] = 0.0;
-    R[4] = 1.0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = 0.0;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
+  (void)p;
+  (void)q;
+  (void)u;
+  (void)s;
+  (void)H;
+  (void)qdot;
+  R[0] = 1.0;
+  R[1] = R[2] = R[3] = 0.0;
+  R[4] = 1.0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = d[2] = v[0] = v[1] = v[2] = w[0] = w[1] = w[2] = c[0] = c[1] = c[2] = c[3] = c[4] =
     c[5] = 0.0;
-    Rc[0] = Rt[0];
-    Rc[1] = Rt[1];
-    Rc[2] = Rt[2];
-    Rc[3] = Rt[3];
-    Rc[4] = Rt[4];
-    Rc[5] = Rt[5];
-    Rc[6] = Rt[6];
-    Rc[7] = Rt[7];
-    Rc[8] = Rt[8];
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t0 = Rt[0] * motion_I[0];
-    const real t1 = Rt[3] * motion_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[6] * motion_I[2];
-    const real t4 = t2 + t3;
-    motion[0] = t4;
-    const real t5 = Rt[1] * motion_I[0];
-    const real t6 = Rt[4] * motion_I[1];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[7] * motion_I[2];
-    const real t9 = t7 + t8;
-    motion[1] = t9;
-    const real t10 = Rt[2] * motion_I[0];
-    const real t11 = Rt[5] * motion_I[1];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[8] * motion_I[2];
-    const real t14 = t12 + t13;
-    motion[2] = t14;
-    const real t15 = Rt[0] * motion_I[3];
-    const real t16 = Rt[3] * motion_I[4];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[6] * motion_I[5];
-    const real t19 = t17 + t18;
-    motion[3] = t19;
-    const real t20 = Rt[1] * motion_I[3];
-    const real t21 = Rt[4] * motion_I[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[7] * motion_I[5];
-    const real t24 = t22 + t23;
-    motion[4] = t24;
-    const real t25 = Rt[2] * motion_I[3];
-    const real t26 = Rt[5] * motion_I[4];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[8] * motion_I[5];
-    const real t29 = t27 + t28;
-    motion[5] = t29;
-    const real t30 = motion_I[0] * motion_I[1];
-    const real t31 = t30 - motion_I[5];
-    const real t32 = ro[1] * t31;
-    const real t33 = motion_I[1] * motion_I[1];
-    const real t34 = motion_I[2] * motion_I[2];
-    const real t35 = t33 + t34;
-    const real t36 = ro[0] * t35;
-    const real t37 = t32 - t36;
-    const real t38 = motion_I[0] * motion_I[2];
-    const real t39 = motion_I[4] + t38;
-    const real t40 = ro[2] * t39;
-    const real t41 = t37 + t40;
-    const real t42 = motion_I[6] + t41;
-    const real t43 = Rt[0] * t42;
-    const real t44 = motion_I[5] + t30;
-    const real t45 = ro[0] * t44;
-    const real t46 = motion_I[0] * motion_I[0];
-    const real t47 = t34 + t46;
-    const real t48 = ro[1] * t47;
-    const real t49 = t45 - t48;
-    const real t50 = motion_I[1] * motion_I[2];
-    const real t51 = t50 - motion_I[3];
-    const real t52 = ro[2] * t51;
-    const real t53 = t49 + t52;
-    const real t54 = motion_I[7] + t53;
-    const real t55 = Rt[3] * t54;
-    const real t56 = t43 + t55;
-    const real t57 = t38 - motion_I[4];
-    const real t58 = ro[0] * t57;
-    const real t59 = motion_I[3] + t50;
-    const real t60 = ro[1] * t59;
-    const real t61 = t58 + t60;
-    const real t62 = t33 + t46;
-    const real t63 = ro[2] * t62;
-    const real t64 = t61 - t63;
-    const real t65 = motion_I[8] + t64;
-    const real t66 = Rt[6] * t65;
-    const real t67 = t56 + t66;
-    motion[6] = t67;
-    const real t68 = Rt[1] * t42;
-    const real t69 = Rt[4] * t54;
-    const real t70 = t68 + t69;
-    const real t71 = Rt[7] * t65;
-    const real t72 = t70 + t71;
-    motion[7] = t72;
-    const real t73 = Rt[2] * t42;
-    const real t74 = Rt[5] * t54;
-    const real t75 = t73 + t74;
-    const real t76 = Rt[8] * t65;
-    const real t77 = t75 + t76;
-    motion[8] = t77;
-    return 0;
+  Rc[0] = Rt[0];
+  Rc[1] = Rt[1];
+  Rc[2] = Rt[2];
+  Rc[3] = Rt[3];
+  Rc[4] = Rt[4];
+  Rc[5] = Rt[5];
+  Rc[6] = Rt[6];
+  Rc[7] = Rt[7];
+  Rc[8] = Rt[8];
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  motion[0] = Rt[0] * motion_I[0] + Rt[3] * motion_I[1] + Rt[6] * motion_I[2];
+  motion[1] = Rt[1] * motion_I[0] + Rt[4] * motion_I[1] + Rt[7] * motion_I[2];
+  motion[2] = Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2];
+  motion[3] = Rt[0] * motion_I[3] + Rt[3] * motion_I[4] + Rt[6] * motion_I[5];
+  motion[4] = Rt[1] * motion_I[3] + Rt[4] * motion_I[4] + Rt[7] * motion_I[5];
+  motion[5] = Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5];
+  real t30 = motion_I[0] * motion_I[1];
+  real t33 = motion_I[1] * motion_I[1];
+  real t34 = motion_I[2] * motion_I[2];
+  real t38 = motion_I[0] * motion_I[2];
+  real t42 = motion_I[6] + (ro[1] * (t30 - motion_I[5]) - ro[0] * (t33 + t34) + ro[2] * (motion_I[4]
+    + t38));
+  real t46 = motion_I[0] * motion_I[0];
+  real t50 = motion_I[1] * motion_I[2];
+  real t54 = motion_I[7] + (ro[0] * (motion_I[5] + t30) - ro[1] * (t34 + t46) + ro[2] * (t50 -
+    motion_I[3]));
+  real t65 = motion_I[8] + (ro[0] * (t38 - motion_I[4]) + ro[1] * (motion_I[3] + t50) - ro[2] * (t33
+    + t46));
+  motion[6] = Rt[0] * t42 + Rt[3] * t54 + Rt[6] * t65;
+  motion[7] = Rt[1] * t42 + Rt[4] * t54 + Rt[7] * t65;
+  motion[8] = Rt[2] * t42 + Rt[5] * t54 + Rt[8] * t65;
+  return 0;
 }
 
-static int mstmm_hinge_fixed_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_fixed_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_fixed_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 0, "", 0, 0},
-    {"u", 0, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 0, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_fixed_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 0, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_fixed_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 static const mstmm_kernel mstmm_hinge_fixed_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_fixed_hinge,
-        .call = mstmm_hinge_fixed_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_fixed_hinge_inputs,
-        .outputs = mstmm_hinge_fixed_hinge_outputs,
-        .ir_hash = "cddbc46d2a8c5169f380665547425937d7a88ba3ca5beb0a54cd07419db90e3e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_fixed_forward,
-        .call = mstmm_hinge_fixed_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_fixed_forward_inputs,
-        .outputs = mstmm_hinge_fixed_forward_outputs,
-        .ir_hash = "103b6fc436546417aaa4f193262f02afebf5b520136c5a113081f07fb3605661",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_fixed_condense,
-        .call = mstmm_hinge_fixed_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_fixed_condense_inputs,
-        .outputs = mstmm_hinge_fixed_condense_outputs,
-        .ir_hash = "129c5987ba9240a1baf9dcdb2c664378e97b6b9f51e56ce61b89984acf8e0b06",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_fixed_recover,
-        .call = mstmm_hinge_fixed_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_fixed_recover_inputs,
-        .outputs = mstmm_hinge_fixed_recover_outputs,
-        .ir_hash = "9932a8b4ae55c097533bd20e92c58888352cbf8d3acaf717735f854bd6ae0a7f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_fixed_hinge_slope,
-        .call = mstmm_hinge_fixed_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_fixed_hinge_slope_inputs,
-        .outputs = mstmm_hinge_fixed_hinge_slope_outputs,
-        .ir_hash = "e7d2d03b8ac34fe0392597c693857e5f66ed761abc6581f0a19f465473b76f61",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_fixed_body_motion,
-        .call = mstmm_hinge_fixed_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_fixed_body_motion_inputs,
-        .outputs = mstmm_hinge_fixed_body_motion_outputs,
-        .ir_hash = "93be3e618776c0b558e2534fc1d0e01b93c5c8294c78dca003c346923838ddc9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_fixed_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0, 0},
+    {"q", 0, "", 0, 0}, {"u", 0, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m",
+    0, 0}, {"H", 0, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 0, "", 0, 0}},
+    "81f7f2e365f6438a076e6bc04c58a8eb7dfb25a890bd0ac407ac295c50746ada", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_fixed_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "",
+    0, 0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 0, "", 0, 0}, {"u", 0, "", 0, 0}, {"s",
+    0, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3,
+    "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 0, "", 0, 0}},
+    "2264ab9320501f435e5559018c4dd1e1eba191cfa95fbfadf93645e588556d7f", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_fixed_condense), 8, 4, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 0, "", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 0, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"G", 0, "", 0, 0}, {"g", 0, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "b9cc7287bd557ce3b02139bab7ddc62049e86d44a25907a0415ba8584900cae8", 0, NULL},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_fixed_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 0, "", 0, 0}, {"G", 0, "", 0, 0}, {"g", 0,
+    "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 0, "", 0, 0}, {"delta", 6,
+    "", 0, 0}}, "31ef183ad2a09ce9db774df149e0122223065e4b1dfa9d19dd35222ba196e768", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_fixed_hinge_slope), 5, 7, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 0, "", 0, 0}, {"u", 0, "", 0, 0}, {"d_q", 0, "", 0, 0}, {"d_u", 0, "", 0,
+    0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 0, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot",
+    0, "", 0, 0}}, "2ea361c0f513054468be68f1b619105f06cd17139492ce6644a709da5e88edbe", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_fixed_body_motion), 7, 10, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 0, "", 0, 0}, {"u", 0, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 0, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 0, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "a2534a4fd584ce9fe7677f817f906af19374dae14a15dfc5bf051d3ba1e8189e", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_hinge_fixed = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "fixed",
-    .hash = "f963810d89b3dd4ed37d6dd2011260a9fad5c5ec637a958f92992f1a24787b5b",
+    .hash = "8529570052570b05852101972474c20d5f4081989c130d89042a00e3100b57f8",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -8,40 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_free;
-int mstmm_hinge_free_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_free_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_free_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_free_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_free_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_free_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_free_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the free hinge
  * in  p[0] parameters
  * in  q[7] coordinates: x [m], y [m], z [m], qw, qx, qy, qz
@@ -54,193 +20,74 @@ int mstmm_hinge_free_directions(const real *restrict p, const real *restrict q,
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[7] coordinate rates
  */
-int mstmm_hinge_free_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_free_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    const real t0 = q[5] * q[5];
-    const real t1 = q[6] * q[6];
-    const real t2 = t0 + t1;
-    const real t3 = q[3] * q[3];
-    const real t4 = q[4] * q[4];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = 2.0 * t8;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    R[0] = t11;
-    const real t12 = q[4] * q[5];
-    const real t13 = q[3] * q[6];
-    const real t14 = t12 - t13;
-    const real t15 = t9 * t14;
-    R[1] = t15;
-    const real t16 = q[3] * q[5];
-    const real t17 = q[4] * q[6];
-    const real t18 = t16 + t17;
-    const real t19 = t9 * t18;
-    R[2] = t19;
-    const real t20 = t13 + t12;
-    const real t21 = t9 * t20;
-    R[3] = t21;
-    const real t22 = t1 + t4;
-    const real t23 = t9 * t22;
-    const real t24 = 1.0 - t23;
-    R[4] = t24;
-    const real t25 = q[5] * q[6];
-    const real t26 = q[3] * q[4];
-    const real t27 = t25 - t26;
-    const real t28 = t9 * t27;
-    R[5] = t28;
-    const real t29 = t17 - t16;
-    const real t30 = t9 * t29;
-    R[6] = t30;
-    const real t31 = t26 + t25;
-    const real t32 = t9 * t31;
-    R[7] = t32;
-    const real t33 = t0 + t4;
-    const real t34 = t9 * t33;
-    const real t35 = 1.0 - t34;
-    R[8] = t35;
-    d[0] = q[0];
-    d[1] = q[1];
-    d[2] = q[2];
-    H[0] = 1.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 1.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 0.0;
-    H[14] = 1.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 0.0;
-    H[18] = 0.0;
-    H[19] = 0.0;
-    H[20] = 0.0;
-    H[21] = 1.0;
-    H[22] = 0.0;
-    H[23] = 0.0;
-    H[24] = 0.0;
-    H[25] = 0.0;
-    H[26] = 0.0;
-    H[27] = 0.0;
-    H[28] = 1.0;
-    H[29] = 0.0;
-    H[30] = 0.0;
-    H[31] = 0.0;
-    H[32] = 0.0;
-    H[33] = 0.0;
-    H[34] = 0.0;
-    H[35] = 1.0;
-    v[0] = u[0];
-    v[1] = u[1];
-    v[2] = u[2];
-    w[0] = u[3];
-    w[1] = u[4];
-    w[2] = u[5];
-    const real t36 = u[2] * u[4];
-    const real t37 = u[1] * u[5];
-    const real t38 = t36 - t37;
-    c[0] = t38;
-    const real t39 = u[0] * u[5];
-    const real t40 = u[2] * u[3];
-    const real t41 = t39 - t40;
-    c[1] = t41;
-    const real t42 = u[1] * u[3];
-    const real t43 = u[0] * u[4];
-    const real t44 = t42 - t43;
-    c[2] = t44;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    const real t45 = u[1] * t14;
-    const real t46 = t9 * t45;
-    const real t47 = u[0] * t11;
-    const real t48 = u[2] * t18;
-    const real t49 = t9 * t48;
-    const real t50 = t47 + t49;
-    const real t51 = t46 + t50;
-    qdot[0] = t51;
-    const real t52 = u[0] * t20;
-    const real t53 = t9 * t52;
-    const real t54 = u[1] * t24;
-    const real t55 = u[2] * t27;
-    const real t56 = t9 * t55;
-    const real t57 = t54 + t56;
-    const real t58 = t53 + t57;
-    qdot[1] = t58;
-    const real t59 = u[0] * t29;
-    const real t60 = t9 * t59;
-    const real t61 = u[2] * t35;
-    const real t62 = u[1] * t31;
-    const real t63 = t9 * t62;
-    const real t64 = t61 + t63;
-    const real t65 = t60 + t64;
-    qdot[2] = t65;
-    const real t66 = q[6] * u[5];
-    const real t67 = q[4] * u[3];
-    const real t68 = q[5] * u[4];
-    const real t69 = t67 + t68;
-    const real t70 = t66 + t69;
-    const real t71 = 0.5 * t70;
-    const real t72 = -t71;
-    qdot[3] = t72;
-    const real t73 = q[3] * u[3];
-    const real t74 = q[5] * u[5];
-    const real t75 = t73 + t74;
-    const real t76 = q[6] * u[4];
-    const real t77 = t75 - t76;
-    const real t78 = 0.5 * t77;
-    qdot[4] = t78;
-    const real t79 = q[6] * u[3];
-    const real t80 = q[3] * u[4];
-    const real t81 = q[4] * u[5];
-    const real t82 = t80 - t81;
-    const real t83 = t79 + t82;
-    const real t84 = 0.5 * t83;
-    qdot[5] = t84;
-    const real t85 = q[3] * u[5];
-    const real t86 = q[4] * u[4];
-    const real t87 = t85 + t86;
-    const real t88 = q[5] * u[3];
-    const real t89 = t87 - t88;
-    const real t90 = 0.5 * t89;
-    qdot[6] = t90;
-    return 0;
+  (void)p;
+  real t0 = q[5] * q[5];
+  real t1 = q[6] * q[6];
+  real t4 = q[4] * q[4];
+  real t9 = 2.0 * (1.0 / (t1 + (t0 + (q[3] * q[3] + t4))));
+  real t11 = 1.0 - (t0 + t1) * t9;
+  R[0] = t11;
+  real t12 = q[4] * q[5];
+  real t13 = q[3] * q[6];
+  real t14 = t12 - t13;
+  R[1] = t9 * t14;
+  real t16 = q[3] * q[5];
+  real t17 = q[4] * q[6];
+  real t18 = t16 + t17;
+  R[2] = t9 * t18;
+  real t20 = t13 + t12;
+  R[3] = t9 * t20;
+  real t24 = 1.0 - t9 * (t1 + t4);
+  R[4] = t24;
+  real t25 = q[5] * q[6];
+  real t26 = q[3] * q[4];
+  real t27 = t25 - t26;
+  R[5] = t9 * t27;
+  real t29 = t17 - t16;
+  R[6] = t9 * t29;
+  real t31 = t26 + t25;
+  R[7] = t9 * t31;
+  real t35 = 1.0 - t9 * (t0 + t4);
+  R[8] = t35;
+  d[0] = q[0];
+  d[1] = q[1];
+  d[2] = q[2];
+  H[0] = 1.0;
+  H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = 0.0;
+  H[7] = 1.0;
+  H[8] = H[9] = H[10] = H[11] = H[12] = H[13] = 0.0;
+  H[14] = 1.0;
+  H[15] = H[16] = H[17] = H[18] = H[19] = H[20] = 0.0;
+  H[21] = 1.0;
+  H[22] = H[23] = H[24] = H[25] = H[26] = H[27] = 0.0;
+  H[28] = 1.0;
+  H[29] = H[30] = H[31] = H[32] = H[33] = H[34] = 0.0;
+  H[35] = 1.0;
+  v[0] = u[0];
+  v[1] = u[1];
+  v[2] = u[2];
+  w[0] = u[3];
+  w[1] = u[4];
+  w[2] = u[5];
+  c[0] = u[2] * u[4] - u[1] * u[5];
+  c[1] = u[0] * u[5] - u[2] * u[3];
+  c[2] = u[1] * u[3] - u[0] * u[4];
+  c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = t9 * (u[1] * t14) + (u[0] * t11 + t9 * (u[2] * t18));
+  qdot[1] = t9 * (u[0] * t20) + (u[1] * t24 + t9 * (u[2] * t27));
+  qdot[2] = t9 * (u[0] * t29) + (u[2] * t35 + t9 * (u[1] * t31));
+  qdot[3] = -(0.5 * (q[6] * u[5] + (q[4] * u[3] + q[5] * u[4])));
+  qdot[4] = 0.5 * (q[3] * u[3] + q[5] * u[5] - q[6] * u[4]);
+  qdot[5] = 0.5 * (q[6] * u[3] + (q[3] * u[4] - q[4] * u[5]));
+  qdot[6] = 0.5 * (q[3] * u[5] + q[4] * u[4] - q[5] * u[3]);
+  return 0;
 }
 
-static int mstmm_hinge_free_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_free_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 7, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the free hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -257,339 +104,101 @@ static const mstmm_port mstmm_hinge_free_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[7] coordinate rates
  */
-int mstmm_hinge_free_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_free_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = q[5] * q[5];
-    const real t1 = q[6] * q[6];
-    const real t2 = t0 + t1;
-    const real t3 = q[3] * q[3];
-    const real t4 = q[4] * q[4];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = 2.0 * t8;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    const real t12 = Rt[0] * t11;
-    const real t13 = q[3] * q[6];
-    const real t14 = q[4] * q[5];
-    const real t15 = t13 + t14;
-    const real t16 = t9 * t15;
-    const real t17 = Rt[1] * t16;
-    const real t18 = t12 + t17;
-    const real t19 = q[4] * q[6];
-    const real t20 = q[3] * q[5];
-    const real t21 = t19 - t20;
-    const real t22 = t9 * t21;
-    const real t23 = Rt[2] * t22;
-    const real t24 = t18 + t23;
-    Rc[0] = t24;
-    const real t25 = t14 - t13;
-    const real t26 = t9 * t25;
-    const real t27 = Rt[0] * t26;
-    const real t28 = t1 + t4;
-    const real t29 = t9 * t28;
-    const real t30 = 1.0 - t29;
-    const real t31 = Rt[1] * t30;
-    const real t32 = t27 + t31;
-    const real t33 = q[3] * q[4];
-    const real t34 = q[5] * q[6];
-    const real t35 = t33 + t34;
-    const real t36 = t9 * t35;
-    const real t37 = Rt[2] * t36;
-    const real t38 = t32 + t37;
-    Rc[1] = t38;
-    const real t39 = t20 + t19;
-    const real t40 = t9 * t39;
-    const real t41 = Rt[0] * t40;
-    const real t42 = t34 - t33;
-    const real t43 = t9 * t42;
-    const real t44 = Rt[1] * t43;
-    const real t45 = t41 + t44;
-    const real t46 = t0 + t4;
-    const real t47 = t9 * t46;
-    const real t48 = 1.0 - t47;
-    const real t49 = Rt[2] * t48;
-    const real t50 = t45 + t49;
-    Rc[2] = t50;
-    const real t51 = Rt[3] * t11;
-    const real t52 = Rt[4] * t16;
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * t22;
-    const real t55 = t53 + t54;
-    Rc[3] = t55;
-    const real t56 = Rt[3] * t26;
-    const real t57 = Rt[4] * t30;
-    const real t58 = t56 + t57;
-    const real t59 = Rt[5] * t36;
-    const real t60 = t58 + t59;
-    Rc[4] = t60;
-    const real t61 = Rt[3] * t40;
-    const real t62 = Rt[4] * t43;
-    const real t63 = t61 + t62;
-    const real t64 = Rt[5] * t48;
-    const real t65 = t63 + t64;
-    Rc[5] = t65;
-    const real t66 = Rt[6] * t11;
-    const real t67 = Rt[7] * t16;
-    const real t68 = t66 + t67;
-    const real t69 = Rt[8] * t22;
-    const real t70 = t68 + t69;
-    Rc[6] = t70;
-    const real t71 = Rt[6] * t26;
-    const real t72 = Rt[7] * t30;
-    const real t73 = t71 + t72;
-    const real t74 = Rt[8] * t36;
-    const real t75 = t73 + t74;
-    Rc[7] = t75;
-    const real t76 = Rt[6] * t40;
-    const real t77 = Rt[7] * t43;
-    const real t78 = t76 + t77;
-    const real t79 = Rt[8] * t48;
-    const real t80 = t78 + t79;
-    Rc[8] = t80;
-    const real t81 = Rt[0] * q[0];
-    const real t82 = Rt[1] * q[1];
-    const real t83 = t81 + t82;
-    const real t84 = Rt[2] * q[2];
-    const real t85 = t83 + t84;
-    const real t86 = ro[0] + t85;
-    r[0] = t86;
-    const real t87 = Rt[3] * q[0];
-    const real t88 = Rt[4] * q[1];
-    const real t89 = t87 + t88;
-    const real t90 = Rt[5] * q[2];
-    const real t91 = t89 + t90;
-    const real t92 = ro[1] + t91;
-    r[1] = t92;
-    const real t93 = Rt[6] * q[0];
-    const real t94 = Rt[7] * q[1];
-    const real t95 = t93 + t94;
-    const real t96 = Rt[8] * q[2];
-    const real t97 = t95 + t96;
-    const real t98 = ro[2] + t97;
-    r[2] = t98;
-    const real t99 = motion_I[0] * t24;
-    const real t100 = motion_I[1] * t55;
-    const real t101 = t99 + t100;
-    const real t102 = motion_I[2] * t70;
-    const real t103 = t101 + t102;
-    const real t104 = u[3] + t103;
-    motion[0] = t104;
-    const real t105 = motion_I[0] * t38;
-    const real t106 = motion_I[1] * t60;
-    const real t107 = t105 + t106;
-    const real t108 = motion_I[2] * t75;
-    const real t109 = t107 + t108;
-    const real t110 = u[4] + t109;
-    motion[1] = t110;
-    const real t111 = motion_I[0] * t50;
-    const real t112 = motion_I[1] * t65;
-    const real t113 = t111 + t112;
-    const real t114 = motion_I[2] * t80;
-    const real t115 = t113 + t114;
-    const real t116 = u[5] + t115;
-    motion[2] = t116;
-    const real t117 = motion_I[3] * t24;
-    const real t118 = motion_I[4] * t55;
-    const real t119 = t117 + t118;
-    const real t120 = motion_I[5] * t70;
-    const real t121 = t119 + t120;
-    const real t122 = u[5] * t109;
-    const real t123 = u[4] * t115;
-    const real t124 = t122 - t123;
-    const real t125 = s[3] + t124;
-    const real t126 = t121 + t125;
-    motion[3] = t126;
-    const real t127 = motion_I[3] * t38;
-    const real t128 = motion_I[4] * t60;
-    const real t129 = t127 + t128;
-    const real t130 = motion_I[5] * t75;
-    const real t131 = t129 + t130;
-    const real t132 = u[3] * t115;
-    const real t133 = u[5] * t103;
-    const real t134 = t132 - t133;
-    const real t135 = s[4] + t134;
-    const real t136 = t131 + t135;
-    motion[4] = t136;
-    const real t137 = motion_I[3] * t50;
-    const real t138 = motion_I[4] * t65;
-    const real t139 = t137 + t138;
-    const real t140 = motion_I[5] * t80;
-    const real t141 = t139 + t140;
-    const real t142 = u[4] * t103;
-    const real t143 = u[3] * t109;
-    const real t144 = t142 - t143;
-    const real t145 = s[5] + t144;
-    const real t146 = t141 + t145;
-    motion[5] = t146;
-    const real t147 = motion_I[0] * motion_I[1];
-    const real t148 = t147 - motion_I[5];
-    const real t149 = t92 * t148;
-    const real t150 = motion_I[1] * motion_I[1];
-    const real t151 = motion_I[2] * motion_I[2];
-    const real t152 = t150 + t151;
-    const real t153 = t86 * t152;
-    const real t154 = t149 - t153;
-    const real t155 = motion_I[0] * motion_I[2];
-    const real t156 = motion_I[4] + t155;
-    const real t157 = t98 * t156;
-    const real t158 = t154 + t157;
-    const real t159 = motion_I[6] + t158;
-    const real t160 = t24 * t159;
-    const real t161 = motion_I[5] + t147;
-    const real t162 = t86 * t161;
-    const real t163 = motion_I[0] * motion_I[0];
-    const real t164 = t151 + t163;
-    const real t165 = t92 * t164;
-    const real t166 = t162 - t165;
-    const real t167 = motion_I[1] * motion_I[2];
-    const real t168 = t167 - motion_I[3];
-    const real t169 = t98 * t168;
-    const real t170 = t166 + t169;
-    const real t171 = motion_I[7] + t170;
-    const real t172 = t55 * t171;
-    const real t173 = t160 + t172;
-    const real t174 = t155 - motion_I[4];
-    const real t175 = t86 * t174;
-    const real t176 = motion_I[3] + t167;
-    const real t177 = t92 * t176;
-    const real t178 = t175 + t177;
-    const real t179 = t150 + t163;
-    const real t180 = t98 * t179;
-    const real t181 = t178 - t180;
-    const real t182 = motion_I[8] + t181;
-    const real t183 = t70 * t182;
-    const real t184 = t173 + t183;
-    const real t185 = u[2] * u[4];
-    const real t186 = u[1] * u[5];
-    const real t187 = t185 - t186;
-    const real t188 = s[0] + t187;
-    const real t189 = u[2] * t109;
-    const real t190 = 2.0 * t189;
-    const real t191 = u[1] * t115;
-    const real t192 = 2.0 * t191;
-    const real t193 = t190 - t192;
-    const real t194 = t188 + t193;
-    const real t195 = t184 + t194;
-    motion[6] = t195;
-    const real t196 = t38 * t159;
-    const real t197 = t60 * t171;
-    const real t198 = t196 + t197;
-    const real t199 = t75 * t182;
-    const real t200 = t198 + t199;
-    const real t201 = u[0] * u[5];
-    const real t202 = u[2] * u[3];
-    const real t203 = t201 - t202;
-    const real t204 = s[1] + t203;
-    const real t205 = u[0] * t115;
-    const real t206 = 2.0 * t205;
-    const real t207 = u[2] * t103;
-    const real t208 = 2.0 * t207;
-    const real t209 = t206 - t208;
-    const real t210 = t204 + t209;
-    const real t211 = t200 + t210;
-    motion[7] = t211;
-    const real t212 = t50 * t159;
-    const real t213 = t65 * t171;
-    const real t214 = t212 + t213;
-    const real t215 = t80 * t182;
-    const real t216 = t214 + t215;
-    const real t217 = u[1] * u[3];
-    const real t218 = u[0] * u[4];
-    const real t219 = t217 - t218;
-    const real t220 = s[2] + t219;
-    const real t221 = u[1] * t103;
-    const real t222 = 2.0 * t221;
-    const real t223 = u[0] * t109;
-    const real t224 = 2.0 * t223;
-    const real t225 = t222 - t224;
-    const real t226 = t220 + t225;
-    const real t227 = t216 + t226;
-    motion[8] = t227;
-    const real t228 = u[1] * t25;
-    const real t229 = t9 * t228;
-    const real t230 = u[0] * t11;
-    const real t231 = u[2] * t39;
-    const real t232 = t9 * t231;
-    const real t233 = t230 + t232;
-    const real t234 = t229 + t233;
-    qdot[0] = t234;
-    const real t235 = u[0] * t15;
-    const real t236 = t9 * t235;
-    const real t237 = u[1] * t30;
-    const real t238 = u[2] * t42;
-    const real t239 = t9 * t238;
-    const real t240 = t237 + t239;
-    const real t241 = t236 + t240;
-    qdot[1] = t241;
-    const real t242 = u[0] * t21;
-    const real t243 = t9 * t242;
-    const real t244 = u[2] * t48;
-    const real t245 = u[1] * t35;
-    const real t246 = t9 * t245;
-    const real t247 = t244 + t246;
-    const real t248 = t243 + t247;
-    qdot[2] = t248;
-    const real t249 = q[6] * u[5];
-    const real t250 = q[4] * u[3];
-    const real t251 = q[5] * u[4];
-    const real t252 = t250 + t251;
-    const real t253 = t249 + t252;
-    const real t254 = 0.5 * t253;
-    const real t255 = -t254;
-    qdot[3] = t255;
-    const real t256 = q[3] * u[3];
-    const real t257 = q[5] * u[5];
-    const real t258 = t256 + t257;
-    const real t259 = q[6] * u[4];
-    const real t260 = t258 - t259;
-    const real t261 = 0.5 * t260;
-    qdot[4] = t261;
-    const real t262 = q[6] * u[3];
-    const real t263 = q[3] * u[4];
-    const real t264 = q[4] * u[5];
-    const real t265 = t263 - t264;
-    const real t266 = t262 + t265;
-    const real t267 = 0.5 * t266;
-    qdot[5] = t267;
-    const real t268 = q[3] * u[5];
-    const real t269 = q[4] * u[4];
-    const real t270 = t268 + t269;
-    const real t271 = q[5] * u[3];
-    const real t272 = t270 - t271;
-    const real t273 = 0.5 * t272;
-    qdot[6] = t273;
-    return 0;
+  (void)p;
+  real t0 = q[5] * q[5];
+  real t1 = q[6] * q[6];
+  real t4 = q[4] * q[4];
+  real t9 = 2.0 * (1.0 / (t1 + (t0 + (q[3] * q[3] + t4))));
+  real t11 = 1.0 - (t0 + t1) * t9;
+  real t13 = q[3] * q[6];
+  real t14 = q[4] * q[5];
+  real t15 = t13 + t14;
+  real t16 = t9 * t15;
+  real t19 = q[4] * q[6];
+  real t20 = q[3] * q[5];
+  real t21 = t19 - t20;
+  real t22 = t9 * t21;
+  real t24 = Rt[0] * t11 + Rt[1] * t16 + Rt[2] * t22;
+  Rc[0] = t24;
+  real t25 = t14 - t13;
+  real t26 = t9 * t25;
+  real t30 = 1.0 - t9 * (t1 + t4);
+  real t33 = q[3] * q[4];
+  real t34 = q[5] * q[6];
+  real t35 = t33 + t34;
+  real t36 = t9 * t35;
+  real t38 = Rt[0] * t26 + Rt[1] * t30 + Rt[2] * t36;
+  Rc[1] = t38;
+  real t39 = t20 + t19;
+  real t40 = t9 * t39;
+  real t42 = t34 - t33;
+  real t43 = t9 * t42;
+  real t48 = 1.0 - t9 * (t0 + t4);
+  real t50 = Rt[0] * t40 + Rt[1] * t43 + Rt[2] * t48;
+  Rc[2] = t50;
+  real t55 = Rt[3] * t11 + Rt[4] * t16 + Rt[5] * t22;
+  Rc[3] = t55;
+  real t60 = Rt[3] * t26 + Rt[4] * t30 + Rt[5] * t36;
+  Rc[4] = t60;
+  real t65 = Rt[3] * t40 + Rt[4] * t43 + Rt[5] * t48;
+  Rc[5] = t65;
+  real t70 = Rt[6] * t11 + Rt[7] * t16 + Rt[8] * t22;
+  Rc[6] = t70;
+  real t75 = Rt[6] * t26 + Rt[7] * t30 + Rt[8] * t36;
+  Rc[7] = t75;
+  real t80 = Rt[6] * t40 + Rt[7] * t43 + Rt[8] * t48;
+  Rc[8] = t80;
+  real t86 = ro[0] + (Rt[0] * q[0] + Rt[1] * q[1] + Rt[2] * q[2]);
+  r[0] = t86;
+  real t92 = ro[1] + (Rt[3] * q[0] + Rt[4] * q[1] + Rt[5] * q[2]);
+  r[1] = t92;
+  real t98 = ro[2] + (Rt[6] * q[0] + Rt[7] * q[1] + Rt[8] * q[2]);
+  r[2] = t98;
+  real t103 = motion_I[0] * t24 + motion_I[1] * t55 + motion_I[2] * t70;
+  motion[0] = u[3] + t103;
+  real t109 = motion_I[0] * t38 + motion_I[1] * t60 + motion_I[2] * t75;
+  motion[1] = u[4] + t109;
+  real t115 = motion_I[0] * t50 + motion_I[1] * t65 + motion_I[2] * t80;
+  motion[2] = u[5] + t115;
+  motion[3] = motion_I[3] * t24 + motion_I[4] * t55 + motion_I[5] * t70 + (s[3] + (u[5] * t109 -
+    u[4] * t115));
+  motion[4] = motion_I[3] * t38 + motion_I[4] * t60 + motion_I[5] * t75 + (s[4] + (u[3] * t115 -
+    u[5] * t103));
+  motion[5] = motion_I[3] * t50 + motion_I[4] * t65 + motion_I[5] * t80 + (s[5] + (u[4] * t103 -
+    u[3] * t109));
+  real t147 = motion_I[0] * motion_I[1];
+  real t150 = motion_I[1] * motion_I[1];
+  real t151 = motion_I[2] * motion_I[2];
+  real t155 = motion_I[0] * motion_I[2];
+  real t159 = motion_I[6] + (t92 * (t147 - motion_I[5]) - t86 * (t150 + t151) + t98 * (motion_I[4] +
+    t155));
+  real t163 = motion_I[0] * motion_I[0];
+  real t167 = motion_I[1] * motion_I[2];
+  real t171 = motion_I[7] + (t86 * (motion_I[5] + t147) - t92 * (t151 + t163) + t98 * (t167 -
+    motion_I[3]));
+  real t182 = motion_I[8] + (t86 * (t155 - motion_I[4]) + t92 * (motion_I[3] + t167) - t98 * (t150 +
+    t163));
+  motion[6] = t24 * t159 + t55 * t171 + t70 * t182 + (s[0] + (u[2] * u[4] - u[1] * u[5]) + (2.0 *
+    (u[2] * t109) - 2.0 * (u[1] * t115)));
+  motion[7] = t38 * t159 + t60 * t171 + t75 * t182 + (s[1] + (u[0] * u[5] - u[2] * u[3]) + (2.0 *
+    (u[0] * t115) - 2.0 * (u[2] * t103)));
+  motion[8] = t50 * t159 + t65 * t171 + t80 * t182 + (s[2] + (u[1] * u[3] - u[0] * u[4]) + (2.0 *
+    (u[1] * t103) - 2.0 * (u[0] * t109)));
+  qdot[0] = t9 * (u[1] * t25) + (u[0] * t11 + t9 * (u[2] * t39));
+  qdot[1] = t9 * (u[0] * t15) + (u[1] * t30 + t9 * (u[2] * t42));
+  qdot[2] = t9 * (u[0] * t21) + (u[2] * t48 + t9 * (u[1] * t35));
+  qdot[3] = -(0.5 * (q[6] * u[5] + (q[4] * u[3] + q[5] * u[4])));
+  qdot[4] = 0.5 * (q[3] * u[3] + q[5] * u[5] - q[6] * u[4]);
+  qdot[5] = 0.5 * (q[6] * u[3] + (q[3] * u[4] - q[4] * u[5]));
+  qdot[6] = 0.5 * (q[3] * u[5] + q[4] * u[4] - q[5] * u[3]);
+  return 0;
 }
 
-static int mstmm_hinge_free_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_free_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 7, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 6 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -607,723 +216,203 @@ static const mstmm_port mstmm_hinge_free_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_free_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_free_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[0];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t1 = S[6] * ((real)1 / (real)10000000000000);
-    const real t2 = 1.0 / S[0];
-    const real t3 = S[1] * t2;
-    const real t4 = S[1] * t3;
-    const real t5 = S[6] - t4;
-    const real t6 = t1 < t5;
-    if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t7 = S[11] * ((real)1 / (real)10000000000000);
-    const real t8 = S[2] * t2;
-    const real t9 = S[2] * t8;
-    const real t10 = S[11] - t9;
-    const real t11 = S[2] * t3;
-    const real t12 = S[7] - t11;
-    const real t13 = 1.0 / t5;
-    const real t14 = t13 * t12;
-    const real t15 = t12 * t14;
-    const real t16 = t10 - t15;
-    const real t17 = t7 < t16;
-    if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t18 = S[15] * ((real)1 / (real)10000000000000);
-    const real t19 = S[3] * t2;
-    const real t20 = S[3] * t19;
-    const real t21 = S[15] - t20;
-    const real t22 = S[3] * t3;
-    const real t23 = S[8] - t22;
-    const real t24 = t13 * t23;
-    const real t25 = t23 * t24;
-    const real t26 = t21 - t25;
-    const real t27 = S[3] * t8;
-    const real t28 = S[12] - t27;
-    const real t29 = t14 * t23;
-    const real t30 = t28 - t29;
-    const real t31 = 1.0 / t16;
-    const real t32 = t31 * t30;
-    const real t33 = t30 * t32;
-    const real t34 = t26 - t33;
-    const real t35 = t18 < t34;
-    if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t36 = S[18] * ((real)1 / (real)10000000000000);
-    const real t37 = S[4] * t2;
-    const real t38 = S[4] * t37;
-    const real t39 = S[18] - t38;
-    const real t40 = S[4] * t3;
-    const real t41 = S[9] - t40;
-    const real t42 = t13 * t41;
-    const real t43 = t41 * t42;
-    const real t44 = t39 - t43;
-    const real t45 = S[4] * t8;
-    const real t46 = S[13] - t45;
-    const real t47 = t14 * t41;
-    const real t48 = t46 - t47;
-    const real t49 = t31 * t48;
-    const real t50 = t48 * t49;
-    const real t51 = t44 - t50;
-    const real t52 = S[4] * t19;
-    const real t53 = S[16] - t52;
-    const real t54 = t24 * t41;
-    const real t55 = t53 - t54;
-    const real t56 = t32 * t48;
-    const real t57 = t55 - t56;
-    const real t58 = 1.0 / t34;
-    const real t59 = t58 * t57;
-    const real t60 = t57 * t59;
-    const real t61 = t51 - t60;
-    const real t62 = t36 < t61;
-    if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t63 = S[20] * ((real)1 / (real)10000000000000);
-    const real t64 = S[5] * t2;
-    const real t65 = S[5] * t64;
-    const real t66 = S[20] - t65;
-    const real t67 = S[5] * t3;
-    const real t68 = S[10] - t67;
-    const real t69 = t13 * t68;
-    const real t70 = t68 * t69;
-    const real t71 = t66 - t70;
-    const real t72 = S[5] * t8;
-    const real t73 = S[14] - t72;
-    const real t74 = t14 * t68;
-    const real t75 = t73 - t74;
-    const real t76 = t31 * t75;
-    const real t77 = t75 * t76;
-    const real t78 = t71 - t77;
-    const real t79 = S[5] * t19;
-    const real t80 = S[17] - t79;
-    const real t81 = t24 * t68;
-    const real t82 = t80 - t81;
-    const real t83 = t32 * t75;
-    const real t84 = t82 - t83;
-    const real t85 = t58 * t84;
-    const real t86 = t84 * t85;
-    const real t87 = t78 - t86;
-    const real t88 = S[5] * t37;
-    const real t89 = S[19] - t88;
-    const real t90 = t42 * t68;
-    const real t91 = t89 - t90;
-    const real t92 = t49 * t75;
-    const real t93 = t91 - t92;
-    const real t94 = t59 * t84;
-    const real t95 = t93 - t94;
-    const real t96 = 1.0 / t61;
-    const real t97 = t96 * t95;
-    const real t98 = t95 * t97;
-    const real t99 = t87 - t98;
-    const real t100 = t63 < t99;
-    if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t101 = 0.0 < floor_[0];
-    const real t102 = S[0] + S[6];
-    const real t103 = S[11] + t102;
-    const real t104 = ((real)1 / (real)300000000000000) * t103;
-    const real t105 = t101 != 0 ? floor_[0] : t104;
-    const real t106 = t105 < S[0];
-    if (!(t106 != 0)) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
-    const real t107 = t105 < S[6];
-    if (!(t107 != 0)) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
-    const real t108 = t105 < S[11];
-    if (!(t108 != 0)) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
-    const real t109 = 0.0 < floor_[1];
-    const real t110 = S[15] + S[18];
-    const real t111 = S[20] + t110;
-    const real t112 = ((real)1 / (real)300000000000000) * t111;
-    const real t113 = t109 != 0 ? floor_[1] : t112;
-    const real t114 = t113 < S[15];
-    if (!(t114 != 0)) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
-    const real t115 = t113 < S[18];
-    if (!(t115 != 0)) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
-    const real t116 = t113 < S[20];
-    if (!(t116 != 0)) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
-    const real t117 = S[0] * t2;
-    const real t118 = S[0] * t3;
-    const real t119 = S[1] - t118;
-    const real t120 = t13 * t119;
-    const real t121 = S[0] * t8;
-    const real t122 = S[2] - t121;
-    const real t123 = t14 * t119;
-    const real t124 = t122 - t123;
-    const real t125 = t31 * t124;
-    const real t126 = S[0] * t19;
-    const real t127 = S[3] - t126;
-    const real t128 = t24 * t119;
-    const real t129 = t127 - t128;
-    const real t130 = t32 * t124;
-    const real t131 = t129 - t130;
-    const real t132 = t58 * t131;
-    const real t133 = S[0] * t37;
-    const real t134 = S[4] - t133;
-    const real t135 = t42 * t119;
-    const real t136 = t134 - t135;
-    const real t137 = t49 * t124;
-    const real t138 = t136 - t137;
-    const real t139 = t59 * t131;
-    const real t140 = t138 - t139;
-    const real t141 = t96 * t140;
-    const real t142 = 1.0 / t99;
-    const real t143 = S[0] * t64;
-    const real t144 = S[5] - t143;
-    const real t145 = t69 * t119;
-    const real t146 = t144 - t145;
-    const real t147 = t76 * t124;
-    const real t148 = t146 - t147;
-    const real t149 = t85 * t131;
-    const real t150 = t148 - t149;
-    const real t151 = t97 * t140;
-    const real t152 = t150 - t151;
-    const real t153 = t142 * t152;
-    const real t154 = t97 * t153;
-    const real t155 = t141 - t154;
-    const real t156 = t59 * t155;
-    const real t157 = t132 - t156;
-    const real t158 = t85 * t153;
-    const real t159 = t157 - t158;
-    const real t160 = t32 * t159;
-    const real t161 = t125 - t160;
-    const real t162 = t49 * t155;
-    const real t163 = t161 - t162;
-    const real t164 = t76 * t153;
-    const real t165 = t163 - t164;
-    const real t166 = t14 * t165;
-    const real t167 = t120 - t166;
-    const real t168 = t24 * t159;
-    const real t169 = t167 - t168;
-    const real t170 = t42 * t155;
-    const real t171 = t169 - t170;
-    const real t172 = t69 * t153;
-    const real t173 = t171 - t172;
-    const real t174 = t3 * t173;
-    const real t175 = t117 - t174;
-    const real t176 = t8 * t165;
-    const real t177 = t175 - t176;
-    const real t178 = t19 * t159;
-    const real t179 = t177 - t178;
-    const real t180 = t37 * t155;
-    const real t181 = t179 - t180;
-    const real t182 = t64 * t153;
-    const real t183 = t181 - t182;
-    G[0] = t183;
-    const real t184 = t5 * t13;
-    const real t185 = S[1] * t8;
-    const real t186 = S[7] - t185;
-    const real t187 = t5 * t14;
-    const real t188 = t186 - t187;
-    const real t189 = t31 * t188;
-    const real t190 = S[1] * t19;
-    const real t191 = S[8] - t190;
-    const real t192 = t5 * t24;
-    const real t193 = t191 - t192;
-    const real t194 = t32 * t188;
-    const real t195 = t193 - t194;
-    const real t196 = t58 * t195;
-    const real t197 = S[1] * t37;
-    const real t198 = S[9] - t197;
-    const real t199 = t5 * t42;
-    const real t200 = t198 - t199;
-    const real t201 = t49 * t188;
-    const real t202 = t200 - t201;
-    const real t203 = t59 * t195;
-    const real t204 = t202 - t203;
-    const real t205 = t96 * t204;
-    const real t206 = S[1] * t64;
-    const real t207 = S[10] - t206;
-    const real t208 = t5 * t69;
-    const real t209 = t207 - t208;
-    const real t210 = t76 * t188;
-    const real t211 = t209 - t210;
-    const real t212 = t85 * t195;
-    const real t213 = t211 - t212;
-    const real t214 = t97 * t204;
-    const real t215 = t213 - t214;
-    const real t216 = t142 * t215;
-    const real t217 = t97 * t216;
-    const real t218 = t205 - t217;
-    const real t219 = t59 * t218;
-    const real t220 = t196 - t219;
-    const real t221 = t85 * t216;
-    const real t222 = t220 - t221;
-    const real t223 = t32 * t222;
-    const real t224 = t189 - t223;
-    const real t225 = t49 * t218;
-    const real t226 = t224 - t225;
-    const real t227 = t76 * t216;
-    const real t228 = t226 - t227;
-    const real t229 = t14 * t228;
-    const real t230 = t184 - t229;
-    const real t231 = t24 * t222;
-    const real t232 = t230 - t231;
-    const real t233 = t42 * t218;
-    const real t234 = t232 - t233;
-    const real t235 = t69 * t216;
-    const real t236 = t234 - t235;
-    const real t237 = t3 * t236;
-    const real t238 = t3 - t237;
-    const real t239 = t8 * t228;
-    const real t240 = t238 - t239;
-    const real t241 = t19 * t222;
-    const real t242 = t240 - t241;
-    const real t243 = t37 * t218;
-    const real t244 = t242 - t243;
-    const real t245 = t64 * t216;
-    const real t246 = t244 - t245;
-    G[1] = t246;
-    const real t247 = t16 * t31;
-    const real t248 = S[2] * t19;
-    const real t249 = S[12] - t248;
-    const real t250 = t12 * t24;
-    const real t251 = t249 - t250;
-    const real t252 = t16 * t32;
-    const real t253 = t251 - t252;
-    const real t254 = t58 * t253;
-    const real t255 = S[2] * t37;
-    const real t256 = S[13] - t255;
-    const real t257 = t12 * t42;
-    const real t258 = t256 - t257;
-    const real t259 = t16 * t49;
-    const real t260 = t258 - t259;
-    const real t261 = t59 * t253;
-    const real t262 = t260 - t261;
-    const real t263 = t96 * t262;
-    const real t264 = S[2] * t64;
-    const real t265 = S[14] - t264;
-    const real t266 = t12 * t69;
-    const real t267 = t265 - t266;
-    const real t268 = t16 * t76;
-    const real t269 = t267 - t268;
-    const real t270 = t85 * t253;
-    const real t271 = t269 - t270;
-    const real t272 = t97 * t262;
-    const real t273 = t271 - t272;
-    const real t274 = t142 * t273;
-    const real t275 = t97 * t274;
-    const real t276 = t263 - t275;
-    const real t277 = t59 * t276;
-    const real t278 = t254 - t277;
-    const real t279 = t85 * t274;
-    const real t280 = t278 - t279;
-    const real t281 = t32 * t280;
-    const real t282 = t247 - t281;
-    const real t283 = t49 * t276;
-    const real t284 = t282 - t283;
-    const real t285 = t76 * t274;
-    const real t286 = t284 - t285;
-    const real t287 = t14 * t286;
-    const real t288 = t14 - t287;
-    const real t289 = t24 * t280;
-    const real t290 = t288 - t289;
-    const real t291 = t42 * t276;
-    const real t292 = t290 - t291;
-    const real t293 = t69 * t274;
-    const real t294 = t292 - t293;
-    const real t295 = t3 * t294;
-    const real t296 = t8 - t295;
-    const real t297 = t8 * t286;
-    const real t298 = t296 - t297;
-    const real t299 = t19 * t280;
-    const real t300 = t298 - t299;
-    const real t301 = t37 * t276;
-    const real t302 = t300 - t301;
-    const real t303 = t64 * t274;
-    const real t304 = t302 - t303;
-    G[2] = t304;
-    const real t305 = t34 * t58;
-    const real t306 = S[3] * t37;
-    const real t307 = S[16] - t306;
-    const real t308 = t23 * t42;
-    const real t309 = t307 - t308;
-    const real t310 = t30 * t49;
-    const real t311 = t309 - t310;
-    const real t312 = t34 * t59;
-    const real t313 = t311 - t312;
-    const real t314 = t96 * t313;
-    const real t315 = S[3] * t64;
-    const real t316 = S[17] - t315;
-    const real t317 = t23 * t69;
-    const real t318 = t316 - t317;
-    const real t319 = t30 * t76;
-    const real t320 = t318 - t319;
-    const real t321 = t34 * t85;
-    const real t322 = t320 - t321;
-    const real t323 = t97 * t313;
-    const real t324 = t322 - t323;
-    const real t325 = t142 * t324;
-    const real t326 = t97 * t325;
-    const real t327 = t314 - t326;
-    const real t328 = t59 * t327;
-    const real t329 = t305 - t328;
-    const real t330 = t85 * t325;
-    const real t331 = t329 - t330;
-    const real t332 = t32 * t331;
-    const real t333 = t32 - t332;
-    const real t334 = t49 * t327;
-    const real t335 = t333 - t334;
-    const real t336 = t76 * t325;
-    const real t337 = t335 - t336;
-    const real t338 = t14 * t337;
-    const real t339 = t24 - t338;
-    const real t340 = t24 * t331;
-    const real t341 = t339 - t340;
-    const real t342 = t42 * t327;
-    const real t343 = t341 - t342;
-    const real t344 = t69 * t325;
-    const real t345 = t343 - t344;
-    const real t346 = t3 * t345;
-    const real t347 = t19 - t346;
-    const real t348 = t8 * t337;
-    const real t349 = t347 - t348;
-    const real t350 = t19 * t331;
-    const real t351 = t349 - t350;
-    const real t352 = t37 * t327;
-    const real t353 = t351 - t352;
-    const real t354 = t64 * t325;
-    const real t355 = t353 - t354;
-    G[3] = t355;
-    const real t356 = t61 * t96;
-    const real t357 = S[4] * t64;
-    const real t358 = S[19] - t357;
-    const real t359 = t41 * t69;
-    const real t360 = t358 - t359;
-    const real t361 = t48 * t76;
-    const real t362 = t360 - t361;
-    const real t363 = t57 * t85;
-    const real t364 = t362 - t363;
-    const real t365 = t61 * t97;
-    const real t366 = t364 - t365;
-    const real t367 = t142 * t366;
-    const real t368 = t97 * t367;
-    const real t369 = t356 - t368;
-    const real t370 = t59 * t369;
-    const real t371 = t59 - t370;
-    const real t372 = t85 * t367;
-    const real t373 = t371 - t372;
-    const real t374 = t32 * t373;
-    const real t375 = t49 - t374;
-    const real t376 = t49 * t369;
-    const real t377 = t375 - t376;
-    const real t378 = t76 * t367;
-    const real t379 = t377 - t378;
-    const real t380 = t14 * t379;
-    const real t381 = t42 - t380;
-    const real t382 = t24 * t373;
-    const real t383 = t381 - t382;
-    const real t384 = t42 * t369;
-    const real t385 = t383 - t384;
-    const real t386 = t69 * t367;
-    const real t387 = t385 - t386;
-    const real t388 = t3 * t387;
-    const real t389 = t37 - t388;
-    const real t390 = t8 * t379;
-    const real t391 = t389 - t390;
-    const real t392 = t19 * t373;
-    const real t393 = t391 - t392;
-    const real t394 = t37 * t369;
-    const real t395 = t393 - t394;
-    const real t396 = t64 * t367;
-    const real t397 = t395 - t396;
-    G[4] = t397;
-    const real t398 = t99 * t142;
-    const real t399 = t97 * t398;
-    const real t400 = t97 - t399;
-    const real t401 = t59 * t400;
-    const real t402 = t85 - t401;
-    const real t403 = t85 * t398;
-    const real t404 = t402 - t403;
-    const real t405 = t32 * t404;
-    const real t406 = t76 - t405;
-    const real t407 = t49 * t400;
-    const real t408 = t406 - t407;
-    const real t409 = t76 * t398;
-    const real t410 = t408 - t409;
-    const real t411 = t14 * t410;
-    const real t412 = t69 - t411;
-    const real t413 = t24 * t404;
-    const real t414 = t412 - t413;
-    const real t415 = t42 * t400;
-    const real t416 = t414 - t415;
-    const real t417 = t69 * t398;
-    const real t418 = t416 - t417;
-    const real t419 = t3 * t418;
-    const real t420 = t64 - t419;
-    const real t421 = t8 * t410;
-    const real t422 = t420 - t421;
-    const real t423 = t19 * t404;
-    const real t424 = t422 - t423;
-    const real t425 = t37 * t400;
-    const real t426 = t424 - t425;
-    const real t427 = t64 * t398;
-    const real t428 = t426 - t427;
-    G[5] = t428;
-    G[6] = t173;
-    G[7] = t236;
-    G[8] = t294;
-    G[9] = t345;
-    G[10] = t387;
-    G[11] = t418;
-    G[12] = t165;
-    G[13] = t228;
-    G[14] = t286;
-    G[15] = t337;
-    G[16] = t379;
-    G[17] = t410;
-    G[18] = t159;
-    G[19] = t222;
-    G[20] = t280;
-    G[21] = t331;
-    G[22] = t373;
-    G[23] = t404;
-    G[24] = t155;
-    G[25] = t218;
-    G[26] = t276;
-    G[27] = t327;
-    G[28] = t369;
-    G[29] = t400;
-    G[30] = t153;
-    G[31] = t216;
-    G[32] = t274;
-    G[33] = t325;
-    G[34] = t367;
-    G[35] = t398;
-    const real t429 = tau[0] - e[0];
-    const real t430 = t2 * t429;
-    const real t431 = tau[1] - e[1];
-    const real t432 = t3 * t429;
-    const real t433 = t431 - t432;
-    const real t434 = t13 * t433;
-    const real t435 = tau[2] - e[2];
-    const real t436 = t8 * t429;
-    const real t437 = t435 - t436;
-    const real t438 = t14 * t433;
-    const real t439 = t437 - t438;
-    const real t440 = t31 * t439;
-    const real t441 = tau[3] - e[3];
-    const real t442 = t19 * t429;
-    const real t443 = t441 - t442;
-    const real t444 = t24 * t433;
-    const real t445 = t443 - t444;
-    const real t446 = t32 * t439;
-    const real t447 = t445 - t446;
-    const real t448 = t58 * t447;
-    const real t449 = tau[4] - e[4];
-    const real t450 = t37 * t429;
-    const real t451 = t449 - t450;
-    const real t452 = t42 * t433;
-    const real t453 = t451 - t452;
-    const real t454 = t49 * t439;
-    const real t455 = t453 - t454;
-    const real t456 = t59 * t447;
-    const real t457 = t455 - t456;
-    const real t458 = t96 * t457;
-    const real t459 = tau[5] - e[5];
-    const real t460 = t64 * t429;
-    const real t461 = t459 - t460;
-    const real t462 = t69 * t433;
-    const real t463 = t461 - t462;
-    const real t464 = t76 * t439;
-    const real t465 = t463 - t464;
-    const real t466 = t85 * t447;
-    const real t467 = t465 - t466;
-    const real t468 = t97 * t457;
-    const real t469 = t467 - t468;
-    const real t470 = t142 * t469;
-    const real t471 = t97 * t470;
-    const real t472 = t458 - t471;
-    const real t473 = t59 * t472;
-    const real t474 = t448 - t473;
-    const real t475 = t85 * t470;
-    const real t476 = t474 - t475;
-    const real t477 = t32 * t476;
-    const real t478 = t440 - t477;
-    const real t479 = t49 * t472;
-    const real t480 = t478 - t479;
-    const real t481 = t76 * t470;
-    const real t482 = t480 - t481;
-    const real t483 = t14 * t482;
-    const real t484 = t434 - t483;
-    const real t485 = t24 * t476;
-    const real t486 = t484 - t485;
-    const real t487 = t42 * t472;
-    const real t488 = t486 - t487;
-    const real t489 = t69 * t470;
-    const real t490 = t488 - t489;
-    const real t491 = t3 * t490;
-    const real t492 = t430 - t491;
-    const real t493 = t8 * t482;
-    const real t494 = t492 - t493;
-    const real t495 = t19 * t476;
-    const real t496 = t494 - t495;
-    const real t497 = t37 * t472;
-    const real t498 = t496 - t497;
-    const real t499 = t64 * t470;
-    const real t500 = t498 - t499;
-    g[0] = t500;
-    g[1] = t490;
-    g[2] = t482;
-    g[3] = t476;
-    g[4] = t472;
-    g[5] = t470;
-    S_I[0] += 0.0;
-    S_I[1] += 0.0;
-    S_I[2] += 0.0;
-    S_I[3] += 0.0;
-    S_I[4] += 0.0;
-    S_I[5] += 0.0;
-    S_I[6] += 0.0;
-    S_I[7] += 0.0;
-    S_I[8] += 0.0;
-    S_I[9] += 0.0;
-    S_I[10] += 0.0;
-    S_I[11] += 0.0;
-    S_I[12] += 0.0;
-    S_I[13] += 0.0;
-    S_I[14] += 0.0;
-    S_I[15] += 0.0;
-    S_I[16] += 0.0;
-    S_I[17] += 0.0;
-    S_I[18] += 0.0;
-    S_I[19] += 0.0;
-    S_I[20] += 0.0;
-    const real t501 = Rc[0] * tau[0];
-    const real t502 = Rc[1] * tau[1];
-    const real t503 = t501 + t502;
-    const real t504 = Rc[2] * tau[2];
-    const real t505 = t503 + t504;
-    e_I[0] += t505;
-    const real t506 = Rc[3] * tau[0];
-    const real t507 = Rc[4] * tau[1];
-    const real t508 = t506 + t507;
-    const real t509 = Rc[5] * tau[2];
-    const real t510 = t508 + t509;
-    e_I[1] += t510;
-    const real t511 = Rc[6] * tau[0];
-    const real t512 = Rc[7] * tau[1];
-    const real t513 = t511 + t512;
-    const real t514 = Rc[8] * tau[2];
-    const real t515 = t513 + t514;
-    e_I[2] += t515;
-    const real t516 = Rc[0] * tau[3];
-    const real t517 = Rc[1] * tau[4];
-    const real t518 = t516 + t517;
-    const real t519 = Rc[2] * tau[5];
-    const real t520 = t518 + t519;
-    const real t521 = Rc[6] * r[1];
-    const real t522 = Rc[3] * r[2];
-    const real t523 = t521 - t522;
-    const real t524 = tau[0] * t523;
-    const real t525 = Rc[7] * r[1];
-    const real t526 = Rc[4] * r[2];
-    const real t527 = t525 - t526;
-    const real t528 = tau[1] * t527;
-    const real t529 = t524 + t528;
-    const real t530 = Rc[8] * r[1];
-    const real t531 = Rc[5] * r[2];
-    const real t532 = t530 - t531;
-    const real t533 = tau[2] * t532;
-    const real t534 = t529 + t533;
-    const real t535 = t520 + t534;
-    e_I[3] += t535;
-    const real t536 = Rc[3] * tau[3];
-    const real t537 = Rc[4] * tau[4];
-    const real t538 = t536 + t537;
-    const real t539 = Rc[5] * tau[5];
-    const real t540 = t538 + t539;
-    const real t541 = Rc[0] * r[2];
-    const real t542 = Rc[6] * r[0];
-    const real t543 = t541 - t542;
-    const real t544 = tau[0] * t543;
-    const real t545 = Rc[1] * r[2];
-    const real t546 = Rc[7] * r[0];
-    const real t547 = t545 - t546;
-    const real t548 = tau[1] * t547;
-    const real t549 = t544 + t548;
-    const real t550 = Rc[2] * r[2];
-    const real t551 = Rc[8] * r[0];
-    const real t552 = t550 - t551;
-    const real t553 = tau[2] * t552;
-    const real t554 = t549 + t553;
-    const real t555 = t540 + t554;
-    e_I[4] += t555;
-    const real t556 = Rc[6] * tau[3];
-    const real t557 = Rc[7] * tau[4];
-    const real t558 = t556 + t557;
-    const real t559 = Rc[8] * tau[5];
-    const real t560 = t558 + t559;
-    const real t561 = Rc[3] * r[0];
-    const real t562 = Rc[0] * r[1];
-    const real t563 = t561 - t562;
-    const real t564 = tau[0] * t563;
-    const real t565 = Rc[4] * r[0];
-    const real t566 = Rc[1] * r[1];
-    const real t567 = t565 - t566;
-    const real t568 = tau[1] * t567;
-    const real t569 = t564 + t568;
-    const real t570 = Rc[5] * r[0];
-    const real t571 = Rc[2] * r[1];
-    const real t572 = t570 - t571;
-    const real t573 = tau[2] * t572;
-    const real t574 = t569 + t573;
-    const real t575 = t560 + t574;
-    e_I[5] += t575;
-    return 0;
+  (void)p;
+  (void)q;
+  real t0 = 0.0 < S[0];
+  if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  real t2 = 1.0 / S[0];
+  real t3 = S[1] * t2;
+  real t5 = S[6] - S[1] * t3;
+  real t6 = S[6] * ((real)1 / (real)10000000000000) < t5;
+  if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  real t8 = S[2] * t2;
+  real t12 = S[7] - S[2] * t3;
+  real t13 = 1.0 / t5;
+  real t14 = t13 * t12;
+  real t16 = S[11] - S[2] * t8 - t12 * t14;
+  real t17 = S[11] * ((real)1 / (real)10000000000000) < t16;
+  if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  real t19 = S[3] * t2;
+  real t23 = S[8] - S[3] * t3;
+  real t24 = t13 * t23;
+  real t30 = S[12] - S[3] * t8 - t14 * t23;
+  real t31 = 1.0 / t16;
+  real t32 = t31 * t30;
+  real t34 = S[15] - S[3] * t19 - t23 * t24 - t30 * t32;
+  real t35 = S[15] * ((real)1 / (real)10000000000000) < t34;
+  if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  real t37 = S[4] * t2;
+  real t41 = S[9] - S[4] * t3;
+  real t42 = t13 * t41;
+  real t48 = S[13] - S[4] * t8 - t14 * t41;
+  real t49 = t31 * t48;
+  real t57 = S[16] - S[4] * t19 - t24 * t41 - t32 * t48;
+  real t58 = 1.0 / t34;
+  real t59 = t58 * t57;
+  real t61 = S[18] - S[4] * t37 - t41 * t42 - t48 * t49 - t57 * t59;
+  real t62 = S[18] * ((real)1 / (real)10000000000000) < t61;
+  if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  real t64 = S[5] * t2;
+  real t68 = S[10] - S[5] * t3;
+  real t69 = t13 * t68;
+  real t75 = S[14] - S[5] * t8 - t14 * t68;
+  real t76 = t31 * t75;
+  real t84 = S[17] - S[5] * t19 - t24 * t68 - t32 * t75;
+  real t85 = t58 * t84;
+  real t95 = S[19] - S[5] * t37 - t42 * t68 - t49 * t75 - t59 * t84;
+  real t96 = 1.0 / t61;
+  real t97 = t96 * t95;
+  real t99 = S[20] - S[5] * t64 - t68 * t69 - t75 * t76 - t84 * t85 - t95 * t97;
+  real t100 = S[20] * ((real)1 / (real)10000000000000) < t99;
+  if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t0 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t6 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t17 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t35 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t62 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t100 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  real t104 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t105 = (0.0 < floor_[0]) ? floor_[0] : t104;
+  if (!((t105 < S[0]))) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t105 < S[6]))) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t105 < S[11]))) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
+  real t112 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t113 = (0.0 < floor_[1]) ? floor_[1] : t112;
+  if (!((t113 < S[15]))) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t113 < S[18]))) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t113 < S[20]))) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
+  real t119 = S[1] - S[0] * t3;
+  real t124 = S[2] - S[0] * t8 - t14 * t119;
+  real t131 = S[3] - S[0] * t19 - t24 * t119 - t32 * t124;
+  real t140 = S[4] - S[0] * t37 - t42 * t119 - t49 * t124 - t59 * t131;
+  real t142 = 1.0 / t99;
+  real t153 = t142 * (S[5] - S[0] * t64 - t69 * t119 - t76 * t124 - t85 * t131 - t97 * t140);
+  real t155 = t96 * t140 - t97 * t153;
+  real t159 = t58 * t131 - t59 * t155 - t85 * t153;
+  real t165 = t31 * t124 - t32 * t159 - t49 * t155 - t76 * t153;
+  real t173 = t13 * t119 - t14 * t165 - t24 * t159 - t42 * t155 - t69 * t153;
+  G[0] = S[0] * t2 - t3 * t173 - t8 * t165 - t19 * t159 - t37 * t155 - t64 * t153;
+  real t188 = S[7] - S[1] * t8 - t5 * t14;
+  real t195 = S[8] - S[1] * t19 - t5 * t24 - t32 * t188;
+  real t204 = S[9] - S[1] * t37 - t5 * t42 - t49 * t188 - t59 * t195;
+  real t216 = t142 * (S[10] - S[1] * t64 - t5 * t69 - t76 * t188 - t85 * t195 - t97 * t204);
+  real t218 = t96 * t204 - t97 * t216;
+  real t222 = t58 * t195 - t59 * t218 - t85 * t216;
+  real t228 = t31 * t188 - t32 * t222 - t49 * t218 - t76 * t216;
+  real t236 = t5 * t13 - t14 * t228 - t24 * t222 - t42 * t218 - t69 * t216;
+  G[1] = t3 - t3 * t236 - t8 * t228 - t19 * t222 - t37 * t218 - t64 * t216;
+  real t253 = S[12] - S[2] * t19 - t12 * t24 - t16 * t32;
+  real t262 = S[13] - S[2] * t37 - t12 * t42 - t16 * t49 - t59 * t253;
+  real t274 = t142 * (S[14] - S[2] * t64 - t12 * t69 - t16 * t76 - t85 * t253 - t97 * t262);
+  real t276 = t96 * t262 - t97 * t274;
+  real t280 = t58 * t253 - t59 * t276 - t85 * t274;
+  real t286 = t16 * t31 - t32 * t280 - t49 * t276 - t76 * t274;
+  real t294 = t14 - t14 * t286 - t24 * t280 - t42 * t276 - t69 * t274;
+  G[2] = t8 - t3 * t294 - t8 * t286 - t19 * t280 - t37 * t276 - t64 * t274;
+  real t313 = S[16] - S[3] * t37 - t23 * t42 - t30 * t49 - t34 * t59;
+  real t325 = t142 * (S[17] - S[3] * t64 - t23 * t69 - t30 * t76 - t34 * t85 - t97 * t313);
+  real t327 = t96 * t313 - t97 * t325;
+  real t331 = t34 * t58 - t59 * t327 - t85 * t325;
+  real t337 = t32 - t32 * t331 - t49 * t327 - t76 * t325;
+  real t345 = t24 - t14 * t337 - t24 * t331 - t42 * t327 - t69 * t325;
+  G[3] = t19 - t3 * t345 - t8 * t337 - t19 * t331 - t37 * t327 - t64 * t325;
+  real t367 = t142 * (S[19] - S[4] * t64 - t41 * t69 - t48 * t76 - t57 * t85 - t61 * t97);
+  real t369 = t61 * t96 - t97 * t367;
+  real t373 = t59 - t59 * t369 - t85 * t367;
+  real t379 = t49 - t32 * t373 - t49 * t369 - t76 * t367;
+  real t387 = t42 - t14 * t379 - t24 * t373 - t42 * t369 - t69 * t367;
+  G[4] = t37 - t3 * t387 - t8 * t379 - t19 * t373 - t37 * t369 - t64 * t367;
+  real t398 = t99 * t142;
+  real t400 = t97 - t97 * t398;
+  real t404 = t85 - t59 * t400 - t85 * t398;
+  real t410 = t76 - t32 * t404 - t49 * t400 - t76 * t398;
+  real t418 = t69 - t14 * t410 - t24 * t404 - t42 * t400 - t69 * t398;
+  G[5] = t64 - t3 * t418 - t8 * t410 - t19 * t404 - t37 * t400 - t64 * t398;
+  G[6] = t173;
+  G[7] = t236;
+  G[8] = t294;
+  G[9] = t345;
+  G[10] = t387;
+  G[11] = t418;
+  G[12] = t165;
+  G[13] = t228;
+  G[14] = t286;
+  G[15] = t337;
+  G[16] = t379;
+  G[17] = t410;
+  G[18] = t159;
+  G[19] = t222;
+  G[20] = t280;
+  G[21] = t331;
+  G[22] = t373;
+  G[23] = t404;
+  G[24] = t155;
+  G[25] = t218;
+  G[26] = t276;
+  G[27] = t327;
+  G[28] = t369;
+  G[29] = t400;
+  G[30] = t153;
+  G[31] = t216;
+  G[32] = t274;
+  G[33] = t325;
+  G[34] = t367;
+  G[35] = t398;
+  real t429 = tau[0] - e[0];
+  real t433 = tau[1] - e[1] - t3 * t429;
+  real t439 = tau[2] - e[2] - t8 * t429 - t14 * t433;
+  real t447 = tau[3] - e[3] - t19 * t429 - t24 * t433 - t32 * t439;
+  real t457 = tau[4] - e[4] - t37 * t429 - t42 * t433 - t49 * t439 - t59 * t447;
+  real t470 = t142 * (tau[5] - e[5] - t64 * t429 - t69 * t433 - t76 * t439 - t85 * t447 - t97 *
+    t457);
+  real t472 = t96 * t457 - t97 * t470;
+  real t476 = t58 * t447 - t59 * t472 - t85 * t470;
+  real t482 = t31 * t439 - t32 * t476 - t49 * t472 - t76 * t470;
+  real t490 = t13 * t433 - t14 * t482 - t24 * t476 - t42 * t472 - t69 * t470;
+  g[0] = t2 * t429 - t3 * t490 - t8 * t482 - t19 * t476 - t37 * t472 - t64 * t470;
+  g[1] = t490;
+  g[2] = t482;
+  g[3] = t476;
+  g[4] = t472;
+  g[5] = t470;
+  S_I[0] += 0.0;
+  S_I[1] += 0.0;
+  S_I[2] += 0.0;
+  S_I[3] += 0.0;
+  S_I[4] += 0.0;
+  S_I[5] += 0.0;
+  S_I[6] += 0.0;
+  S_I[7] += 0.0;
+  S_I[8] += 0.0;
+  S_I[9] += 0.0;
+  S_I[10] += 0.0;
+  S_I[11] += 0.0;
+  S_I[12] += 0.0;
+  S_I[13] += 0.0;
+  S_I[14] += 0.0;
+  S_I[15] += 0.0;
+  S_I[16] += 0.0;
+  S_I[17] += 0.0;
+  S_I[18] += 0.0;
+  S_I[19] += 0.0;
+  S_I[20] += 0.0;
+  e_I[0] += Rc[0] * tau[0] + Rc[1] * tau[1] + Rc[2] * tau[2];
+  e_I[1] += Rc[3] * tau[0] + Rc[4] * tau[1] + Rc[5] * tau[2];
+  e_I[2] += Rc[6] * tau[0] + Rc[7] * tau[1] + Rc[8] * tau[2];
+  e_I[3] += Rc[0] * tau[3] + Rc[1] * tau[4] + Rc[2] * tau[5] + (tau[0] * (Rc[6] * r[1] - Rc[3] *
+    r[2]) + tau[1] * (Rc[7] * r[1] - Rc[4] * r[2]) + tau[2] * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * tau[3] + Rc[4] * tau[4] + Rc[5] * tau[5] + (tau[0] * (Rc[0] * r[2] - Rc[6] *
+    r[0]) + tau[1] * (Rc[1] * r[2] - Rc[7] * r[0]) + tau[2] * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * tau[3] + Rc[7] * tau[4] + Rc[8] * tau[5] + (tau[0] * (Rc[3] * r[0] - Rc[0] *
+    r[1]) + tau[1] * (Rc[4] * r[0] - Rc[1] * r[1]) + tau[2] * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_free_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_free_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_condense_outputs[] = {
-    {"G", 36, "", 0, 0},
-    {"g", 6, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_free_condense_guards[] = {
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 6 of 6 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_free_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 6 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1338,167 +427,47 @@ static const mstmm_guard mstmm_hinge_free_condense_guards[] = {
  * out udot[6] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_free_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_free_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    (void)q;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    const real t78 = G[18] * t16;
-    const real t79 = G[19] * t22;
-    const real t80 = t78 + t79;
-    const real t81 = G[20] * t29;
-    const real t82 = t80 + t81;
-    const real t83 = G[21] * t36;
-    const real t84 = t82 + t83;
-    const real t85 = G[22] * t43;
-    const real t86 = t84 + t85;
-    const real t87 = G[23] * t50;
-    const real t88 = t86 + t87;
-    const real t89 = g[3] - t88;
-    udot[3] = t89;
-    const real t90 = G[24] * t16;
-    const real t91 = G[25] * t22;
-    const real t92 = t90 + t91;
-    const real t93 = G[26] * t29;
-    const real t94 = t92 + t93;
-    const real t95 = G[27] * t36;
-    const real t96 = t94 + t95;
-    const real t97 = G[28] * t43;
-    const real t98 = t96 + t97;
-    const real t99 = G[29] * t50;
-    const real t100 = t98 + t99;
-    const real t101 = g[4] - t100;
-    udot[4] = t101;
-    const real t102 = G[30] * t16;
-    const real t103 = G[31] * t22;
-    const real t104 = t102 + t103;
-    const real t105 = G[32] * t29;
-    const real t106 = t104 + t105;
-    const real t107 = G[33] * t36;
-    const real t108 = t106 + t107;
-    const real t109 = G[34] * t43;
-    const real t110 = t108 + t109;
-    const real t111 = G[35] * t50;
-    const real t112 = t110 + t111;
-    const real t113 = g[5] - t112;
-    udot[5] = t113;
-    const real t114 = t16 + t53;
-    delta[0] = t114;
-    const real t115 = t22 + t65;
-    delta[1] = t115;
-    const real t116 = t29 + t77;
-    delta[2] = t116;
-    const real t117 = t36 + t89;
-    delta[3] = t117;
-    const real t118 = t43 + t101;
-    delta[4] = t118;
-    const real t119 = t50 + t113;
-    delta[5] = t119;
-    return 0;
+  (void)p;
+  (void)q;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  real t89 = g[3] - (G[18] * t16 + G[19] * t22 + G[20] * t29 + G[21] * t36 + G[22] * t43 + G[23] *
+    t50);
+  udot[3] = t89;
+  real t101 = g[4] - (G[24] * t16 + G[25] * t22 + G[26] * t29 + G[27] * t36 + G[28] * t43 + G[29] *
+    t50);
+  udot[4] = t101;
+  real t113 = g[5] - (G[30] * t16 + G[31] * t22 + G[32] * t29 + G[33] * t36 + G[34] * t43 + G[35] *
+    t50);
+  udot[5] = t113;
+  delta[0] = t16 + t53;
+  delta[1] = t22 + t65;
+  delta[2] = t29 + t77;
+  delta[3] = t36 + t89;
+  delta[4] = t43 + t101;
+  delta[5] = t50 + t113;
+  return 0;
 }
 
-static int mstmm_hinge_free_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_free_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"G", 36, "", 0, 0},
-    {"g", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_recover_outputs[] = {
-    {"udot", 6, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[0] parameters
@@ -1514,330 +483,99 @@ static const mstmm_port mstmm_hinge_free_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[7] derivative of qdot
  */
-int mstmm_hinge_free_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_free_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    const real t0 = q[5] * q[5];
-    const real t1 = q[6] * q[6];
-    const real t2 = t0 + t1;
-    const real t3 = q[3] * q[3];
-    const real t4 = q[4] * q[4];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = q[4] * d_q[4];
-    const real t10 = t9 + t9;
-    const real t11 = q[3] * d_q[3];
-    const real t12 = t11 + t11;
-    const real t13 = t10 + t12;
-    const real t14 = q[5] * d_q[5];
-    const real t15 = t14 + t14;
-    const real t16 = t13 + t15;
-    const real t17 = q[6] * d_q[6];
-    const real t18 = t17 + t17;
-    const real t19 = t16 + t18;
-    const real t20 = t8 * t19;
-    const real t21 = t20 / t7;
-    const real t22 = 2.0 * t21;
-    const real t23 = t2 * t22;
-    const real t24 = t8 * 2.0;
-    const real t25 = t15 + t18;
-    const real t26 = t24 * t25;
-    const real t27 = t23 - t26;
-    d_R[0] = t27;
-    const real t28 = q[4] * d_q[5];
-    const real t29 = q[5] * d_q[4];
-    const real t30 = t28 + t29;
-    const real t31 = q[3] * d_q[6];
-    const real t32 = q[6] * d_q[3];
-    const real t33 = t31 + t32;
-    const real t34 = t30 - t33;
-    const real t35 = t24 * t34;
-    const real t36 = q[5] * q[4];
-    const real t37 = q[6] * q[3];
-    const real t38 = t36 - t37;
-    const real t39 = t38 * t22;
-    const real t40 = t35 - t39;
-    d_R[1] = t40;
-    const real t41 = q[4] * d_q[6];
-    const real t42 = q[6] * d_q[4];
-    const real t43 = t41 + t42;
-    const real t44 = q[3] * d_q[5];
-    const real t45 = q[5] * d_q[3];
-    const real t46 = t44 + t45;
-    const real t47 = t43 + t46;
-    const real t48 = t24 * t47;
-    const real t49 = q[5] * q[3];
-    const real t50 = q[6] * q[4];
-    const real t51 = t49 + t50;
-    const real t52 = t51 * t22;
-    const real t53 = t48 - t52;
-    d_R[2] = t53;
-    const real t54 = t33 + t30;
-    const real t55 = t24 * t54;
-    const real t56 = t36 + t37;
-    const real t57 = t56 * t22;
-    const real t58 = t55 - t57;
-    d_R[3] = t58;
-    const real t59 = t1 + t4;
-    const real t60 = t59 * t22;
-    const real t61 = t10 + t18;
-    const real t62 = t24 * t61;
-    const real t63 = t60 - t62;
-    d_R[4] = t63;
-    const real t64 = q[6] * d_q[5];
-    const real t65 = q[5] * d_q[6];
-    const real t66 = t64 + t65;
-    const real t67 = q[4] * d_q[3];
-    const real t68 = q[3] * d_q[4];
-    const real t69 = t67 + t68;
-    const real t70 = t66 - t69;
-    const real t71 = t24 * t70;
-    const real t72 = q[5] * q[6];
-    const real t73 = q[3] * q[4];
-    const real t74 = t72 - t73;
-    const real t75 = t74 * t22;
-    const real t76 = t71 - t75;
-    d_R[5] = t76;
-    const real t77 = t43 - t46;
-    const real t78 = t24 * t77;
-    const real t79 = t50 - t49;
-    const real t80 = t79 * t22;
-    const real t81 = t78 - t80;
-    d_R[6] = t81;
-    const real t82 = t69 + t66;
-    const real t83 = t24 * t82;
-    const real t84 = t72 + t73;
-    const real t85 = t84 * t22;
-    const real t86 = t83 - t85;
-    d_R[7] = t86;
-    const real t87 = t0 + t4;
-    const real t88 = t87 * t22;
-    const real t89 = t10 + t15;
-    const real t90 = t24 * t89;
-    const real t91 = t88 - t90;
-    d_R[8] = t91;
-    d_d[0] = d_q[0];
-    d_d[1] = d_q[1];
-    d_d[2] = d_q[2];
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_H[6] = 0.0;
-    d_H[7] = 0.0;
-    d_H[8] = 0.0;
-    d_H[9] = 0.0;
-    d_H[10] = 0.0;
-    d_H[11] = 0.0;
-    d_H[12] = 0.0;
-    d_H[13] = 0.0;
-    d_H[14] = 0.0;
-    d_H[15] = 0.0;
-    d_H[16] = 0.0;
-    d_H[17] = 0.0;
-    d_H[18] = 0.0;
-    d_H[19] = 0.0;
-    d_H[20] = 0.0;
-    d_H[21] = 0.0;
-    d_H[22] = 0.0;
-    d_H[23] = 0.0;
-    d_H[24] = 0.0;
-    d_H[25] = 0.0;
-    d_H[26] = 0.0;
-    d_H[27] = 0.0;
-    d_H[28] = 0.0;
-    d_H[29] = 0.0;
-    d_H[30] = 0.0;
-    d_H[31] = 0.0;
-    d_H[32] = 0.0;
-    d_H[33] = 0.0;
-    d_H[34] = 0.0;
-    d_H[35] = 0.0;
-    d_v[0] = d_u[0];
-    d_v[1] = d_u[1];
-    d_v[2] = d_u[2];
-    d_w[0] = d_u[3];
-    d_w[1] = d_u[4];
-    d_w[2] = d_u[5];
-    const real t92 = u[4] * d_u[2];
-    const real t93 = u[2] * d_u[4];
-    const real t94 = t92 + t93;
-    const real t95 = u[5] * d_u[1];
-    const real t96 = u[1] * d_u[5];
-    const real t97 = t95 + t96;
-    const real t98 = t94 - t97;
-    d_c[0] = t98;
-    const real t99 = u[5] * d_u[0];
-    const real t100 = u[0] * d_u[5];
-    const real t101 = t99 + t100;
-    const real t102 = u[3] * d_u[2];
-    const real t103 = u[2] * d_u[3];
-    const real t104 = t102 + t103;
-    const real t105 = t101 - t104;
-    d_c[1] = t105;
-    const real t106 = u[3] * d_u[1];
-    const real t107 = u[1] * d_u[3];
-    const real t108 = t106 + t107;
-    const real t109 = u[4] * d_u[0];
-    const real t110 = u[0] * d_u[4];
-    const real t111 = t109 + t110;
-    const real t112 = t108 - t111;
-    d_c[2] = t112;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    const real t113 = u[2] * t47;
-    const real t114 = t51 * d_u[2];
-    const real t115 = t113 + t114;
-    const real t116 = t24 * t115;
-    const real t117 = t51 * u[2];
-    const real t118 = t117 * t22;
-    const real t119 = t116 - t118;
-    const real t120 = u[0] * t27;
-    const real t121 = t2 * t24;
-    const real t122 = 1.0 - t121;
-    const real t123 = t122 * d_u[0];
-    const real t124 = t120 + t123;
-    const real t125 = t119 + t124;
-    const real t126 = u[1] * t34;
-    const real t127 = t38 * d_u[1];
-    const real t128 = t126 + t127;
-    const real t129 = t24 * t128;
-    const real t130 = t38 * u[1];
-    const real t131 = t130 * t22;
-    const real t132 = t129 - t131;
-    const real t133 = t125 + t132;
-    d_qdot[0] = t133;
-    const real t134 = u[2] * t70;
-    const real t135 = t74 * d_u[2];
-    const real t136 = t134 + t135;
-    const real t137 = t24 * t136;
-    const real t138 = t74 * u[2];
-    const real t139 = t138 * t22;
-    const real t140 = t137 - t139;
-    const real t141 = u[1] * t63;
-    const real t142 = t24 * t59;
-    const real t143 = 1.0 - t142;
-    const real t144 = t143 * d_u[1];
-    const real t145 = t141 + t144;
-    const real t146 = t140 + t145;
-    const real t147 = u[0] * t54;
-    const real t148 = t56 * d_u[0];
-    const real t149 = t147 + t148;
-    const real t150 = t24 * t149;
-    const real t151 = t56 * u[0];
-    const real t152 = t151 * t22;
-    const real t153 = t150 - t152;
-    const real t154 = t146 + t153;
-    d_qdot[1] = t154;
-    const real t155 = u[1] * t82;
-    const real t156 = t84 * d_u[1];
-    const real t157 = t155 + t156;
-    const real t158 = t24 * t157;
-    const real t159 = t84 * u[1];
-    const real t160 = t159 * t22;
-    const real t161 = t158 - t160;
-    const real t162 = u[2] * t91;
-    const real t163 = t24 * t87;
-    const real t164 = 1.0 - t163;
-    const real t165 = t164 * d_u[2];
-    const real t166 = t162 + t165;
-    const real t167 = t161 + t166;
-    const real t168 = u[0] * t77;
-    const real t169 = t79 * d_u[0];
-    const real t170 = t168 + t169;
-    const real t171 = t24 * t170;
-    const real t172 = t79 * u[0];
-    const real t173 = t172 * t22;
-    const real t174 = t171 - t173;
-    const real t175 = t167 + t174;
-    d_qdot[2] = t175;
-    const real t176 = u[4] * d_q[5];
-    const real t177 = q[5] * d_u[4];
-    const real t178 = t176 + t177;
-    const real t179 = u[3] * d_q[4];
-    const real t180 = q[4] * d_u[3];
-    const real t181 = t179 + t180;
-    const real t182 = t178 + t181;
-    const real t183 = u[5] * d_q[6];
-    const real t184 = q[6] * d_u[5];
-    const real t185 = t183 + t184;
-    const real t186 = t182 + t185;
-    const real t187 = 0.5 * t186;
-    const real t188 = -t187;
-    d_qdot[3] = t188;
-    const real t189 = u[5] * d_q[5];
-    const real t190 = q[5] * d_u[5];
-    const real t191 = t189 + t190;
-    const real t192 = u[3] * d_q[3];
-    const real t193 = q[3] * d_u[3];
-    const real t194 = t192 + t193;
-    const real t195 = t191 + t194;
-    const real t196 = u[4] * d_q[6];
-    const real t197 = q[6] * d_u[4];
-    const real t198 = t196 + t197;
-    const real t199 = t195 - t198;
-    const real t200 = 0.5 * t199;
-    d_qdot[4] = t200;
-    const real t201 = u[4] * d_q[3];
-    const real t202 = q[3] * d_u[4];
-    const real t203 = t201 + t202;
-    const real t204 = u[5] * d_q[4];
-    const real t205 = q[4] * d_u[5];
-    const real t206 = t204 + t205;
-    const real t207 = t203 - t206;
-    const real t208 = u[3] * d_q[6];
-    const real t209 = q[6] * d_u[3];
-    const real t210 = t208 + t209;
-    const real t211 = t207 + t210;
-    const real t212 = 0.5 * t211;
-    d_qdot[5] = t212;
-    const real t213 = u[4] * d_q[4];
-    const real t214 = q[4] * d_u[4];
-    const real t215 = t213 + t214;
-    const real t216 = u[5] * d_q[3];
-    const real t217 = q[3] * d_u[5];
-    const real t218 = t216 + t217;
-    const real t219 = t215 + t218;
-    const real t220 = u[3] * d_q[5];
-    const real t221 = q[5] * d_u[3];
-    const real t222 = t220 + t221;
-    const real t223 = t219 - t222;
-    const real t224 = 0.5 * t223;
-    d_qdot[6] = t224;
-    return 0;
+  (void)p;
+  real t0 = q[5] * q[5];
+  real t1 = q[6] * q[6];
+  real t2 = t0 + t1;
+  real t4 = q[4] * q[4];
+  real t7 = t1 + (t0 + (q[3] * q[3] + t4));
+  real t8 = 1.0 / t7;
+  real t9 = q[4] * d_q[4];
+  real t10 = t9 + t9;
+  real t11 = q[3] * d_q[3];
+  real t14 = q[5] * d_q[5];
+  real t15 = t14 + t14;
+  real t17 = q[6] * d_q[6];
+  real t18 = t17 + t17;
+  real t22 = 2.0 * (t8 * (t10 + (t11 + t11) + t15 + t18) / t7);
+  real t24 = t8 * 2.0;
+  real t27 = t2 * t22 - t24 * (t15 + t18);
+  d_R[0] = t27;
+  real t30 = q[4] * d_q[5] + q[5] * d_q[4];
+  real t33 = q[3] * d_q[6] + q[6] * d_q[3];
+  real t34 = t30 - t33;
+  real t36 = q[5] * q[4];
+  real t37 = q[6] * q[3];
+  real t38 = t36 - t37;
+  d_R[1] = t24 * t34 - t38 * t22;
+  real t43 = q[4] * d_q[6] + q[6] * d_q[4];
+  real t46 = q[3] * d_q[5] + q[5] * d_q[3];
+  real t47 = t43 + t46;
+  real t49 = q[5] * q[3];
+  real t50 = q[6] * q[4];
+  real t51 = t49 + t50;
+  d_R[2] = t24 * t47 - t51 * t22;
+  real t54 = t33 + t30;
+  real t56 = t36 + t37;
+  d_R[3] = t24 * t54 - t56 * t22;
+  real t59 = t1 + t4;
+  real t63 = t59 * t22 - t24 * (t10 + t18);
+  d_R[4] = t63;
+  real t66 = q[6] * d_q[5] + q[5] * d_q[6];
+  real t69 = q[4] * d_q[3] + q[3] * d_q[4];
+  real t70 = t66 - t69;
+  real t72 = q[5] * q[6];
+  real t73 = q[3] * q[4];
+  real t74 = t72 - t73;
+  d_R[5] = t24 * t70 - t74 * t22;
+  real t77 = t43 - t46;
+  real t79 = t50 - t49;
+  d_R[6] = t24 * t77 - t79 * t22;
+  real t82 = t69 + t66;
+  real t84 = t72 + t73;
+  d_R[7] = t24 * t82 - t84 * t22;
+  real t87 = t0 + t4;
+  real t91 = t87 * t22 - t24 * (t10 + t15);
+  d_R[8] = t91;
+  d_d[0] = d_q[0];
+  d_d[1] = d_q[1];
+  d_d[2] = d_q[2];
+  d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = d_H[6] = d_H[7] = d_H[8] = d_H[9] = d_H[10]
+    = d_H[11] = d_H[12] = d_H[13] = d_H[14] = d_H[15] = d_H[16] = d_H[17] = d_H[18] = d_H[19] =
+    d_H[20] = d_H[21] = d_H[22] = d_H[23] = d_H[24] = d_H[25] = d_H[26] = d_H[27] = d_H[28] =
+    d_H[29] = d_H[30] = d_H[31] = d_H[32] = d_H[33] = d_H[34] = d_H[35] = 0.0;
+  d_v[0] = d_u[0];
+  d_v[1] = d_u[1];
+  d_v[2] = d_u[2];
+  d_w[0] = d_u[3];
+  d_w[1] = d_u[4];
+  d_w[2] = d_u[5];
+  d_c[0] = u[4] * d_u[2] + u[2] * d_u[4] - (u[5] * d_u[1] + u[1] * d_u[5]);
+  d_c[1] = u[5] * d_u[0] + u[0] * d_u[5] - (u[3] * d_u[2] + u[2] * d_u[3]);
+  d_c[2] = u[3] * d_u[1] + u[1] * d_u[3] - (u[4] * d_u[0] + u[0] * d_u[4]);
+  d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = t24 * (u[2] * t47 + t51 * d_u[2]) - t51 * u[2] * t22 + (u[0] * t27 + (1.0 - t2 * t24)
+    * d_u[0]) + (t24 * (u[1] * t34 + t38 * d_u[1]) - t38 * u[1] * t22);
+  d_qdot[1] = t24 * (u[2] * t70 + t74 * d_u[2]) - t74 * u[2] * t22 + (u[1] * t63 + (1.0 - t24 * t59)
+    * d_u[1]) + (t24 * (u[0] * t54 + t56 * d_u[0]) - t56 * u[0] * t22);
+  d_qdot[2] = t24 * (u[1] * t82 + t84 * d_u[1]) - t84 * u[1] * t22 + (u[2] * t91 + (1.0 - t24 * t87)
+    * d_u[2]) + (t24 * (u[0] * t77 + t79 * d_u[0]) - t79 * u[0] * t22);
+  d_qdot[3] = -(0.5 * (u[4] * d_q[5] + q[5] * d_u[4] + (u[3] * d_q[4] + q[4] * d_u[3]) + (u[5] *
+    d_q[6] + q[6] * d_u[5])));
+  d_qdot[4] = 0.5 * (u[5] * d_q[5] + q[5] * d_u[5] + (u[3] * d_q[3] + q[3] * d_u[3]) - (u[4] *
+    d_q[6] + q[6] * d_u[4]));
+  d_qdot[5] = 0.5 * (u[4] * d_q[3] + q[3] * d_u[4] - (u[5] * d_q[4] + q[4] * d_u[5]) + (u[3] *
+    d_q[6] + q[6] * d_u[3]));
+  d_qdot[6] = 0.5 * (u[4] * d_q[4] + q[4] * d_u[4] + (u[5] * d_q[3] + q[3] * d_u[5]) - (u[3] *
+    d_q[5] + q[5] * d_u[3]));
+  return 0;
 }
 
-static int mstmm_hinge_free_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_free_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-    {"d_q", 7, "", 0, 0},
-    {"d_u", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 36, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 7, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2],
+  out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[0] parameters
@@ -1845,258 +583,92 @@ static const mstmm_port mstmm_hinge_free_hinge_slope_outputs[] = {
  * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * out J[7][7] qdot by q, transposed
  */
-int mstmm_hinge_free_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_free_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    J[0] = 0.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    J[4] = 0.0;
-    J[5] = 0.0;
-    J[6] = 0.0;
-    J[7] = 0.0;
-    J[8] = 0.0;
-    J[9] = 0.0;
-    J[10] = 0.0;
-    J[11] = 0.0;
-    J[12] = 0.0;
-    J[13] = 0.0;
-    J[14] = 0.0;
-    J[15] = 0.0;
-    J[16] = 0.0;
-    J[17] = 0.0;
-    J[18] = 0.0;
-    J[19] = 0.0;
-    J[20] = 0.0;
-    const real t0 = q[6] * q[6];
-    const real t1 = q[5] * q[5];
-    const real t2 = q[3] * q[3];
-    const real t3 = q[4] * q[4];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = 1.0 / t6;
-    const real t8 = t7 * 2.0;
-    const real t9 = q[5] * u[2];
-    const real t10 = t8 * t9;
-    const real t11 = q[5] * q[3];
-    const real t12 = q[6] * q[4];
-    const real t13 = t11 + t12;
-    const real t14 = t13 * u[2];
-    const real t15 = q[3] + q[3];
-    const real t16 = t7 * t15;
-    const real t17 = t16 / t6;
-    const real t18 = 2.0 * t17;
-    const real t19 = t14 * t18;
-    const real t20 = t10 - t19;
-    const real t21 = t1 + t0;
-    const real t22 = t21 * t18;
-    const real t23 = u[0] * t22;
-    const real t24 = t20 + t23;
-    const real t25 = q[5] * q[4];
-    const real t26 = q[6] * q[3];
-    const real t27 = t25 - t26;
-    const real t28 = t27 * u[1];
-    const real t29 = t28 * t18;
-    const real t30 = q[6] * u[1];
-    const real t31 = t8 * t30;
-    const real t32 = t29 + t31;
-    const real t33 = t24 - t32;
-    J[21] = t33;
-    const real t34 = t0 + t3;
-    const real t35 = t34 * t18;
-    const real t36 = u[1] * t35;
-    const real t37 = q[5] * q[6];
-    const real t38 = q[3] * q[4];
-    const real t39 = t37 - t38;
-    const real t40 = t39 * u[2];
-    const real t41 = t40 * t18;
-    const real t42 = q[4] * u[2];
-    const real t43 = t8 * t42;
-    const real t44 = t41 + t43;
-    const real t45 = t36 - t44;
-    const real t46 = q[6] * u[0];
-    const real t47 = t8 * t46;
-    const real t48 = t25 + t26;
-    const real t49 = t48 * u[0];
-    const real t50 = t49 * t18;
-    const real t51 = t47 - t50;
-    const real t52 = t45 + t51;
-    J[22] = t52;
-    const real t53 = q[4] * u[1];
-    const real t54 = t8 * t53;
-    const real t55 = t37 + t38;
-    const real t56 = t55 * u[1];
-    const real t57 = t56 * t18;
-    const real t58 = t54 - t57;
-    const real t59 = t1 + t3;
-    const real t60 = t59 * t18;
-    const real t61 = u[2] * t60;
-    const real t62 = t58 + t61;
-    const real t63 = t12 - t11;
-    const real t64 = t63 * u[0];
-    const real t65 = t64 * t18;
-    const real t66 = q[5] * u[0];
-    const real t67 = t8 * t66;
-    const real t68 = t65 + t67;
-    const real t69 = t62 - t68;
-    J[23] = t69;
-    J[24] = 0.0;
-    const real t70 = u[3] * 0.5;
-    J[25] = t70;
-    const real t71 = u[4] * 0.5;
-    J[26] = t71;
-    const real t72 = u[5] * 0.5;
-    J[27] = t72;
-    const real t73 = q[6] * u[2];
-    const real t74 = t8 * t73;
-    const real t75 = q[4] + q[4];
-    const real t76 = t7 * t75;
-    const real t77 = t76 / t6;
-    const real t78 = 2.0 * t77;
-    const real t79 = t14 * t78;
-    const real t80 = t74 - t79;
-    const real t81 = t21 * t78;
-    const real t82 = u[0] * t81;
-    const real t83 = t80 + t82;
-    const real t84 = q[5] * u[1];
-    const real t85 = t8 * t84;
-    const real t86 = t28 * t78;
-    const real t87 = t85 - t86;
-    const real t88 = t83 + t87;
-    J[28] = t88;
-    const real t89 = t34 * t78;
-    const real t90 = t8 * t75;
-    const real t91 = t89 - t90;
-    const real t92 = u[1] * t91;
-    const real t93 = t40 * t78;
-    const real t94 = q[3] * u[2];
-    const real t95 = t8 * t94;
-    const real t96 = t93 + t95;
-    const real t97 = t92 - t96;
-    const real t98 = t49 * t78;
-    const real t99 = t67 - t98;
-    const real t100 = t97 + t99;
-    J[29] = t100;
-    const real t101 = q[3] * u[1];
-    const real t102 = t8 * t101;
-    const real t103 = t56 * t78;
-    const real t104 = t102 - t103;
-    const real t105 = t59 * t78;
-    const real t106 = t105 - t90;
-    const real t107 = u[2] * t106;
-    const real t108 = t104 + t107;
-    const real t109 = t64 * t78;
-    const real t110 = t47 - t109;
-    const real t111 = t108 + t110;
-    J[30] = t111;
-    const real t112 = -t70;
-    J[31] = t112;
-    J[32] = 0.0;
-    const real t113 = -t72;
-    J[33] = t113;
-    J[34] = t71;
-    const real t114 = q[5] + q[5];
-    const real t115 = t7 * t114;
-    const real t116 = t115 / t6;
-    const real t117 = 2.0 * t116;
-    const real t118 = t14 * t117;
-    const real t119 = t95 - t118;
-    const real t120 = t21 * t117;
-    const real t121 = t8 * t114;
-    const real t122 = t120 - t121;
-    const real t123 = u[0] * t122;
-    const real t124 = t119 + t123;
-    const real t125 = t28 * t117;
-    const real t126 = t54 - t125;
-    const real t127 = t124 + t126;
-    J[35] = t127;
-    const real t128 = t40 * t117;
-    const real t129 = t74 - t128;
-    const real t130 = t34 * t117;
-    const real t131 = u[1] * t130;
-    const real t132 = t129 + t131;
-    const real t133 = q[4] * u[0];
-    const real t134 = t8 * t133;
-    const real t135 = t49 * t117;
-    const real t136 = t134 - t135;
-    const real t137 = t132 + t136;
-    J[36] = t137;
-    const real t138 = t56 * t117;
-    const real t139 = t31 - t138;
-    const real t140 = t59 * t117;
-    const real t141 = t140 - t121;
-    const real t142 = u[2] * t141;
-    const real t143 = t139 + t142;
-    const real t144 = t64 * t117;
-    const real t145 = q[3] * u[0];
-    const real t146 = t8 * t145;
-    const real t147 = t144 + t146;
-    const real t148 = t143 - t147;
-    J[37] = t148;
-    const real t149 = -t71;
-    J[38] = t149;
-    J[39] = t72;
-    J[40] = 0.0;
-    J[41] = t112;
-    const real t150 = q[6] + q[6];
-    const real t151 = t7 * t150;
-    const real t152 = t151 / t6;
-    const real t153 = 2.0 * t152;
-    const real t154 = t14 * t153;
-    const real t155 = t43 - t154;
-    const real t156 = t21 * t153;
-    const real t157 = t8 * t150;
-    const real t158 = t156 - t157;
-    const real t159 = u[0] * t158;
-    const real t160 = t155 + t159;
-    const real t161 = t28 * t153;
-    const real t162 = t102 + t161;
-    const real t163 = t160 - t162;
-    J[42] = t163;
-    const real t164 = t40 * t153;
-    const real t165 = t10 - t164;
-    const real t166 = t34 * t153;
-    const real t167 = t166 - t157;
-    const real t168 = u[1] * t167;
-    const real t169 = t165 + t168;
-    const real t170 = t49 * t153;
-    const real t171 = t146 - t170;
-    const real t172 = t169 + t171;
-    J[43] = t172;
-    const real t173 = t56 * t153;
-    const real t174 = t85 - t173;
-    const real t175 = t59 * t153;
-    const real t176 = u[2] * t175;
-    const real t177 = t174 + t176;
-    const real t178 = t64 * t153;
-    const real t179 = t134 - t178;
-    const real t180 = t177 + t179;
-    J[44] = t180;
-    J[45] = t113;
-    J[46] = t149;
-    J[47] = t70;
-    J[48] = 0.0;
-    return 0;
+  (void)p;
+  J[0] = J[1] = J[2] = J[3] = J[4] = J[5] = J[6] = J[7] = J[8] = J[9] = J[10] = J[11] = J[12] =
+    J[13] = J[14] = J[15] = J[16] = J[17] = J[18] = J[19] = J[20] = 0.0;
+  real t0 = q[6] * q[6];
+  real t1 = q[5] * q[5];
+  real t3 = q[4] * q[4];
+  real t6 = t0 + (t1 + (q[3] * q[3] + t3));
+  real t7 = 1.0 / t6;
+  real t8 = t7 * 2.0;
+  real t10 = t8 * (q[5] * u[2]);
+  real t11 = q[5] * q[3];
+  real t12 = q[6] * q[4];
+  real t14 = (t11 + t12) * u[2];
+  real t18 = 2.0 * (t7 * (q[3] + q[3]) / t6);
+  real t21 = t1 + t0;
+  real t25 = q[5] * q[4];
+  real t26 = q[6] * q[3];
+  real t28 = (t25 - t26) * u[1];
+  real t31 = t8 * (q[6] * u[1]);
+  J[21] = t10 - t14 * t18 + u[0] * (t21 * t18) - (t28 * t18 + t31);
+  real t34 = t0 + t3;
+  real t37 = q[5] * q[6];
+  real t38 = q[3] * q[4];
+  real t40 = (t37 - t38) * u[2];
+  real t43 = t8 * (q[4] * u[2]);
+  real t47 = t8 * (q[6] * u[0]);
+  real t49 = (t25 + t26) * u[0];
+  J[22] = u[1] * (t34 * t18) - (t40 * t18 + t43) + (t47 - t49 * t18);
+  real t54 = t8 * (q[4] * u[1]);
+  real t56 = (t37 + t38) * u[1];
+  real t59 = t1 + t3;
+  real t64 = (t12 - t11) * u[0];
+  real t67 = t8 * (q[5] * u[0]);
+  J[23] = t54 - t56 * t18 + u[2] * (t59 * t18) - (t64 * t18 + t67);
+  J[24] = 0.0;
+  real t70 = u[3] * 0.5;
+  J[25] = t70;
+  real t71 = u[4] * 0.5;
+  J[26] = t71;
+  real t72 = u[5] * 0.5;
+  J[27] = t72;
+  real t74 = t8 * (q[6] * u[2]);
+  real t75 = q[4] + q[4];
+  real t78 = 2.0 * (t7 * t75 / t6);
+  real t85 = t8 * (q[5] * u[1]);
+  J[28] = t74 - t14 * t78 + u[0] * (t21 * t78) + (t85 - t28 * t78);
+  real t90 = t8 * t75;
+  real t95 = t8 * (q[3] * u[2]);
+  J[29] = u[1] * (t34 * t78 - t90) - (t40 * t78 + t95) + (t67 - t49 * t78);
+  real t102 = t8 * (q[3] * u[1]);
+  J[30] = t102 - t56 * t78 + u[2] * (t59 * t78 - t90) + (t47 - t64 * t78);
+  real t112 = -t70;
+  J[31] = t112;
+  J[32] = 0.0;
+  real t113 = -t72;
+  J[33] = t113;
+  J[34] = t71;
+  real t114 = q[5] + q[5];
+  real t117 = 2.0 * (t7 * t114 / t6);
+  real t121 = t8 * t114;
+  J[35] = t95 - t14 * t117 + u[0] * (t21 * t117 - t121) + (t54 - t28 * t117);
+  real t134 = t8 * (q[4] * u[0]);
+  J[36] = t74 - t40 * t117 + u[1] * (t34 * t117) + (t134 - t49 * t117);
+  real t146 = t8 * (q[3] * u[0]);
+  J[37] = t31 - t56 * t117 + u[2] * (t59 * t117 - t121) - (t64 * t117 + t146);
+  real t149 = -t71;
+  J[38] = t149;
+  J[39] = t72;
+  J[40] = 0.0;
+  J[41] = t112;
+  real t150 = q[6] + q[6];
+  real t153 = 2.0 * (t7 * t150 / t6);
+  real t157 = t8 * t150;
+  J[42] = t43 - t14 * t153 + u[0] * (t21 * t153 - t157) - (t102 + t28 * t153);
+  J[43] = t10 - t40 * t153 + u[1] * (t34 * t153 - t157) + (t146 - t49 * t153);
+  J[44] = t85 - t56 * t153 + u[2] * (t59 * t153) + (t134 - t64 * t153);
+  J[45] = t113;
+  J[46] = t149;
+  J[47] = t70;
+  J[48] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_free_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_free_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_rates_by_coordinates_outputs[] = {
-    {"J", 49, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[0] parameters
@@ -2104,114 +676,57 @@ static const mstmm_port mstmm_hinge_free_rates_by_coordinates_outputs[] = {
  * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * out J[6][7] qdot by u, transposed
  */
-int mstmm_hinge_free_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_free_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)u;
-    const real t0 = q[5] * q[5];
-    const real t1 = q[6] * q[6];
-    const real t2 = t0 + t1;
-    const real t3 = q[3] * q[3];
-    const real t4 = q[4] * q[4];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = t8 * 2.0;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    J[0] = t11;
-    const real t12 = q[5] * q[4];
-    const real t13 = q[6] * q[3];
-    const real t14 = t12 + t13;
-    const real t15 = t9 * t14;
-    J[1] = t15;
-    const real t16 = q[6] * q[4];
-    const real t17 = q[5] * q[3];
-    const real t18 = t16 - t17;
-    const real t19 = t9 * t18;
-    J[2] = t19;
-    J[3] = 0.0;
-    J[4] = 0.0;
-    J[5] = 0.0;
-    J[6] = 0.0;
-    const real t20 = t12 - t13;
-    const real t21 = t9 * t20;
-    J[7] = t21;
-    const real t22 = t1 + t4;
-    const real t23 = t9 * t22;
-    const real t24 = 1.0 - t23;
-    J[8] = t24;
-    const real t25 = q[5] * q[6];
-    const real t26 = q[3] * q[4];
-    const real t27 = t25 + t26;
-    const real t28 = t9 * t27;
-    J[9] = t28;
-    J[10] = 0.0;
-    J[11] = 0.0;
-    J[12] = 0.0;
-    J[13] = 0.0;
-    const real t29 = t17 + t16;
-    const real t30 = t9 * t29;
-    J[14] = t30;
-    const real t31 = t25 - t26;
-    const real t32 = t9 * t31;
-    J[15] = t32;
-    const real t33 = t0 + t4;
-    const real t34 = t9 * t33;
-    const real t35 = 1.0 - t34;
-    J[16] = t35;
-    J[17] = 0.0;
-    J[18] = 0.0;
-    J[19] = 0.0;
-    J[20] = 0.0;
-    J[21] = 0.0;
-    J[22] = 0.0;
-    J[23] = 0.0;
-    const real t36 = q[4] * 0.5;
-    const real t37 = -t36;
-    J[24] = t37;
-    const real t38 = q[3] * 0.5;
-    J[25] = t38;
-    const real t39 = q[6] * 0.5;
-    J[26] = t39;
-    const real t40 = q[5] * 0.5;
-    const real t41 = -t40;
-    J[27] = t41;
-    J[28] = 0.0;
-    J[29] = 0.0;
-    J[30] = 0.0;
-    J[31] = t41;
-    const real t42 = -t39;
-    J[32] = t42;
-    J[33] = t38;
-    J[34] = t36;
-    J[35] = 0.0;
-    J[36] = 0.0;
-    J[37] = 0.0;
-    J[38] = t42;
-    J[39] = t40;
-    J[40] = t37;
-    J[41] = t38;
-    return 0;
+  (void)p;
+  (void)u;
+  real t0 = q[5] * q[5];
+  real t1 = q[6] * q[6];
+  real t4 = q[4] * q[4];
+  real t9 = 1.0 / (t1 + (t0 + (q[3] * q[3] + t4))) * 2.0;
+  J[0] = 1.0 - (t0 + t1) * t9;
+  real t12 = q[5] * q[4];
+  real t13 = q[6] * q[3];
+  J[1] = t9 * (t12 + t13);
+  real t16 = q[6] * q[4];
+  real t17 = q[5] * q[3];
+  J[2] = t9 * (t16 - t17);
+  J[3] = J[4] = J[5] = J[6] = 0.0;
+  J[7] = t9 * (t12 - t13);
+  J[8] = 1.0 - t9 * (t1 + t4);
+  real t25 = q[5] * q[6];
+  real t26 = q[3] * q[4];
+  J[9] = t9 * (t25 + t26);
+  J[10] = J[11] = J[12] = J[13] = 0.0;
+  J[14] = t9 * (t17 + t16);
+  J[15] = t9 * (t25 - t26);
+  J[16] = 1.0 - t9 * (t0 + t4);
+  J[17] = J[18] = J[19] = J[20] = J[21] = J[22] = J[23] = 0.0;
+  real t36 = q[4] * 0.5;
+  real t37 = -t36;
+  J[24] = t37;
+  real t38 = q[3] * 0.5;
+  J[25] = t38;
+  real t39 = q[6] * 0.5;
+  J[26] = t39;
+  real t40 = q[5] * 0.5;
+  real t41 = -t40;
+  J[27] = t41;
+  J[28] = J[29] = J[30] = 0.0;
+  J[31] = t41;
+  real t42 = -t39;
+  J[32] = t42;
+  J[33] = t38;
+  J[34] = t36;
+  J[35] = J[36] = J[37] = 0.0;
+  J[38] = t42;
+  J[39] = t40;
+  J[40] = t37;
+  J[41] = t38;
+  return 0;
 }
 
-static int mstmm_hinge_free_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_free_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_rates_by_speeds_outputs[] = {
-    {"J", 42, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[0] parameters
@@ -2232,406 +747,138 @@ static const mstmm_port mstmm_hinge_free_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_free_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_free_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    (void)p;
-    const real t0 = q[5] * q[5];
-    const real t1 = q[6] * q[6];
-    const real t2 = t0 + t1;
-    const real t3 = q[3] * q[3];
-    const real t4 = q[4] * q[4];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = 1.0 / t7;
-    const real t9 = t8 * 2.0;
-    const real t10 = t2 * t9;
-    const real t11 = 1.0 - t10;
-    R[0] = t11;
-    const real t12 = q[4] * q[5];
-    const real t13 = q[3] * q[6];
-    const real t14 = t12 - t13;
-    const real t15 = t9 * t14;
-    R[1] = t15;
-    const real t16 = q[3] * q[5];
-    const real t17 = q[4] * q[6];
-    const real t18 = t16 + t17;
-    const real t19 = t9 * t18;
-    R[2] = t19;
-    const real t20 = t12 + t13;
-    const real t21 = t9 * t20;
-    R[3] = t21;
-    const real t22 = t1 + t4;
-    const real t23 = t9 * t22;
-    const real t24 = 1.0 - t23;
-    R[4] = t24;
-    const real t25 = q[5] * q[6];
-    const real t26 = q[3] * q[4];
-    const real t27 = t25 - t26;
-    const real t28 = t9 * t27;
-    R[5] = t28;
-    const real t29 = t17 - t16;
-    const real t30 = t9 * t29;
-    R[6] = t30;
-    const real t31 = t25 + t26;
-    const real t32 = t9 * t31;
-    R[7] = t32;
-    const real t33 = t0 + t4;
-    const real t34 = t9 * t33;
-    const real t35 = 1.0 - t34;
-    R[8] = t35;
-    d[0] = q[0];
-    d[1] = q[1];
-    d[2] = q[2];
-    H[0] = 1.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 1.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 0.0;
-    H[14] = 1.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 0.0;
-    H[18] = 0.0;
-    H[19] = 0.0;
-    H[20] = 0.0;
-    H[21] = 1.0;
-    H[22] = 0.0;
-    H[23] = 0.0;
-    H[24] = 0.0;
-    H[25] = 0.0;
-    H[26] = 0.0;
-    H[27] = 0.0;
-    H[28] = 1.0;
-    H[29] = 0.0;
-    H[30] = 0.0;
-    H[31] = 0.0;
-    H[32] = 0.0;
-    H[33] = 0.0;
-    H[34] = 0.0;
-    H[35] = 1.0;
-    v[0] = u[0];
-    v[1] = u[1];
-    v[2] = u[2];
-    w[0] = u[3];
-    w[1] = u[4];
-    w[2] = u[5];
-    const real t36 = u[2] * u[4];
-    const real t37 = u[1] * u[5];
-    const real t38 = t36 - t37;
-    c[0] = t38;
-    const real t39 = u[0] * u[5];
-    const real t40 = u[2] * u[3];
-    const real t41 = t39 - t40;
-    c[1] = t41;
-    const real t42 = u[1] * u[3];
-    const real t43 = u[0] * u[4];
-    const real t44 = t42 - t43;
-    c[2] = t44;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    const real t45 = u[1] * t14;
-    const real t46 = t9 * t45;
-    const real t47 = u[0] * t11;
-    const real t48 = u[2] * t18;
-    const real t49 = t9 * t48;
-    const real t50 = t47 + t49;
-    const real t51 = t46 + t50;
-    qdot[0] = t51;
-    const real t52 = u[0] * t20;
-    const real t53 = t9 * t52;
-    const real t54 = u[1] * t24;
-    const real t55 = u[2] * t27;
-    const real t56 = t9 * t55;
-    const real t57 = t54 + t56;
-    const real t58 = t53 + t57;
-    qdot[1] = t58;
-    const real t59 = u[0] * t29;
-    const real t60 = t9 * t59;
-    const real t61 = u[2] * t35;
-    const real t62 = u[1] * t31;
-    const real t63 = t9 * t62;
-    const real t64 = t61 + t63;
-    const real t65 = t60 + t64;
-    qdot[2] = t65;
-    const real t66 = q[6] * u[5];
-    const real t67 = q[4] * u[3];
-    const real t68 = q[5] * u[4];
-    const real t69 = t67 + t68;
-    const real t70 = t66 + t69;
-    const real t71 = t70 * 0.5;
-    const real t72 = -t71;
-    qdot[3] = t72;
-    const real t73 = q[3] * u[3];
-    const real t74 = q[5] * u[5];
-    const real t75 = t73 + t74;
-    const real t76 = q[6] * u[4];
-    const real t77 = t75 - t76;
-    const real t78 = 0.5 * t77;
-    qdot[4] = t78;
-    const real t79 = q[6] * u[3];
-    const real t80 = q[3] * u[4];
-    const real t81 = q[4] * u[5];
-    const real t82 = t80 - t81;
-    const real t83 = t79 + t82;
-    const real t84 = 0.5 * t83;
-    qdot[5] = t84;
-    const real t85 = q[3] * u[5];
-    const real t86 = q[4] * u[4];
-    const real t87 = t85 + t86;
-    const real t88 = q[5] * u[3];
-    const real t89 = t87 - t88;
-    const real t90 = 0.5 * t89;
-    qdot[6] = t90;
-    const real t91 = t11 * Rt[0];
-    const real t92 = t21 * Rt[1];
-    const real t93 = t91 + t92;
-    const real t94 = t30 * Rt[2];
-    const real t95 = t93 + t94;
-    Rc[0] = t95;
-    const real t96 = t15 * Rt[0];
-    const real t97 = t24 * Rt[1];
-    const real t98 = t96 + t97;
-    const real t99 = t32 * Rt[2];
-    const real t100 = t98 + t99;
-    Rc[1] = t100;
-    const real t101 = t19 * Rt[0];
-    const real t102 = t28 * Rt[1];
-    const real t103 = t101 + t102;
-    const real t104 = t35 * Rt[2];
-    const real t105 = t103 + t104;
-    Rc[2] = t105;
-    const real t106 = t11 * Rt[3];
-    const real t107 = t21 * Rt[4];
-    const real t108 = t106 + t107;
-    const real t109 = t30 * Rt[5];
-    const real t110 = t108 + t109;
-    Rc[3] = t110;
-    const real t111 = t15 * Rt[3];
-    const real t112 = t24 * Rt[4];
-    const real t113 = t111 + t112;
-    const real t114 = t32 * Rt[5];
-    const real t115 = t113 + t114;
-    Rc[4] = t115;
-    const real t116 = t19 * Rt[3];
-    const real t117 = t28 * Rt[4];
-    const real t118 = t116 + t117;
-    const real t119 = t35 * Rt[5];
-    const real t120 = t118 + t119;
-    Rc[5] = t120;
-    const real t121 = t11 * Rt[6];
-    const real t122 = t21 * Rt[7];
-    const real t123 = t121 + t122;
-    const real t124 = t30 * Rt[8];
-    const real t125 = t123 + t124;
-    Rc[6] = t125;
-    const real t126 = t15 * Rt[6];
-    const real t127 = t24 * Rt[7];
-    const real t128 = t126 + t127;
-    const real t129 = t32 * Rt[8];
-    const real t130 = t128 + t129;
-    Rc[7] = t130;
-    const real t131 = t19 * Rt[6];
-    const real t132 = t28 * Rt[7];
-    const real t133 = t131 + t132;
-    const real t134 = t35 * Rt[8];
-    const real t135 = t133 + t134;
-    Rc[8] = t135;
-    const real t136 = q[0] * Rt[0];
-    const real t137 = q[1] * Rt[1];
-    const real t138 = t136 + t137;
-    const real t139 = q[2] * Rt[2];
-    const real t140 = t138 + t139;
-    const real t141 = ro[0] + t140;
-    r[0] = t141;
-    const real t142 = q[0] * Rt[3];
-    const real t143 = q[1] * Rt[4];
-    const real t144 = t142 + t143;
-    const real t145 = q[2] * Rt[5];
-    const real t146 = t144 + t145;
-    const real t147 = ro[1] + t146;
-    r[1] = t147;
-    const real t148 = q[0] * Rt[6];
-    const real t149 = q[1] * Rt[7];
-    const real t150 = t148 + t149;
-    const real t151 = q[2] * Rt[8];
-    const real t152 = t150 + t151;
-    const real t153 = ro[2] + t152;
-    r[2] = t153;
-    const real t154 = motion_I[0] * t95;
-    const real t155 = motion_I[1] * t110;
-    const real t156 = t154 + t155;
-    const real t157 = motion_I[2] * t125;
-    const real t158 = t156 + t157;
-    const real t159 = u[3] + t158;
-    motion[0] = t159;
-    const real t160 = motion_I[0] * t100;
-    const real t161 = motion_I[1] * t115;
-    const real t162 = t160 + t161;
-    const real t163 = motion_I[2] * t130;
-    const real t164 = t162 + t163;
-    const real t165 = u[4] + t164;
-    motion[1] = t165;
-    const real t166 = motion_I[0] * t105;
-    const real t167 = motion_I[1] * t120;
-    const real t168 = t166 + t167;
-    const real t169 = motion_I[2] * t135;
-    const real t170 = t168 + t169;
-    const real t171 = u[5] + t170;
-    motion[2] = t171;
-    const real t172 = motion_I[3] * t95;
-    const real t173 = motion_I[4] * t110;
-    const real t174 = t172 + t173;
-    const real t175 = motion_I[5] * t125;
-    const real t176 = t174 + t175;
-    const real t177 = u[5] * t164;
-    const real t178 = u[4] * t170;
-    const real t179 = t177 - t178;
-    const real t180 = s[3] + t179;
-    const real t181 = t176 + t180;
-    motion[3] = t181;
-    const real t182 = motion_I[3] * t100;
-    const real t183 = motion_I[4] * t115;
-    const real t184 = t182 + t183;
-    const real t185 = motion_I[5] * t130;
-    const real t186 = t184 + t185;
-    const real t187 = u[3] * t170;
-    const real t188 = u[5] * t158;
-    const real t189 = t187 - t188;
-    const real t190 = s[4] + t189;
-    const real t191 = t186 + t190;
-    motion[4] = t191;
-    const real t192 = motion_I[3] * t105;
-    const real t193 = motion_I[4] * t120;
-    const real t194 = t192 + t193;
-    const real t195 = motion_I[5] * t135;
-    const real t196 = t194 + t195;
-    const real t197 = u[4] * t158;
-    const real t198 = u[3] * t164;
-    const real t199 = t197 - t198;
-    const real t200 = s[5] + t199;
-    const real t201 = t196 + t200;
-    motion[5] = t201;
-    const real t202 = motion_I[0] * motion_I[1];
-    const real t203 = t202 - motion_I[5];
-    const real t204 = t147 * t203;
-    const real t205 = motion_I[1] * motion_I[1];
-    const real t206 = motion_I[2] * motion_I[2];
-    const real t207 = t205 + t206;
-    const real t208 = t141 * t207;
-    const real t209 = t204 - t208;
-    const real t210 = motion_I[0] * motion_I[2];
-    const real t211 = motion_I[4] + t210;
-    const real t212 = t153 * t211;
-    const real t213 = t209 + t212;
-    const real t214 = motion_I[6] + t213;
-    const real t215 = t95 * t214;
-    const real t216 = motion_I[5] + t202;
-    const real t217 = t141 * t216;
-    const real t218 = motion_I[0] * motion_I[0];
-    const real t219 = t206 + t218;
-    const real t220 = t147 * t219;
-    const real t221 = t217 - t220;
-    const real t222 = motion_I[1] * motion_I[2];
-    const real t223 = t222 - motion_I[3];
-    const real t224 = t153 * t223;
-    const real t225 = t221 + t224;
-    const real t226 = motion_I[7] + t225;
-    const real t227 = t110 * t226;
-    const real t228 = t215 + t227;
-    const real t229 = t210 - motion_I[4];
-    const real t230 = t141 * t229;
-    const real t231 = motion_I[3] + t222;
-    const real t232 = t147 * t231;
-    const real t233 = t230 + t232;
-    const real t234 = t205 + t218;
-    const real t235 = t153 * t234;
-    const real t236 = t233 - t235;
-    const real t237 = motion_I[8] + t236;
-    const real t238 = t125 * t237;
-    const real t239 = t228 + t238;
-    const real t240 = t38 + s[0];
-    const real t241 = u[2] * t164;
-    const real t242 = 2.0 * t241;
-    const real t243 = u[1] * t170;
-    const real t244 = 2.0 * t243;
-    const real t245 = t242 - t244;
-    const real t246 = t240 + t245;
-    const real t247 = t239 + t246;
-    motion[6] = t247;
-    const real t248 = t100 * t214;
-    const real t249 = t115 * t226;
-    const real t250 = t248 + t249;
-    const real t251 = t130 * t237;
-    const real t252 = t250 + t251;
-    const real t253 = t41 + s[1];
-    const real t254 = u[0] * t170;
-    const real t255 = 2.0 * t254;
-    const real t256 = u[2] * t158;
-    const real t257 = 2.0 * t256;
-    const real t258 = t255 - t257;
-    const real t259 = t253 + t258;
-    const real t260 = t252 + t259;
-    motion[7] = t260;
-    const real t261 = t105 * t214;
-    const real t262 = t120 * t226;
-    const real t263 = t261 + t262;
-    const real t264 = t135 * t237;
-    const real t265 = t263 + t264;
-    const real t266 = t44 + s[2];
-    const real t267 = u[1] * t158;
-    const real t268 = 2.0 * t267;
-    const real t269 = u[0] * t164;
-    const real t270 = 2.0 * t269;
-    const real t271 = t268 - t270;
-    const real t272 = t266 + t271;
-    const real t273 = t265 + t272;
-    motion[8] = t273;
-    return 0;
+  (void)p;
+  real t0 = q[5] * q[5];
+  real t1 = q[6] * q[6];
+  real t4 = q[4] * q[4];
+  real t9 = 1.0 / (t1 + (t0 + (q[3] * q[3] + t4))) * 2.0;
+  real t11 = 1.0 - (t0 + t1) * t9;
+  R[0] = t11;
+  real t12 = q[4] * q[5];
+  real t13 = q[3] * q[6];
+  real t14 = t12 - t13;
+  real t15 = t9 * t14;
+  R[1] = t15;
+  real t16 = q[3] * q[5];
+  real t17 = q[4] * q[6];
+  real t18 = t16 + t17;
+  real t19 = t9 * t18;
+  R[2] = t19;
+  real t20 = t12 + t13;
+  real t21 = t9 * t20;
+  R[3] = t21;
+  real t24 = 1.0 - t9 * (t1 + t4);
+  R[4] = t24;
+  real t25 = q[5] * q[6];
+  real t26 = q[3] * q[4];
+  real t27 = t25 - t26;
+  real t28 = t9 * t27;
+  R[5] = t28;
+  real t29 = t17 - t16;
+  real t30 = t9 * t29;
+  R[6] = t30;
+  real t31 = t25 + t26;
+  real t32 = t9 * t31;
+  R[7] = t32;
+  real t35 = 1.0 - t9 * (t0 + t4);
+  R[8] = t35;
+  d[0] = q[0];
+  d[1] = q[1];
+  d[2] = q[2];
+  H[0] = 1.0;
+  H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = 0.0;
+  H[7] = 1.0;
+  H[8] = H[9] = H[10] = H[11] = H[12] = H[13] = 0.0;
+  H[14] = 1.0;
+  H[15] = H[16] = H[17] = H[18] = H[19] = H[20] = 0.0;
+  H[21] = 1.0;
+  H[22] = H[23] = H[24] = H[25] = H[26] = H[27] = 0.0;
+  H[28] = 1.0;
+  H[29] = H[30] = H[31] = H[32] = H[33] = H[34] = 0.0;
+  H[35] = 1.0;
+  v[0] = u[0];
+  v[1] = u[1];
+  v[2] = u[2];
+  w[0] = u[3];
+  w[1] = u[4];
+  w[2] = u[5];
+  real t38 = u[2] * u[4] - u[1] * u[5];
+  c[0] = t38;
+  real t41 = u[0] * u[5] - u[2] * u[3];
+  c[1] = t41;
+  real t44 = u[1] * u[3] - u[0] * u[4];
+  c[2] = t44;
+  c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = t9 * (u[1] * t14) + (u[0] * t11 + t9 * (u[2] * t18));
+  qdot[1] = t9 * (u[0] * t20) + (u[1] * t24 + t9 * (u[2] * t27));
+  qdot[2] = t9 * (u[0] * t29) + (u[2] * t35 + t9 * (u[1] * t31));
+  qdot[3] = -((q[6] * u[5] + (q[4] * u[3] + q[5] * u[4])) * 0.5);
+  qdot[4] = 0.5 * (q[3] * u[3] + q[5] * u[5] - q[6] * u[4]);
+  qdot[5] = 0.5 * (q[6] * u[3] + (q[3] * u[4] - q[4] * u[5]));
+  qdot[6] = 0.5 * (q[3] * u[5] + q[4] * u[4] - q[5] * u[3]);
+  real t95 = t11 * Rt[0] + t21 * Rt[1] + t30 * Rt[2];
+  Rc[0] = t95;
+  real t100 = t15 * Rt[0] + t24 * Rt[1] + t32 * Rt[2];
+  Rc[1] = t100;
+  real t105 = t19 * Rt[0] + t28 * Rt[1] + t35 * Rt[2];
+  Rc[2] = t105;
+  real t110 = t11 * Rt[3] + t21 * Rt[4] + t30 * Rt[5];
+  Rc[3] = t110;
+  real t115 = t15 * Rt[3] + t24 * Rt[4] + t32 * Rt[5];
+  Rc[4] = t115;
+  real t120 = t19 * Rt[3] + t28 * Rt[4] + t35 * Rt[5];
+  Rc[5] = t120;
+  real t125 = t11 * Rt[6] + t21 * Rt[7] + t30 * Rt[8];
+  Rc[6] = t125;
+  real t130 = t15 * Rt[6] + t24 * Rt[7] + t32 * Rt[8];
+  Rc[7] = t130;
+  real t135 = t19 * Rt[6] + t28 * Rt[7] + t35 * Rt[8];
+  Rc[8] = t135;
+  real t141 = ro[0] + (q[0] * Rt[0] + q[1] * Rt[1] + q[2] * Rt[2]);
+  r[0] = t141;
+  real t147 = ro[1] + (q[0] * Rt[3] + q[1] * Rt[4] + q[2] * Rt[5]);
+  r[1] = t147;
+  real t153 = ro[2] + (q[0] * Rt[6] + q[1] * Rt[7] + q[2] * Rt[8]);
+  r[2] = t153;
+  real t158 = motion_I[0] * t95 + motion_I[1] * t110 + motion_I[2] * t125;
+  motion[0] = u[3] + t158;
+  real t164 = motion_I[0] * t100 + motion_I[1] * t115 + motion_I[2] * t130;
+  motion[1] = u[4] + t164;
+  real t170 = motion_I[0] * t105 + motion_I[1] * t120 + motion_I[2] * t135;
+  motion[2] = u[5] + t170;
+  motion[3] = motion_I[3] * t95 + motion_I[4] * t110 + motion_I[5] * t125 + (s[3] + (u[5] * t164 -
+    u[4] * t170));
+  motion[4] = motion_I[3] * t100 + motion_I[4] * t115 + motion_I[5] * t130 + (s[4] + (u[3] * t170 -
+    u[5] * t158));
+  motion[5] = motion_I[3] * t105 + motion_I[4] * t120 + motion_I[5] * t135 + (s[5] + (u[4] * t158 -
+    u[3] * t164));
+  real t202 = motion_I[0] * motion_I[1];
+  real t205 = motion_I[1] * motion_I[1];
+  real t206 = motion_I[2] * motion_I[2];
+  real t210 = motion_I[0] * motion_I[2];
+  real t214 = motion_I[6] + (t147 * (t202 - motion_I[5]) - t141 * (t205 + t206) + t153 *
+    (motion_I[4] + t210));
+  real t218 = motion_I[0] * motion_I[0];
+  real t222 = motion_I[1] * motion_I[2];
+  real t226 = motion_I[7] + (t141 * (motion_I[5] + t202) - t147 * (t206 + t218) + t153 * (t222 -
+    motion_I[3]));
+  real t237 = motion_I[8] + (t141 * (t210 - motion_I[4]) + t147 * (motion_I[3] + t222) - t153 *
+    (t205 + t218));
+  motion[6] = t95 * t214 + t110 * t226 + t125 * t237 + (t38 + s[0] + (2.0 * (u[2] * t164) - 2.0 *
+    (u[1] * t170)));
+  motion[7] = t100 * t214 + t115 * t226 + t130 * t237 + (t41 + s[1] + (2.0 * (u[0] * t170) - 2.0 *
+    (u[2] * t158)));
+  motion[8] = t105 * t214 + t120 * t226 + t135 * t237 + (t44 + s[2] + (2.0 * (u[1] * t158) - 2.0 *
+    (u[0] * t164)));
+  return 0;
 }
 
-static int mstmm_hinge_free_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_free_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 7, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2653,1655 +900,402 @@ static const mstmm_port mstmm_hinge_free_body_motion_outputs[] = {
  * out W[6][6] slopes of the rows by load, rotors and laws
  * out H[6][6] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_free_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_free_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)sq;
-    const real t0 = q[6] * q[6];
-    const real t1 = q[5] * q[5];
-    const real t2 = q[3] * q[3];
-    const real t3 = q[4] * q[4];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = 1.0 / t6;
-    const real t8 = t7 * 2.0;
-    const real t9 = q[5] * q[6];
-    const real t10 = q[3] * q[4];
-    const real t11 = t9 + t10;
-    const real t12 = t8 * t11;
-    const real t13 = q[6] * along[4];
-    const real t14 = q[4] * along[6];
-    const real t15 = t13 + t14;
-    const real t16 = q[5] * along[3];
-    const real t17 = q[3] * along[5];
-    const real t18 = t16 + t17;
-    const real t19 = t15 - t18;
-    const real t20 = t8 * t19;
-    const real t21 = q[4] * q[6];
-    const real t22 = q[3] * q[5];
-    const real t23 = t21 - t22;
-    const real t24 = q[4] * along[4];
-    const real t25 = t24 + t24;
-    const real t26 = q[3] * along[3];
-    const real t27 = t26 + t26;
-    const real t28 = t25 + t27;
-    const real t29 = q[5] * along[5];
-    const real t30 = t29 + t29;
-    const real t31 = t28 + t30;
-    const real t32 = q[6] * along[6];
-    const real t33 = t32 + t32;
-    const real t34 = t31 + t33;
-    const real t35 = t7 * t34;
-    const real t36 = t35 / t6;
-    const real t37 = 2.0 * t36;
-    const real t38 = t23 * t37;
-    const real t39 = t20 - t38;
-    const real t40 = t12 * t39;
-    const real t41 = q[4] * q[5];
-    const real t42 = q[3] * q[6];
-    const real t43 = t41 - t42;
-    const real t44 = t8 * t43;
-    const real t45 = t1 + t0;
-    const real t46 = t45 * t37;
-    const real t47 = t30 + t33;
-    const real t48 = t8 * t47;
-    const real t49 = t46 - t48;
-    const real t50 = t44 * t49;
-    const real t51 = t0 + t3;
-    const real t52 = t8 * t51;
-    const real t53 = 1.0 - t52;
-    const real t54 = q[6] * along[3];
-    const real t55 = q[3] * along[6];
-    const real t56 = t54 + t55;
-    const real t57 = q[5] * along[4];
-    const real t58 = q[4] * along[5];
-    const real t59 = t57 + t58;
-    const real t60 = t56 + t59;
-    const real t61 = t8 * t60;
-    const real t62 = t41 + t42;
-    const real t63 = t62 * t37;
-    const real t64 = t61 - t63;
-    const real t65 = t53 * t64;
-    const real t66 = t50 + t65;
-    const real t67 = t40 + t66;
-    const real t68 = motion[1] - u[4];
-    const real t69 = t67 * t68;
-    const real t70 = t8 * t23;
-    const real t71 = t1 + t3;
-    const real t72 = t71 * t37;
-    const real t73 = t25 + t30;
-    const real t74 = t8 * t73;
-    const real t75 = t72 - t74;
-    const real t76 = t70 * t75;
-    const real t77 = t45 * t8;
-    const real t78 = 1.0 - t77;
-    const real t79 = t15 + t18;
-    const real t80 = t8 * t79;
-    const real t81 = t22 + t21;
-    const real t82 = t81 * t37;
-    const real t83 = t80 - t82;
-    const real t84 = t78 * t83;
-    const real t85 = t8 * t62;
-    const real t86 = q[6] * along[5];
-    const real t87 = q[5] * along[6];
-    const real t88 = t86 + t87;
-    const real t89 = q[4] * along[3];
-    const real t90 = q[3] * along[4];
-    const real t91 = t89 + t90;
-    const real t92 = t88 - t91;
-    const real t93 = t8 * t92;
-    const real t94 = t9 - t10;
-    const real t95 = t94 * t37;
-    const real t96 = t93 - t95;
-    const real t97 = t85 * t96;
-    const real t98 = t84 + t97;
-    const real t99 = t76 + t98;
-    const real t100 = motion[2] - u[5];
-    const real t101 = t99 * t100;
-    const real t102 = t69 - t101;
-    B[0] = t102;
-    const real t103 = t8 * t71;
-    const real t104 = 1.0 - t103;
-    const real t105 = t91 + t88;
-    const real t106 = t8 * t105;
-    const real t107 = t11 * t37;
-    const real t108 = t106 - t107;
-    const real t109 = t104 * t108;
-    const real t110 = t8 * t81;
-    const real t111 = t59 - t56;
-    const real t112 = t8 * t111;
-    const real t113 = t43 * t37;
-    const real t114 = t112 - t113;
-    const real t115 = t110 * t114;
-    const real t116 = t8 * t94;
-    const real t117 = t51 * t37;
-    const real t118 = t25 + t33;
-    const real t119 = t8 * t118;
-    const real t120 = t117 - t119;
-    const real t121 = t116 * t120;
-    const real t122 = t115 + t121;
-    const real t123 = t109 + t122;
-    const real t124 = t123 * t100;
-    const real t125 = motion[0] - u[3];
-    const real t126 = t67 * t125;
-    const real t127 = t124 - t126;
-    B[1] = t127;
-    const real t128 = t99 * t125;
-    const real t129 = t123 * t68;
-    const real t130 = t128 - t129;
-    B[2] = t130;
-    const real t131 = u[5] * t127;
-    const real t132 = u[4] * t130;
-    const real t133 = t131 - t132;
-    const real t134 = u[5] * t125;
-    const real t135 = u[3] * t100;
-    const real t136 = t134 - t135;
-    const real t137 = t136 - s[4];
-    const real t138 = motion[4] + t137;
-    const real t139 = t67 * t138;
-    const real t140 = u[3] * t68;
-    const real t141 = u[4] * t125;
-    const real t142 = t140 - t141;
-    const real t143 = t142 - s[5];
-    const real t144 = motion[5] + t143;
-    const real t145 = t99 * t144;
-    const real t146 = t139 - t145;
-    const real t147 = t133 + t146;
-    B[3] = t147;
-    const real t148 = u[3] * t130;
-    const real t149 = u[5] * t102;
-    const real t150 = t148 - t149;
-    const real t151 = t123 * t144;
-    const real t152 = u[4] * t100;
-    const real t153 = u[5] * t68;
-    const real t154 = t152 - t153;
-    const real t155 = t154 - s[3];
-    const real t156 = motion[3] + t155;
-    const real t157 = t67 * t156;
-    const real t158 = t151 - t157;
-    const real t159 = t150 + t158;
-    B[4] = t159;
-    const real t160 = u[4] * t102;
-    const real t161 = u[3] * t127;
-    const real t162 = t160 - t161;
-    const real t163 = t99 * t156;
-    const real t164 = t123 * t138;
-    const real t165 = t163 - t164;
-    const real t166 = t162 + t165;
-    B[5] = t166;
-    const real t167 = u[2] * 2.0;
-    const real t168 = t127 * t167;
-    const real t169 = u[1] * 2.0;
-    const real t170 = t130 * t169;
-    const real t171 = t168 - t170;
-    const real t172 = u[2] * t125;
-    const real t173 = 2.0 * t172;
-    const real t174 = u[0] * t100;
-    const real t175 = 2.0 * t174;
-    const real t176 = t173 - t175;
-    const real t177 = u[0] * u[5];
-    const real t178 = u[2] * u[3];
-    const real t179 = t177 - t178;
-    const real t180 = t179 + s[1];
-    const real t181 = t176 - t180;
-    const real t182 = motion[7] + t181;
-    const real t183 = t67 * t182;
-    const real t184 = t110 * along[0];
-    const real t185 = t116 * along[1];
-    const real t186 = t184 + t185;
-    const real t187 = t104 * along[2];
-    const real t188 = t186 + t187;
-    const real t189 = t188 * t138;
-    const real t190 = t44 * along[0];
-    const real t191 = t53 * along[1];
-    const real t192 = t190 + t191;
-    const real t193 = t12 * along[2];
-    const real t194 = t192 + t193;
-    const real t195 = t194 * t125;
-    const real t196 = t78 * along[0];
-    const real t197 = t85 * along[1];
-    const real t198 = t196 + t197;
-    const real t199 = t70 * along[2];
-    const real t200 = t198 + t199;
-    const real t201 = t200 * t68;
-    const real t202 = t195 - t201;
-    const real t203 = t68 * t202;
-    const real t204 = t200 * t100;
-    const real t205 = t188 * t125;
-    const real t206 = t204 - t205;
-    const real t207 = t100 * t206;
-    const real t208 = t203 - t207;
-    const real t209 = t189 + t208;
-    const real t210 = t194 * t144;
-    const real t211 = t209 - t210;
-    const real t212 = t183 + t211;
-    const real t213 = u[0] * t68;
-    const real t214 = 2.0 * t213;
-    const real t215 = u[1] * t125;
-    const real t216 = 2.0 * t215;
-    const real t217 = t214 - t216;
-    const real t218 = u[1] * u[3];
-    const real t219 = u[0] * u[4];
-    const real t220 = t218 - t219;
-    const real t221 = t220 + s[2];
-    const real t222 = t217 - t221;
-    const real t223 = motion[8] + t222;
-    const real t224 = t99 * t223;
-    const real t225 = t212 - t224;
-    const real t226 = scale[0] + t225;
-    const real t227 = t171 + t226;
-    B[6] = t227;
-    const real t228 = u[0] * 2.0;
-    const real t229 = t130 * t228;
-    const real t230 = t102 * t167;
-    const real t231 = t229 - t230;
-    const real t232 = u[5] * rate[0];
-    const real t233 = t123 * t223;
-    const real t234 = t200 * t144;
-    const real t235 = rate[0] * t100;
-    const real t236 = 2.0 * t235;
-    const real t237 = t188 * t68;
-    const real t238 = t194 * t100;
-    const real t239 = t237 - t238;
-    const real t240 = t100 * t239;
-    const real t241 = t125 * t202;
-    const real t242 = t240 - t241;
-    const real t243 = t236 + t242;
-    const real t244 = t188 * t156;
-    const real t245 = t243 - t244;
-    const real t246 = t234 + t245;
-    const real t247 = u[1] * t100;
-    const real t248 = 2.0 * t247;
-    const real t249 = u[2] * t68;
-    const real t250 = 2.0 * t249;
-    const real t251 = t248 - t250;
-    const real t252 = u[2] * u[4];
-    const real t253 = u[1] * u[5];
-    const real t254 = t252 - t253;
-    const real t255 = t254 + s[0];
-    const real t256 = t251 - t255;
-    const real t257 = motion[6] + t256;
-    const real t258 = t67 * t257;
-    const real t259 = t246 - t258;
-    const real t260 = t233 + t259;
-    const real t261 = t232 + t260;
-    const real t262 = t231 + t261;
-    B[7] = t262;
-    const real t263 = t102 * t169;
-    const real t264 = t127 * t228;
-    const real t265 = t263 - t264;
-    const real t266 = t99 * t257;
-    const real t267 = t194 * t156;
-    const real t268 = t125 * t206;
-    const real t269 = t68 * t239;
-    const real t270 = t268 - t269;
-    const real t271 = rate[0] * t68;
-    const real t272 = 2.0 * t271;
-    const real t273 = t270 - t272;
-    const real t274 = t267 + t273;
-    const real t275 = t200 * t138;
-    const real t276 = t274 - t275;
-    const real t277 = t266 + t276;
-    const real t278 = t123 * t182;
-    const real t279 = t277 - t278;
-    const real t280 = u[4] * rate[0];
-    const real t281 = t279 - t280;
-    const real t282 = t265 + t281;
-    B[8] = t282;
-    const real t283 = q[6] * along[11];
-    const real t284 = q[4] * along[13];
-    const real t285 = t283 + t284;
-    const real t286 = q[5] * along[10];
-    const real t287 = q[3] * along[12];
-    const real t288 = t286 + t287;
-    const real t289 = t285 - t288;
-    const real t290 = t8 * t289;
-    const real t291 = q[4] * along[11];
-    const real t292 = t291 + t291;
-    const real t293 = q[3] * along[10];
-    const real t294 = t293 + t293;
-    const real t295 = t292 + t294;
-    const real t296 = q[5] * along[12];
-    const real t297 = t296 + t296;
-    const real t298 = t295 + t297;
-    const real t299 = q[6] * along[13];
-    const real t300 = t299 + t299;
-    const real t301 = t298 + t300;
-    const real t302 = t7 * t301;
-    const real t303 = t302 / t6;
-    const real t304 = 2.0 * t303;
-    const real t305 = t23 * t304;
-    const real t306 = t290 - t305;
-    const real t307 = t12 * t306;
-    const real t308 = t45 * t304;
-    const real t309 = t297 + t300;
-    const real t310 = t8 * t309;
-    const real t311 = t308 - t310;
-    const real t312 = t44 * t311;
-    const real t313 = q[6] * along[10];
-    const real t314 = q[3] * along[13];
-    const real t315 = t313 + t314;
-    const real t316 = q[5] * along[11];
-    const real t317 = q[4] * along[12];
-    const real t318 = t316 + t317;
-    const real t319 = t315 + t318;
-    const real t320 = t8 * t319;
-    const real t321 = t62 * t304;
-    const real t322 = t320 - t321;
-    const real t323 = t53 * t322;
-    const real t324 = t312 + t323;
-    const real t325 = t307 + t324;
-    const real t326 = t68 * t325;
-    const real t327 = t71 * t304;
-    const real t328 = t292 + t297;
-    const real t329 = t8 * t328;
-    const real t330 = t327 - t329;
-    const real t331 = t70 * t330;
-    const real t332 = t285 + t288;
-    const real t333 = t8 * t332;
-    const real t334 = t81 * t304;
-    const real t335 = t333 - t334;
-    const real t336 = t78 * t335;
-    const real t337 = q[6] * along[12];
-    const real t338 = q[5] * along[13];
-    const real t339 = t337 + t338;
-    const real t340 = q[4] * along[10];
-    const real t341 = q[3] * along[11];
-    const real t342 = t340 + t341;
-    const real t343 = t339 - t342;
-    const real t344 = t8 * t343;
-    const real t345 = t94 * t304;
-    const real t346 = t344 - t345;
-    const real t347 = t85 * t346;
-    const real t348 = t336 + t347;
-    const real t349 = t331 + t348;
-    const real t350 = t100 * t349;
-    const real t351 = t326 - t350;
-    B[9] = t351;
-    const real t352 = t342 + t339;
-    const real t353 = t8 * t352;
-    const real t354 = t11 * t304;
-    const real t355 = t353 - t354;
-    const real t356 = t104 * t355;
-    const real t357 = t318 - t315;
-    const real t358 = t8 * t357;
-    const real t359 = t43 * t304;
-    const real t360 = t358 - t359;
-    const real t361 = t110 * t360;
-    const real t362 = t51 * t304;
-    const real t363 = t292 + t300;
-    const real t364 = t8 * t363;
-    const real t365 = t362 - t364;
-    const real t366 = t116 * t365;
-    const real t367 = t361 + t366;
-    const real t368 = t356 + t367;
-    const real t369 = t100 * t368;
-    const real t370 = t125 * t325;
-    const real t371 = t369 - t370;
-    B[10] = t371;
-    const real t372 = t125 * t349;
-    const real t373 = t68 * t368;
-    const real t374 = t372 - t373;
-    B[11] = t374;
-    const real t375 = u[5] * t371;
-    const real t376 = u[4] * t374;
-    const real t377 = t375 - t376;
-    const real t378 = t138 * t325;
-    const real t379 = t144 * t349;
-    const real t380 = t378 - t379;
-    const real t381 = t377 + t380;
-    B[12] = t381;
-    const real t382 = u[3] * t374;
-    const real t383 = u[5] * t351;
-    const real t384 = t382 - t383;
-    const real t385 = t144 * t368;
-    const real t386 = t156 * t325;
-    const real t387 = t385 - t386;
-    const real t388 = t384 + t387;
-    B[13] = t388;
-    const real t389 = u[4] * t351;
-    const real t390 = u[3] * t371;
-    const real t391 = t389 - t390;
-    const real t392 = t156 * t349;
-    const real t393 = t138 * t368;
-    const real t394 = t392 - t393;
-    const real t395 = t391 + t394;
-    B[14] = t395;
-    const real t396 = t167 * t371;
-    const real t397 = t169 * t374;
-    const real t398 = t396 - t397;
-    const real t399 = t182 * t325;
-    const real t400 = t110 * along[7];
-    const real t401 = t116 * along[8];
-    const real t402 = t400 + t401;
-    const real t403 = t104 * along[9];
-    const real t404 = t402 + t403;
-    const real t405 = t138 * t404;
-    const real t406 = t44 * along[7];
-    const real t407 = t53 * along[8];
-    const real t408 = t406 + t407;
-    const real t409 = t12 * along[9];
-    const real t410 = t408 + t409;
-    const real t411 = t125 * t410;
-    const real t412 = t78 * along[7];
-    const real t413 = t85 * along[8];
-    const real t414 = t412 + t413;
-    const real t415 = t70 * along[9];
-    const real t416 = t414 + t415;
-    const real t417 = t68 * t416;
-    const real t418 = t411 - t417;
-    const real t419 = t68 * t418;
-    const real t420 = t100 * t416;
-    const real t421 = t125 * t404;
-    const real t422 = t420 - t421;
-    const real t423 = t100 * t422;
-    const real t424 = t419 - t423;
-    const real t425 = t424 - t236;
-    const real t426 = t405 + t425;
-    const real t427 = t144 * t410;
-    const real t428 = t426 - t427;
-    const real t429 = t399 + t428;
-    const real t430 = t223 * t349;
-    const real t431 = t429 - t430;
-    const real t432 = t431 - t232;
-    const real t433 = t398 + t432;
-    B[15] = t433;
-    const real t434 = t228 * t374;
-    const real t435 = t167 * t351;
-    const real t436 = t434 - t435;
-    const real t437 = t223 * t368;
-    const real t438 = t144 * t416;
-    const real t439 = t68 * t404;
-    const real t440 = t100 * t410;
-    const real t441 = t439 - t440;
-    const real t442 = t100 * t441;
-    const real t443 = t125 * t418;
-    const real t444 = t442 - t443;
-    const real t445 = t156 * t404;
-    const real t446 = t444 - t445;
-    const real t447 = t438 + t446;
-    const real t448 = t257 * t325;
-    const real t449 = t447 - t448;
-    const real t450 = t437 + t449;
-    const real t451 = scale[0] + t450;
-    const real t452 = t436 + t451;
-    B[16] = t452;
-    const real t453 = t169 * t351;
-    const real t454 = t228 * t371;
-    const real t455 = t453 - t454;
-    const real t456 = u[3] * rate[0];
-    const real t457 = t257 * t349;
-    const real t458 = t156 * t410;
-    const real t459 = rate[0] * t125;
-    const real t460 = 2.0 * t459;
-    const real t461 = t125 * t422;
-    const real t462 = t68 * t441;
-    const real t463 = t461 - t462;
-    const real t464 = t460 + t463;
-    const real t465 = t458 + t464;
-    const real t466 = t138 * t416;
-    const real t467 = t465 - t466;
-    const real t468 = t457 + t467;
-    const real t469 = t182 * t368;
-    const real t470 = t468 - t469;
-    const real t471 = t456 + t470;
-    const real t472 = t455 + t471;
-    B[17] = t472;
-    const real t473 = q[6] * along[18];
-    const real t474 = q[4] * along[20];
-    const real t475 = t473 + t474;
-    const real t476 = q[5] * along[17];
-    const real t477 = q[3] * along[19];
-    const real t478 = t476 + t477;
-    const real t479 = t475 - t478;
-    const real t480 = t8 * t479;
-    const real t481 = q[4] * along[18];
-    const real t482 = t481 + t481;
-    const real t483 = q[3] * along[17];
-    const real t484 = t483 + t483;
-    const real t485 = t482 + t484;
-    const real t486 = q[5] * along[19];
-    const real t487 = t486 + t486;
-    const real t488 = t485 + t487;
-    const real t489 = q[6] * along[20];
-    const real t490 = t489 + t489;
-    const real t491 = t488 + t490;
-    const real t492 = t7 * t491;
-    const real t493 = t492 / t6;
-    const real t494 = 2.0 * t493;
-    const real t495 = t23 * t494;
-    const real t496 = t480 - t495;
-    const real t497 = t12 * t496;
-    const real t498 = t45 * t494;
-    const real t499 = t487 + t490;
-    const real t500 = t8 * t499;
-    const real t501 = t498 - t500;
-    const real t502 = t44 * t501;
-    const real t503 = q[6] * along[17];
-    const real t504 = q[3] * along[20];
-    const real t505 = t503 + t504;
-    const real t506 = q[5] * along[18];
-    const real t507 = q[4] * along[19];
-    const real t508 = t506 + t507;
-    const real t509 = t505 + t508;
-    const real t510 = t8 * t509;
-    const real t511 = t62 * t494;
-    const real t512 = t510 - t511;
-    const real t513 = t53 * t512;
-    const real t514 = t502 + t513;
-    const real t515 = t497 + t514;
-    const real t516 = t68 * t515;
-    const real t517 = t71 * t494;
-    const real t518 = t482 + t487;
-    const real t519 = t8 * t518;
-    const real t520 = t517 - t519;
-    const real t521 = t70 * t520;
-    const real t522 = t475 + t478;
-    const real t523 = t8 * t522;
-    const real t524 = t81 * t494;
-    const real t525 = t523 - t524;
-    const real t526 = t78 * t525;
-    const real t527 = q[6] * along[19];
-    const real t528 = q[5] * along[20];
-    const real t529 = t527 + t528;
-    const real t530 = q[4] * along[17];
-    const real t531 = q[3] * along[18];
-    const real t532 = t530 + t531;
-    const real t533 = t529 - t532;
-    const real t534 = t8 * t533;
-    const real t535 = t94 * t494;
-    const real t536 = t534 - t535;
-    const real t537 = t85 * t536;
-    const real t538 = t526 + t537;
-    const real t539 = t521 + t538;
-    const real t540 = t100 * t539;
-    const real t541 = t516 - t540;
-    B[18] = t541;
-    const real t542 = t532 + t529;
-    const real t543 = t8 * t542;
-    const real t544 = t11 * t494;
-    const real t545 = t543 - t544;
-    const real t546 = t104 * t545;
-    const real t547 = t508 - t505;
-    const real t548 = t8 * t547;
-    const real t549 = t43 * t494;
-    const real t550 = t548 - t549;
-    const real t551 = t110 * t550;
-    const real t552 = t51 * t494;
-    const real t553 = t482 + t490;
-    const real t554 = t8 * t553;
-    const real t555 = t552 - t554;
-    const real t556 = t116 * t555;
-    const real t557 = t551 + t556;
-    const real t558 = t546 + t557;
-    const real t559 = t100 * t558;
-    const real t560 = t125 * t515;
-    const real t561 = t559 - t560;
-    B[19] = t561;
-    const real t562 = t125 * t539;
-    const real t563 = t68 * t558;
-    const real t564 = t562 - t563;
-    B[20] = t564;
-    const real t565 = u[5] * t561;
-    const real t566 = u[4] * t564;
-    const real t567 = t565 - t566;
-    const real t568 = t138 * t515;
-    const real t569 = t144 * t539;
-    const real t570 = t568 - t569;
-    const real t571 = t567 + t570;
-    B[21] = t571;
-    const real t572 = u[3] * t564;
-    const real t573 = u[5] * t541;
-    const real t574 = t572 - t573;
-    const real t575 = t144 * t558;
-    const real t576 = t156 * t515;
-    const real t577 = t575 - t576;
-    const real t578 = t574 + t577;
-    B[22] = t578;
-    const real t579 = u[4] * t541;
-    const real t580 = u[3] * t561;
-    const real t581 = t579 - t580;
-    const real t582 = t156 * t539;
-    const real t583 = t138 * t558;
-    const real t584 = t582 - t583;
-    const real t585 = t581 + t584;
-    B[23] = t585;
-    const real t586 = t167 * t561;
-    const real t587 = t169 * t564;
-    const real t588 = t586 - t587;
-    const real t589 = t182 * t515;
-    const real t590 = t110 * along[14];
-    const real t591 = t116 * along[15];
-    const real t592 = t590 + t591;
-    const real t593 = t104 * along[16];
-    const real t594 = t592 + t593;
-    const real t595 = t138 * t594;
-    const real t596 = t44 * along[14];
-    const real t597 = t53 * along[15];
-    const real t598 = t596 + t597;
-    const real t599 = t12 * along[16];
-    const real t600 = t598 + t599;
-    const real t601 = t125 * t600;
-    const real t602 = t78 * along[14];
-    const real t603 = t85 * along[15];
-    const real t604 = t602 + t603;
-    const real t605 = t70 * along[16];
-    const real t606 = t604 + t605;
-    const real t607 = t68 * t606;
-    const real t608 = t601 - t607;
-    const real t609 = t68 * t608;
-    const real t610 = t100 * t606;
-    const real t611 = t125 * t594;
-    const real t612 = t610 - t611;
-    const real t613 = t100 * t612;
-    const real t614 = t609 - t613;
-    const real t615 = t272 + t614;
-    const real t616 = t595 + t615;
-    const real t617 = t144 * t600;
-    const real t618 = t616 - t617;
-    const real t619 = t589 + t618;
-    const real t620 = t223 * t539;
-    const real t621 = t619 - t620;
-    const real t622 = t280 + t621;
-    const real t623 = t588 + t622;
-    B[24] = t623;
-    const real t624 = t228 * t564;
-    const real t625 = t167 * t541;
-    const real t626 = t624 - t625;
-    const real t627 = t223 * t558;
-    const real t628 = t144 * t606;
-    const real t629 = t68 * t594;
-    const real t630 = t100 * t600;
-    const real t631 = t629 - t630;
-    const real t632 = t100 * t631;
-    const real t633 = t125 * t608;
-    const real t634 = t632 - t633;
-    const real t635 = t634 - t460;
-    const real t636 = t156 * t594;
-    const real t637 = t635 - t636;
-    const real t638 = t628 + t637;
-    const real t639 = t257 * t515;
-    const real t640 = t638 - t639;
-    const real t641 = t627 + t640;
-    const real t642 = t641 - t456;
-    const real t643 = t626 + t642;
-    B[25] = t643;
-    const real t644 = t169 * t541;
-    const real t645 = t228 * t561;
-    const real t646 = t644 - t645;
-    const real t647 = t257 * t539;
-    const real t648 = t156 * t600;
-    const real t649 = t125 * t612;
-    const real t650 = t68 * t631;
-    const real t651 = t649 - t650;
-    const real t652 = t648 + t651;
-    const real t653 = t138 * t606;
-    const real t654 = t652 - t653;
-    const real t655 = t647 + t654;
-    const real t656 = t182 * t558;
-    const real t657 = t655 - t656;
-    const real t658 = scale[0] + t657;
-    const real t659 = t646 + t658;
-    B[26] = t659;
-    const real t660 = q[6] * along[25];
-    const real t661 = q[4] * along[27];
-    const real t662 = t660 + t661;
-    const real t663 = q[5] * along[24];
-    const real t664 = q[3] * along[26];
-    const real t665 = t663 + t664;
-    const real t666 = t662 - t665;
-    const real t667 = t8 * t666;
-    const real t668 = q[4] * along[25];
-    const real t669 = t668 + t668;
-    const real t670 = q[3] * along[24];
-    const real t671 = t670 + t670;
-    const real t672 = t669 + t671;
-    const real t673 = q[5] * along[26];
-    const real t674 = t673 + t673;
-    const real t675 = t672 + t674;
-    const real t676 = q[6] * along[27];
-    const real t677 = t676 + t676;
-    const real t678 = t675 + t677;
-    const real t679 = t7 * t678;
-    const real t680 = t679 / t6;
-    const real t681 = 2.0 * t680;
-    const real t682 = t23 * t681;
-    const real t683 = t667 - t682;
-    const real t684 = t12 * t683;
-    const real t685 = t45 * t681;
-    const real t686 = t674 + t677;
-    const real t687 = t8 * t686;
-    const real t688 = t685 - t687;
-    const real t689 = t44 * t688;
-    const real t690 = q[6] * along[24];
-    const real t691 = q[3] * along[27];
-    const real t692 = t690 + t691;
-    const real t693 = q[5] * along[25];
-    const real t694 = q[4] * along[26];
-    const real t695 = t693 + t694;
-    const real t696 = t692 + t695;
-    const real t697 = t8 * t696;
-    const real t698 = t62 * t681;
-    const real t699 = t697 - t698;
-    const real t700 = t53 * t699;
-    const real t701 = t689 + t700;
-    const real t702 = t684 + t701;
-    const real t703 = t68 * t702;
-    const real t704 = t71 * t681;
-    const real t705 = t669 + t674;
-    const real t706 = t8 * t705;
-    const real t707 = t704 - t706;
-    const real t708 = t70 * t707;
-    const real t709 = t662 + t665;
-    const real t710 = t8 * t709;
-    const real t711 = t81 * t681;
-    const real t712 = t710 - t711;
-    const real t713 = t78 * t712;
-    const real t714 = q[6] * along[26];
-    const real t715 = q[5] * along[27];
-    const real t716 = t714 + t715;
-    const real t717 = q[4] * along[24];
-    const real t718 = q[3] * along[25];
-    const real t719 = t717 + t718;
-    const real t720 = t716 - t719;
-    const real t721 = t8 * t720;
-    const real t722 = t94 * t681;
-    const real t723 = t721 - t722;
-    const real t724 = t85 * t723;
-    const real t725 = t713 + t724;
-    const real t726 = t708 + t725;
-    const real t727 = t100 * t726;
-    const real t728 = t703 - t727;
-    const real t729 = rate[0] + t728;
-    B[27] = t729;
-    const real t730 = t719 + t716;
-    const real t731 = t8 * t730;
-    const real t732 = t11 * t681;
-    const real t733 = t731 - t732;
-    const real t734 = t104 * t733;
-    const real t735 = t695 - t692;
-    const real t736 = t8 * t735;
-    const real t737 = t43 * t681;
-    const real t738 = t736 - t737;
-    const real t739 = t110 * t738;
-    const real t740 = t51 * t681;
-    const real t741 = t669 + t677;
-    const real t742 = t8 * t741;
-    const real t743 = t740 - t742;
-    const real t744 = t116 * t743;
-    const real t745 = t739 + t744;
-    const real t746 = t734 + t745;
-    const real t747 = t100 * t746;
-    const real t748 = t125 * t702;
-    const real t749 = t747 - t748;
-    B[28] = t749;
-    const real t750 = t125 * t726;
-    const real t751 = t68 * t746;
-    const real t752 = t750 - t751;
-    B[29] = t752;
-    const real t753 = u[5] * t749;
-    const real t754 = u[4] * t752;
-    const real t755 = t753 - t754;
-    const real t756 = t138 * t702;
-    const real t757 = t144 * t726;
-    const real t758 = t756 - t757;
-    const real t759 = scale[0] + t758;
-    const real t760 = t755 + t759;
-    B[30] = t760;
-    const real t761 = u[3] * t752;
-    const real t762 = u[5] * t728;
-    const real t763 = t761 - t762;
-    const real t764 = t144 * t746;
-    const real t765 = t156 * t702;
-    const real t766 = t235 - t765;
-    const real t767 = t764 + t766;
-    const real t768 = t763 + t767;
-    B[31] = t768;
-    const real t769 = u[4] * t728;
-    const real t770 = u[3] * t749;
-    const real t771 = t769 - t770;
-    const real t772 = t156 * t726;
-    const real t773 = t772 - t271;
-    const real t774 = t138 * t746;
-    const real t775 = t773 - t774;
-    const real t776 = t771 + t775;
-    B[32] = t776;
-    const real t777 = t167 * t749;
-    const real t778 = t169 * t752;
-    const real t779 = t777 - t778;
-    const real t780 = t182 * t702;
-    const real t781 = t110 * along[21];
-    const real t782 = t116 * along[22];
-    const real t783 = t781 + t782;
-    const real t784 = t104 * along[23];
-    const real t785 = t783 + t784;
-    const real t786 = t138 * t785;
-    const real t787 = t44 * along[21];
-    const real t788 = t53 * along[22];
-    const real t789 = t787 + t788;
-    const real t790 = t12 * along[23];
-    const real t791 = t789 + t790;
-    const real t792 = t125 * t791;
-    const real t793 = t78 * along[21];
-    const real t794 = t85 * along[22];
-    const real t795 = t793 + t794;
-    const real t796 = t70 * along[23];
-    const real t797 = t795 + t796;
-    const real t798 = t68 * t797;
-    const real t799 = t792 - t798;
-    const real t800 = t68 * t799;
-    const real t801 = t100 * t797;
-    const real t802 = t125 * t785;
-    const real t803 = t801 - t802;
-    const real t804 = t100 * t803;
-    const real t805 = t800 - t804;
-    const real t806 = t786 + t805;
-    const real t807 = t144 * t791;
-    const real t808 = t806 - t807;
-    const real t809 = t780 + t808;
-    const real t810 = t223 * t726;
-    const real t811 = t809 - t810;
-    const real t812 = t779 + t811;
-    B[33] = t812;
-    const real t813 = t228 * t752;
-    const real t814 = t167 * t728;
-    const real t815 = t813 - t814;
-    const real t816 = t223 * t746;
-    const real t817 = t144 * t797;
-    const real t818 = t68 * t785;
-    const real t819 = t100 * t791;
-    const real t820 = t818 - t819;
-    const real t821 = t100 * t820;
-    const real t822 = t125 * t799;
-    const real t823 = t821 - t822;
-    const real t824 = t156 * t785;
-    const real t825 = t823 - t824;
-    const real t826 = t817 + t825;
-    const real t827 = t257 * t702;
-    const real t828 = t826 - t827;
-    const real t829 = t816 + t828;
-    const real t830 = u[2] * rate[0];
-    const real t831 = t829 - t830;
-    const real t832 = t815 + t831;
-    B[34] = t832;
-    const real t833 = t169 * t728;
-    const real t834 = t228 * t749;
-    const real t835 = t833 - t834;
-    const real t836 = u[1] * rate[0];
-    const real t837 = t257 * t726;
-    const real t838 = t156 * t791;
-    const real t839 = t125 * t803;
-    const real t840 = t68 * t820;
-    const real t841 = t839 - t840;
-    const real t842 = t838 + t841;
-    const real t843 = t138 * t797;
-    const real t844 = t842 - t843;
-    const real t845 = t837 + t844;
-    const real t846 = t182 * t746;
-    const real t847 = t845 - t846;
-    const real t848 = t836 + t847;
-    const real t849 = t835 + t848;
-    B[35] = t849;
-    const real t850 = q[6] * along[32];
-    const real t851 = q[4] * along[34];
-    const real t852 = t850 + t851;
-    const real t853 = q[5] * along[31];
-    const real t854 = q[3] * along[33];
-    const real t855 = t853 + t854;
-    const real t856 = t852 - t855;
-    const real t857 = t8 * t856;
-    const real t858 = q[4] * along[32];
-    const real t859 = t858 + t858;
-    const real t860 = q[3] * along[31];
-    const real t861 = t860 + t860;
-    const real t862 = t859 + t861;
-    const real t863 = q[5] * along[33];
-    const real t864 = t863 + t863;
-    const real t865 = t862 + t864;
-    const real t866 = q[6] * along[34];
-    const real t867 = t866 + t866;
-    const real t868 = t865 + t867;
-    const real t869 = t7 * t868;
-    const real t870 = t869 / t6;
-    const real t871 = 2.0 * t870;
-    const real t872 = t23 * t871;
-    const real t873 = t857 - t872;
-    const real t874 = t12 * t873;
-    const real t875 = t45 * t871;
-    const real t876 = t864 + t867;
-    const real t877 = t8 * t876;
-    const real t878 = t875 - t877;
-    const real t879 = t44 * t878;
-    const real t880 = q[6] * along[31];
-    const real t881 = q[3] * along[34];
-    const real t882 = t880 + t881;
-    const real t883 = q[5] * along[32];
-    const real t884 = q[4] * along[33];
-    const real t885 = t883 + t884;
-    const real t886 = t882 + t885;
-    const real t887 = t8 * t886;
-    const real t888 = t62 * t871;
-    const real t889 = t887 - t888;
-    const real t890 = t53 * t889;
-    const real t891 = t879 + t890;
-    const real t892 = t874 + t891;
-    const real t893 = t68 * t892;
-    const real t894 = t71 * t871;
-    const real t895 = t859 + t864;
-    const real t896 = t8 * t895;
-    const real t897 = t894 - t896;
-    const real t898 = t70 * t897;
-    const real t899 = t852 + t855;
-    const real t900 = t8 * t899;
-    const real t901 = t81 * t871;
-    const real t902 = t900 - t901;
-    const real t903 = t78 * t902;
-    const real t904 = q[6] * along[33];
-    const real t905 = q[5] * along[34];
-    const real t906 = t904 + t905;
-    const real t907 = q[4] * along[31];
-    const real t908 = q[3] * along[32];
-    const real t909 = t907 + t908;
-    const real t910 = t906 - t909;
-    const real t911 = t8 * t910;
-    const real t912 = t94 * t871;
-    const real t913 = t911 - t912;
-    const real t914 = t85 * t913;
-    const real t915 = t903 + t914;
-    const real t916 = t898 + t915;
-    const real t917 = t100 * t916;
-    const real t918 = t893 - t917;
-    B[36] = t918;
-    const real t919 = t909 + t906;
-    const real t920 = t8 * t919;
-    const real t921 = t11 * t871;
-    const real t922 = t920 - t921;
-    const real t923 = t104 * t922;
-    const real t924 = t885 - t882;
-    const real t925 = t8 * t924;
-    const real t926 = t43 * t871;
-    const real t927 = t925 - t926;
-    const real t928 = t110 * t927;
-    const real t929 = t51 * t871;
-    const real t930 = t859 + t867;
-    const real t931 = t8 * t930;
-    const real t932 = t929 - t931;
-    const real t933 = t116 * t932;
-    const real t934 = t928 + t933;
-    const real t935 = t923 + t934;
-    const real t936 = t100 * t935;
-    const real t937 = t125 * t892;
-    const real t938 = t936 - t937;
-    const real t939 = rate[0] + t938;
-    B[37] = t939;
-    const real t940 = t125 * t916;
-    const real t941 = t68 * t935;
-    const real t942 = t940 - t941;
-    B[38] = t942;
-    const real t943 = u[5] * t938;
-    const real t944 = u[4] * t942;
-    const real t945 = t943 - t944;
-    const real t946 = t138 * t892;
-    const real t947 = t946 - t235;
-    const real t948 = t144 * t916;
-    const real t949 = t947 - t948;
-    const real t950 = t945 + t949;
-    B[39] = t950;
-    const real t951 = u[3] * t942;
-    const real t952 = u[5] * t918;
-    const real t953 = t951 - t952;
-    const real t954 = t144 * t935;
-    const real t955 = t156 * t892;
-    const real t956 = t954 - t955;
-    const real t957 = scale[0] + t956;
-    const real t958 = t953 + t957;
-    B[40] = t958;
-    const real t959 = u[4] * t918;
-    const real t960 = u[3] * t938;
-    const real t961 = t959 - t960;
-    const real t962 = t156 * t916;
-    const real t963 = t459 + t962;
-    const real t964 = t138 * t935;
-    const real t965 = t963 - t964;
-    const real t966 = t961 + t965;
-    B[41] = t966;
-    const real t967 = t167 * t938;
-    const real t968 = t169 * t942;
-    const real t969 = t967 - t968;
-    const real t970 = t182 * t892;
-    const real t971 = t110 * along[28];
-    const real t972 = t116 * along[29];
-    const real t973 = t971 + t972;
-    const real t974 = t104 * along[30];
-    const real t975 = t973 + t974;
-    const real t976 = t138 * t975;
-    const real t977 = t44 * along[28];
-    const real t978 = t53 * along[29];
-    const real t979 = t977 + t978;
-    const real t980 = t12 * along[30];
-    const real t981 = t979 + t980;
-    const real t982 = t125 * t981;
-    const real t983 = t78 * along[28];
-    const real t984 = t85 * along[29];
-    const real t985 = t983 + t984;
-    const real t986 = t70 * along[30];
-    const real t987 = t985 + t986;
-    const real t988 = t68 * t987;
-    const real t989 = t982 - t988;
-    const real t990 = t68 * t989;
-    const real t991 = t100 * t987;
-    const real t992 = t125 * t975;
-    const real t993 = t991 - t992;
-    const real t994 = t100 * t993;
-    const real t995 = t990 - t994;
-    const real t996 = t976 + t995;
-    const real t997 = t144 * t981;
-    const real t998 = t996 - t997;
-    const real t999 = t970 + t998;
-    const real t1000 = t223 * t916;
-    const real t1001 = t999 - t1000;
-    const real t1002 = t830 + t1001;
-    const real t1003 = t969 + t1002;
-    B[42] = t1003;
-    const real t1004 = t228 * t942;
-    const real t1005 = t167 * t918;
-    const real t1006 = t1004 - t1005;
-    const real t1007 = t223 * t935;
-    const real t1008 = t144 * t987;
-    const real t1009 = t68 * t975;
-    const real t1010 = t100 * t981;
-    const real t1011 = t1009 - t1010;
-    const real t1012 = t100 * t1011;
-    const real t1013 = t125 * t989;
-    const real t1014 = t1012 - t1013;
-    const real t1015 = t156 * t975;
-    const real t1016 = t1014 - t1015;
-    const real t1017 = t1008 + t1016;
-    const real t1018 = t257 * t892;
-    const real t1019 = t1017 - t1018;
-    const real t1020 = t1007 + t1019;
-    const real t1021 = t1006 + t1020;
-    B[43] = t1021;
-    const real t1022 = t169 * t918;
-    const real t1023 = t228 * t938;
-    const real t1024 = t1022 - t1023;
-    const real t1025 = t257 * t916;
-    const real t1026 = t156 * t981;
-    const real t1027 = t125 * t993;
-    const real t1028 = t68 * t1011;
-    const real t1029 = t1027 - t1028;
-    const real t1030 = t1026 + t1029;
-    const real t1031 = t138 * t987;
-    const real t1032 = t1030 - t1031;
-    const real t1033 = t1025 + t1032;
-    const real t1034 = t182 * t935;
-    const real t1035 = t1033 - t1034;
-    const real t1036 = u[0] * rate[0];
-    const real t1037 = t1035 - t1036;
-    const real t1038 = t1024 + t1037;
-    B[44] = t1038;
-    const real t1039 = q[6] * along[39];
-    const real t1040 = q[4] * along[41];
-    const real t1041 = t1039 + t1040;
-    const real t1042 = q[5] * along[38];
-    const real t1043 = q[3] * along[40];
-    const real t1044 = t1042 + t1043;
-    const real t1045 = t1041 - t1044;
-    const real t1046 = t8 * t1045;
-    const real t1047 = q[4] * along[39];
-    const real t1048 = t1047 + t1047;
-    const real t1049 = q[3] * along[38];
-    const real t1050 = t1049 + t1049;
-    const real t1051 = t1048 + t1050;
-    const real t1052 = q[5] * along[40];
-    const real t1053 = t1052 + t1052;
-    const real t1054 = t1051 + t1053;
-    const real t1055 = q[6] * along[41];
-    const real t1056 = t1055 + t1055;
-    const real t1057 = t1054 + t1056;
-    const real t1058 = t7 * t1057;
-    const real t1059 = t1058 / t6;
-    const real t1060 = 2.0 * t1059;
-    const real t1061 = t23 * t1060;
-    const real t1062 = t1046 - t1061;
-    const real t1063 = t12 * t1062;
-    const real t1064 = t45 * t1060;
-    const real t1065 = t1053 + t1056;
-    const real t1066 = t8 * t1065;
-    const real t1067 = t1064 - t1066;
-    const real t1068 = t44 * t1067;
-    const real t1069 = q[6] * along[38];
-    const real t1070 = q[3] * along[41];
-    const real t1071 = t1069 + t1070;
-    const real t1072 = q[5] * along[39];
-    const real t1073 = q[4] * along[40];
-    const real t1074 = t1072 + t1073;
-    const real t1075 = t1071 + t1074;
-    const real t1076 = t8 * t1075;
-    const real t1077 = t62 * t1060;
-    const real t1078 = t1076 - t1077;
-    const real t1079 = t53 * t1078;
-    const real t1080 = t1068 + t1079;
-    const real t1081 = t1063 + t1080;
-    const real t1082 = t68 * t1081;
-    const real t1083 = t71 * t1060;
-    const real t1084 = t1048 + t1053;
-    const real t1085 = t8 * t1084;
-    const real t1086 = t1083 - t1085;
-    const real t1087 = t70 * t1086;
-    const real t1088 = t1041 + t1044;
-    const real t1089 = t8 * t1088;
-    const real t1090 = t81 * t1060;
-    const real t1091 = t1089 - t1090;
-    const real t1092 = t78 * t1091;
-    const real t1093 = q[6] * along[40];
-    const real t1094 = q[5] * along[41];
-    const real t1095 = t1093 + t1094;
-    const real t1096 = q[4] * along[38];
-    const real t1097 = q[3] * along[39];
-    const real t1098 = t1096 + t1097;
-    const real t1099 = t1095 - t1098;
-    const real t1100 = t8 * t1099;
-    const real t1101 = t94 * t1060;
-    const real t1102 = t1100 - t1101;
-    const real t1103 = t85 * t1102;
-    const real t1104 = t1092 + t1103;
-    const real t1105 = t1087 + t1104;
-    const real t1106 = t100 * t1105;
-    const real t1107 = t1082 - t1106;
-    B[45] = t1107;
-    const real t1108 = t1098 + t1095;
-    const real t1109 = t8 * t1108;
-    const real t1110 = t11 * t1060;
-    const real t1111 = t1109 - t1110;
-    const real t1112 = t104 * t1111;
-    const real t1113 = t1074 - t1071;
-    const real t1114 = t8 * t1113;
-    const real t1115 = t43 * t1060;
-    const real t1116 = t1114 - t1115;
-    const real t1117 = t110 * t1116;
-    const real t1118 = t51 * t1060;
-    const real t1119 = t1048 + t1056;
-    const real t1120 = t8 * t1119;
-    const real t1121 = t1118 - t1120;
-    const real t1122 = t116 * t1121;
-    const real t1123 = t1117 + t1122;
-    const real t1124 = t1112 + t1123;
-    const real t1125 = t100 * t1124;
-    const real t1126 = t125 * t1081;
-    const real t1127 = t1125 - t1126;
-    B[46] = t1127;
-    const real t1128 = t125 * t1105;
-    const real t1129 = t68 * t1124;
-    const real t1130 = t1128 - t1129;
-    const real t1131 = rate[0] + t1130;
-    B[47] = t1131;
-    const real t1132 = u[5] * t1127;
-    const real t1133 = u[4] * t1130;
-    const real t1134 = t1132 - t1133;
-    const real t1135 = t138 * t1081;
-    const real t1136 = t271 + t1135;
-    const real t1137 = t144 * t1105;
-    const real t1138 = t1136 - t1137;
-    const real t1139 = t1134 + t1138;
-    B[48] = t1139;
-    const real t1140 = u[3] * t1130;
-    const real t1141 = u[5] * t1107;
-    const real t1142 = t1140 - t1141;
-    const real t1143 = t144 * t1124;
-    const real t1144 = t156 * t1081;
-    const real t1145 = t459 + t1144;
-    const real t1146 = t1143 - t1145;
-    const real t1147 = t1142 + t1146;
-    B[49] = t1147;
-    const real t1148 = u[4] * t1107;
-    const real t1149 = u[3] * t1127;
-    const real t1150 = t1148 - t1149;
-    const real t1151 = t156 * t1105;
-    const real t1152 = t138 * t1124;
-    const real t1153 = t1151 - t1152;
-    const real t1154 = scale[0] + t1153;
-    const real t1155 = t1150 + t1154;
-    B[50] = t1155;
-    const real t1156 = t167 * t1127;
-    const real t1157 = t169 * t1130;
-    const real t1158 = t1156 - t1157;
-    const real t1159 = t182 * t1081;
-    const real t1160 = t110 * along[35];
-    const real t1161 = t116 * along[36];
-    const real t1162 = t1160 + t1161;
-    const real t1163 = t104 * along[37];
-    const real t1164 = t1162 + t1163;
-    const real t1165 = t138 * t1164;
-    const real t1166 = t44 * along[35];
-    const real t1167 = t53 * along[36];
-    const real t1168 = t1166 + t1167;
-    const real t1169 = t12 * along[37];
-    const real t1170 = t1168 + t1169;
-    const real t1171 = t125 * t1170;
-    const real t1172 = t78 * along[35];
-    const real t1173 = t85 * along[36];
-    const real t1174 = t1172 + t1173;
-    const real t1175 = t70 * along[37];
-    const real t1176 = t1174 + t1175;
-    const real t1177 = t68 * t1176;
-    const real t1178 = t1171 - t1177;
-    const real t1179 = t68 * t1178;
-    const real t1180 = t100 * t1176;
-    const real t1181 = t125 * t1164;
-    const real t1182 = t1180 - t1181;
-    const real t1183 = t100 * t1182;
-    const real t1184 = t1179 - t1183;
-    const real t1185 = t1165 + t1184;
-    const real t1186 = t144 * t1170;
-    const real t1187 = t1185 - t1186;
-    const real t1188 = t1159 + t1187;
-    const real t1189 = t223 * t1105;
-    const real t1190 = t1188 - t1189;
-    const real t1191 = t1190 - t836;
-    const real t1192 = t1158 + t1191;
-    B[51] = t1192;
-    const real t1193 = t228 * t1130;
-    const real t1194 = t167 * t1107;
-    const real t1195 = t1193 - t1194;
-    const real t1196 = t223 * t1124;
-    const real t1197 = t144 * t1176;
-    const real t1198 = t68 * t1164;
-    const real t1199 = t100 * t1170;
-    const real t1200 = t1198 - t1199;
-    const real t1201 = t100 * t1200;
-    const real t1202 = t125 * t1178;
-    const real t1203 = t1201 - t1202;
-    const real t1204 = t156 * t1164;
-    const real t1205 = t1203 - t1204;
-    const real t1206 = t1197 + t1205;
-    const real t1207 = t257 * t1081;
-    const real t1208 = t1206 - t1207;
-    const real t1209 = t1196 + t1208;
-    const real t1210 = t1036 + t1209;
-    const real t1211 = t1195 + t1210;
-    B[52] = t1211;
-    const real t1212 = t169 * t1107;
-    const real t1213 = t228 * t1127;
-    const real t1214 = t1212 - t1213;
-    const real t1215 = t257 * t1105;
-    const real t1216 = t156 * t1170;
-    const real t1217 = t125 * t1182;
-    const real t1218 = t68 * t1200;
-    const real t1219 = t1217 - t1218;
-    const real t1220 = t1216 + t1219;
-    const real t1221 = t138 * t1176;
-    const real t1222 = t1220 - t1221;
-    const real t1223 = t1215 + t1222;
-    const real t1224 = t182 * t1124;
-    const real t1225 = t1223 - t1224;
-    const real t1226 = t1214 + t1225;
-    B[53] = t1226;
-    const real t1227 = f[2] * t99;
-    const real t1228 = f[1] * t67;
-    const real t1229 = t1227 - t1228;
-    G[0] = t1229;
-    const real t1230 = f[0] * t67;
-    const real t1231 = f[2] * t123;
-    const real t1232 = t1230 - t1231;
-    G[1] = t1232;
-    const real t1233 = f[1] * t123;
-    const real t1234 = f[0] * t99;
-    const real t1235 = t1233 - t1234;
-    G[2] = t1235;
-    const real t1236 = f[5] * t99;
-    const real t1237 = f[2] * t194;
-    const real t1238 = f[1] * t188;
-    const real t1239 = t1237 - t1238;
-    const real t1240 = f[4] * t67;
-    const real t1241 = t1239 - t1240;
-    const real t1242 = t1236 + t1241;
-    G[3] = t1242;
-    const real t1243 = f[3] * t67;
-    const real t1244 = f[0] * t188;
-    const real t1245 = f[2] * t200;
-    const real t1246 = t1244 - t1245;
-    const real t1247 = t1243 + t1246;
-    const real t1248 = f[5] * t123;
-    const real t1249 = t1247 - t1248;
-    G[4] = t1249;
-    const real t1250 = f[4] * t123;
-    const real t1251 = f[1] * t200;
-    const real t1252 = f[0] * t194;
-    const real t1253 = t1251 - t1252;
-    const real t1254 = f[3] * t99;
-    const real t1255 = t1253 - t1254;
-    const real t1256 = t1250 + t1255;
-    G[5] = t1256;
-    const real t1257 = f[2] * t349;
-    const real t1258 = f[1] * t325;
-    const real t1259 = t1257 - t1258;
-    G[6] = t1259;
-    const real t1260 = f[0] * t325;
-    const real t1261 = f[2] * t368;
-    const real t1262 = t1260 - t1261;
-    G[7] = t1262;
-    const real t1263 = f[1] * t368;
-    const real t1264 = f[0] * t349;
-    const real t1265 = t1263 - t1264;
-    G[8] = t1265;
-    const real t1266 = f[5] * t349;
-    const real t1267 = f[2] * t410;
-    const real t1268 = f[1] * t404;
-    const real t1269 = t1267 - t1268;
-    const real t1270 = f[4] * t325;
-    const real t1271 = t1269 - t1270;
-    const real t1272 = t1266 + t1271;
-    G[9] = t1272;
-    const real t1273 = f[3] * t325;
-    const real t1274 = f[0] * t404;
-    const real t1275 = f[2] * t416;
-    const real t1276 = t1274 - t1275;
-    const real t1277 = t1273 + t1276;
-    const real t1278 = f[5] * t368;
-    const real t1279 = t1277 - t1278;
-    G[10] = t1279;
-    const real t1280 = f[4] * t368;
-    const real t1281 = f[1] * t416;
-    const real t1282 = f[0] * t410;
-    const real t1283 = t1281 - t1282;
-    const real t1284 = f[3] * t349;
-    const real t1285 = t1283 - t1284;
-    const real t1286 = t1280 + t1285;
-    G[11] = t1286;
-    const real t1287 = f[2] * t539;
-    const real t1288 = f[1] * t515;
-    const real t1289 = t1287 - t1288;
-    G[12] = t1289;
-    const real t1290 = f[0] * t515;
-    const real t1291 = f[2] * t558;
-    const real t1292 = t1290 - t1291;
-    G[13] = t1292;
-    const real t1293 = f[1] * t558;
-    const real t1294 = f[0] * t539;
-    const real t1295 = t1293 - t1294;
-    G[14] = t1295;
-    const real t1296 = f[5] * t539;
-    const real t1297 = f[2] * t600;
-    const real t1298 = f[1] * t594;
-    const real t1299 = t1297 - t1298;
-    const real t1300 = f[4] * t515;
-    const real t1301 = t1299 - t1300;
-    const real t1302 = t1296 + t1301;
-    G[15] = t1302;
-    const real t1303 = f[3] * t515;
-    const real t1304 = f[0] * t594;
-    const real t1305 = f[2] * t606;
-    const real t1306 = t1304 - t1305;
-    const real t1307 = t1303 + t1306;
-    const real t1308 = f[5] * t558;
-    const real t1309 = t1307 - t1308;
-    G[16] = t1309;
-    const real t1310 = f[4] * t558;
-    const real t1311 = f[1] * t606;
-    const real t1312 = f[0] * t600;
-    const real t1313 = t1311 - t1312;
-    const real t1314 = f[3] * t539;
-    const real t1315 = t1313 - t1314;
-    const real t1316 = t1310 + t1315;
-    G[17] = t1316;
-    const real t1317 = f[2] * t726;
-    const real t1318 = f[1] * t702;
-    const real t1319 = t1317 - t1318;
-    G[18] = t1319;
-    const real t1320 = f[0] * t702;
-    const real t1321 = f[2] * t746;
-    const real t1322 = t1320 - t1321;
-    G[19] = t1322;
-    const real t1323 = f[1] * t746;
-    const real t1324 = f[0] * t726;
-    const real t1325 = t1323 - t1324;
-    G[20] = t1325;
-    const real t1326 = f[5] * t726;
-    const real t1327 = f[2] * t791;
-    const real t1328 = f[1] * t785;
-    const real t1329 = t1327 - t1328;
-    const real t1330 = f[4] * t702;
-    const real t1331 = t1329 - t1330;
-    const real t1332 = t1326 + t1331;
-    G[21] = t1332;
-    const real t1333 = f[3] * t702;
-    const real t1334 = f[0] * t785;
-    const real t1335 = f[2] * t797;
-    const real t1336 = t1334 - t1335;
-    const real t1337 = t1333 + t1336;
-    const real t1338 = f[5] * t746;
-    const real t1339 = t1337 - t1338;
-    G[22] = t1339;
-    const real t1340 = f[4] * t746;
-    const real t1341 = f[1] * t797;
-    const real t1342 = f[0] * t791;
-    const real t1343 = t1341 - t1342;
-    const real t1344 = f[3] * t726;
-    const real t1345 = t1343 - t1344;
-    const real t1346 = t1340 + t1345;
-    G[23] = t1346;
-    const real t1347 = f[2] * t916;
-    const real t1348 = f[1] * t892;
-    const real t1349 = t1347 - t1348;
-    G[24] = t1349;
-    const real t1350 = f[0] * t892;
-    const real t1351 = f[2] * t935;
-    const real t1352 = t1350 - t1351;
-    G[25] = t1352;
-    const real t1353 = f[1] * t935;
-    const real t1354 = f[0] * t916;
-    const real t1355 = t1353 - t1354;
-    G[26] = t1355;
-    const real t1356 = f[5] * t916;
-    const real t1357 = f[2] * t981;
-    const real t1358 = f[1] * t975;
-    const real t1359 = t1357 - t1358;
-    const real t1360 = f[4] * t892;
-    const real t1361 = t1359 - t1360;
-    const real t1362 = t1356 + t1361;
-    G[27] = t1362;
-    const real t1363 = f[3] * t892;
-    const real t1364 = f[0] * t975;
-    const real t1365 = f[2] * t987;
-    const real t1366 = t1364 - t1365;
-    const real t1367 = t1363 + t1366;
-    const real t1368 = f[5] * t935;
-    const real t1369 = t1367 - t1368;
-    G[28] = t1369;
-    const real t1370 = f[4] * t935;
-    const real t1371 = f[1] * t987;
-    const real t1372 = f[0] * t981;
-    const real t1373 = t1371 - t1372;
-    const real t1374 = f[3] * t916;
-    const real t1375 = t1373 - t1374;
-    const real t1376 = t1370 + t1375;
-    G[29] = t1376;
-    const real t1377 = f[2] * t1105;
-    const real t1378 = f[1] * t1081;
-    const real t1379 = t1377 - t1378;
-    G[30] = t1379;
-    const real t1380 = f[0] * t1081;
-    const real t1381 = f[2] * t1124;
-    const real t1382 = t1380 - t1381;
-    G[31] = t1382;
-    const real t1383 = f[1] * t1124;
-    const real t1384 = f[0] * t1105;
-    const real t1385 = t1383 - t1384;
-    G[32] = t1385;
-    const real t1386 = f[5] * t1105;
-    const real t1387 = f[2] * t1170;
-    const real t1388 = f[1] * t1164;
-    const real t1389 = t1387 - t1388;
-    const real t1390 = f[4] * t1081;
-    const real t1391 = t1389 - t1390;
-    const real t1392 = t1386 + t1391;
-    G[33] = t1392;
-    const real t1393 = f[3] * t1081;
-    const real t1394 = f[0] * t1164;
-    const real t1395 = f[2] * t1176;
-    const real t1396 = t1394 - t1395;
-    const real t1397 = t1393 + t1396;
-    const real t1398 = f[5] * t1124;
-    const real t1399 = t1397 - t1398;
-    G[34] = t1399;
-    const real t1400 = f[4] * t1124;
-    const real t1401 = f[1] * t1176;
-    const real t1402 = f[0] * t1170;
-    const real t1403 = t1401 - t1402;
-    const real t1404 = f[3] * t1105;
-    const real t1405 = t1403 - t1404;
-    const real t1406 = t1400 + t1405;
-    G[35] = t1406;
-    const real t1407 = J[0] * scale[0];
-    const real t1408 = t1407 - laws[0];
-    W[0] = t1408;
-    const real t1409 = -laws[1];
-    W[1] = t1409;
-    const real t1410 = -laws[2];
-    W[2] = t1410;
-    const real t1411 = -laws[3];
-    W[3] = t1411;
-    const real t1412 = -laws[4];
-    W[4] = t1412;
-    const real t1413 = -laws[5];
-    W[5] = t1413;
-    const real t1414 = -laws[6];
-    W[6] = t1414;
-    const real t1415 = J[1] * scale[0];
-    const real t1416 = t1415 - laws[7];
-    W[7] = t1416;
-    const real t1417 = -laws[8];
-    W[8] = t1417;
-    const real t1418 = -laws[9];
-    W[9] = t1418;
-    const real t1419 = -laws[10];
-    W[10] = t1419;
-    const real t1420 = -laws[11];
-    W[11] = t1420;
-    const real t1421 = -laws[12];
-    W[12] = t1421;
-    const real t1422 = -laws[13];
-    W[13] = t1422;
-    const real t1423 = J[2] * scale[0];
-    const real t1424 = t1423 - laws[14];
-    W[14] = t1424;
-    const real t1425 = -laws[15];
-    W[15] = t1425;
-    const real t1426 = -laws[16];
-    W[16] = t1426;
-    const real t1427 = -laws[17];
-    W[17] = t1427;
-    const real t1428 = -laws[18];
-    W[18] = t1428;
-    const real t1429 = -laws[19];
-    W[19] = t1429;
-    const real t1430 = -laws[20];
-    W[20] = t1430;
-    const real t1431 = J[3] * scale[0];
-    const real t1432 = t1431 - laws[21];
-    W[21] = t1432;
-    const real t1433 = -laws[22];
-    W[22] = t1433;
-    const real t1434 = -laws[23];
-    W[23] = t1434;
-    const real t1435 = -laws[24];
-    W[24] = t1435;
-    const real t1436 = -laws[25];
-    W[25] = t1436;
-    const real t1437 = -laws[26];
-    W[26] = t1437;
-    const real t1438 = -laws[27];
-    W[27] = t1438;
-    const real t1439 = J[4] * scale[0];
-    const real t1440 = t1439 - laws[28];
-    W[28] = t1440;
-    const real t1441 = -laws[29];
-    W[29] = t1441;
-    const real t1442 = -laws[30];
-    W[30] = t1442;
-    const real t1443 = -laws[31];
-    W[31] = t1443;
-    const real t1444 = -laws[32];
-    W[32] = t1444;
-    const real t1445 = -laws[33];
-    W[33] = t1445;
-    const real t1446 = -laws[34];
-    W[34] = t1446;
-    const real t1447 = J[5] * scale[0];
-    const real t1448 = t1447 - laws[35];
-    W[35] = t1448;
-    H[0] = 1.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 1.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 0.0;
-    H[14] = 1.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 0.0;
-    H[18] = 0.0;
-    H[19] = 0.0;
-    H[20] = 0.0;
-    H[21] = 1.0;
-    H[22] = 0.0;
-    H[23] = 0.0;
-    H[24] = 0.0;
-    H[25] = 0.0;
-    H[26] = 0.0;
-    H[27] = 0.0;
-    H[28] = 1.0;
-    H[29] = 0.0;
-    H[30] = 0.0;
-    H[31] = 0.0;
-    H[32] = 0.0;
-    H[33] = 0.0;
-    H[34] = 0.0;
-    H[35] = 1.0;
-    return 0;
+  (void)p;
+  (void)sq;
+  real t0 = q[6] * q[6];
+  real t1 = q[5] * q[5];
+  real t3 = q[4] * q[4];
+  real t6 = t0 + (t1 + (q[3] * q[3] + t3));
+  real t7 = 1.0 / t6;
+  real t8 = t7 * 2.0;
+  real t9 = q[5] * q[6];
+  real t10 = q[3] * q[4];
+  real t11 = t9 + t10;
+  real t12 = t8 * t11;
+  real t15 = q[6] * along[4] + q[4] * along[6];
+  real t18 = q[5] * along[3] + q[3] * along[5];
+  real t21 = q[4] * q[6];
+  real t22 = q[3] * q[5];
+  real t23 = t21 - t22;
+  real t24 = q[4] * along[4];
+  real t25 = t24 + t24;
+  real t26 = q[3] * along[3];
+  real t29 = q[5] * along[5];
+  real t30 = t29 + t29;
+  real t32 = q[6] * along[6];
+  real t33 = t32 + t32;
+  real t37 = 2.0 * (t7 * (t25 + (t26 + t26) + t30 + t33) / t6);
+  real t41 = q[4] * q[5];
+  real t42 = q[3] * q[6];
+  real t43 = t41 - t42;
+  real t44 = t8 * t43;
+  real t45 = t1 + t0;
+  real t51 = t0 + t3;
+  real t53 = 1.0 - t8 * t51;
+  real t56 = q[6] * along[3] + q[3] * along[6];
+  real t59 = q[5] * along[4] + q[4] * along[5];
+  real t62 = t41 + t42;
+  real t67 = t12 * (t8 * (t15 - t18) - t23 * t37) + (t44 * (t45 * t37 - t8 * (t30 + t33)) + t53 *
+    (t8 * (t56 + t59) - t62 * t37));
+  real t68 = motion[1] - u[4];
+  real t70 = t8 * t23;
+  real t71 = t1 + t3;
+  real t78 = 1.0 - t45 * t8;
+  real t81 = t22 + t21;
+  real t85 = t8 * t62;
+  real t88 = q[6] * along[5] + q[5] * along[6];
+  real t91 = q[4] * along[3] + q[3] * along[4];
+  real t94 = t9 - t10;
+  real t99 = t70 * (t71 * t37 - t8 * (t25 + t30)) + (t78 * (t8 * (t15 + t18) - t81 * t37) + t85 *
+    (t8 * (t88 - t91) - t94 * t37));
+  real t100 = motion[2] - u[5];
+  real t102 = t67 * t68 - t99 * t100;
+  B[0] = t102;
+  real t104 = 1.0 - t8 * t71;
+  real t110 = t8 * t81;
+  real t116 = t8 * t94;
+  real t123 = t104 * (t8 * (t91 + t88) - t11 * t37) + (t110 * (t8 * (t59 - t56) - t43 * t37) + t116
+    * (t51 * t37 - t8 * (t25 + t33)));
+  real t125 = motion[0] - u[3];
+  real t127 = t123 * t100 - t67 * t125;
+  B[1] = t127;
+  real t130 = t99 * t125 - t123 * t68;
+  B[2] = t130;
+  real t138 = motion[4] + (u[5] * t125 - u[3] * t100 - s[4]);
+  real t144 = motion[5] + (u[3] * t68 - u[4] * t125 - s[5]);
+  B[3] = u[5] * t127 - u[4] * t130 + (t67 * t138 - t99 * t144);
+  real t156 = motion[3] + (u[4] * t100 - u[5] * t68 - s[3]);
+  B[4] = u[3] * t130 - u[5] * t102 + (t123 * t144 - t67 * t156);
+  B[5] = u[4] * t102 - u[3] * t127 + (t99 * t156 - t123 * t138);
+  real t167 = u[2] * 2.0;
+  real t169 = u[1] * 2.0;
+  real t182 = motion[7] + (2.0 * (u[2] * t125) - 2.0 * (u[0] * t100) - (u[0] * u[5] - u[2] * u[3] +
+    s[1]));
+  real t188 = t110 * along[0] + t116 * along[1] + t104 * along[2];
+  real t194 = t44 * along[0] + t53 * along[1] + t12 * along[2];
+  real t200 = t78 * along[0] + t85 * along[1] + t70 * along[2];
+  real t202 = t194 * t125 - t200 * t68;
+  real t206 = t200 * t100 - t188 * t125;
+  real t223 = motion[8] + (2.0 * (u[0] * t68) - 2.0 * (u[1] * t125) - (u[1] * u[3] - u[0] * u[4] +
+    s[2]));
+  B[6] = t127 * t167 - t130 * t169 + (scale[0] + (t67 * t182 + (t188 * t138 + (t68 * t202 - t100 *
+    t206) - t194 * t144) - t99 * t223));
+  real t228 = u[0] * 2.0;
+  real t232 = u[5] * rate[0];
+  real t235 = rate[0] * t100;
+  real t236 = 2.0 * t235;
+  real t239 = t188 * t68 - t194 * t100;
+  real t257 = motion[6] + (2.0 * (u[1] * t100) - 2.0 * (u[2] * t68) - (u[2] * u[4] - u[1] * u[5] +
+    s[0]));
+  B[7] = t130 * t228 - t102 * t167 + (t232 + (t123 * t223 + (t200 * t144 + (t236 + (t100 * t239 -
+    t125 * t202) - t188 * t156) - t67 * t257)));
+  real t271 = rate[0] * t68;
+  real t272 = 2.0 * t271;
+  real t280 = u[4] * rate[0];
+  B[8] = t102 * t169 - t127 * t228 + (t99 * t257 + (t194 * t156 + (t125 * t206 - t68 * t239 - t272)
+    - t200 * t138) - t123 * t182 - t280);
+  real t285 = q[6] * along[11] + q[4] * along[13];
+  real t288 = q[5] * along[10] + q[3] * along[12];
+  real t291 = q[4] * along[11];
+  real t292 = t291 + t291;
+  real t293 = q[3] * along[10];
+  real t296 = q[5] * along[12];
+  real t297 = t296 + t296;
+  real t299 = q[6] * along[13];
+  real t300 = t299 + t299;
+  real t304 = 2.0 * (t7 * (t292 + (t293 + t293) + t297 + t300) / t6);
+  real t315 = q[6] * along[10] + q[3] * along[13];
+  real t318 = q[5] * along[11] + q[4] * along[12];
+  real t325 = t12 * (t8 * (t285 - t288) - t23 * t304) + (t44 * (t45 * t304 - t8 * (t297 + t300)) +
+    t53 * (t8 * (t315 + t318) - t62 * t304));
+  real t339 = q[6] * along[12] + q[5] * along[13];
+  real t342 = q[4] * along[10] + q[3] * along[11];
+  real t349 = t70 * (t71 * t304 - t8 * (t292 + t297)) + (t78 * (t8 * (t285 + t288) - t81 * t304) +
+    t85 * (t8 * (t339 - t342) - t94 * t304));
+  real t351 = t68 * t325 - t100 * t349;
+  B[9] = t351;
+  real t368 = t104 * (t8 * (t342 + t339) - t11 * t304) + (t110 * (t8 * (t318 - t315) - t43 * t304) +
+    t116 * (t51 * t304 - t8 * (t292 + t300)));
+  real t371 = t100 * t368 - t125 * t325;
+  B[10] = t371;
+  real t374 = t125 * t349 - t68 * t368;
+  B[11] = t374;
+  B[12] = u[5] * t371 - u[4] * t374 + (t138 * t325 - t144 * t349);
+  B[13] = u[3] * t374 - u[5] * t351 + (t144 * t368 - t156 * t325);
+  B[14] = u[4] * t351 - u[3] * t371 + (t156 * t349 - t138 * t368);
+  real t404 = t110 * along[7] + t116 * along[8] + t104 * along[9];
+  real t410 = t44 * along[7] + t53 * along[8] + t12 * along[9];
+  real t416 = t78 * along[7] + t85 * along[8] + t70 * along[9];
+  real t418 = t125 * t410 - t68 * t416;
+  real t422 = t100 * t416 - t125 * t404;
+  B[15] = t167 * t371 - t169 * t374 + (t182 * t325 + (t138 * t404 + (t68 * t418 - t100 * t422 -
+    t236) - t144 * t410) - t223 * t349 - t232);
+  real t441 = t68 * t404 - t100 * t410;
+  B[16] = t228 * t374 - t167 * t351 + (scale[0] + (t223 * t368 + (t144 * t416 + (t100 * t441 - t125
+    * t418 - t156 * t404) - t257 * t325)));
+  real t456 = u[3] * rate[0];
+  real t459 = rate[0] * t125;
+  real t460 = 2.0 * t459;
+  B[17] = t169 * t351 - t228 * t371 + (t456 + (t257 * t349 + (t156 * t410 + (t460 + (t125 * t422 -
+    t68 * t441)) - t138 * t416) - t182 * t368));
+  real t475 = q[6] * along[18] + q[4] * along[20];
+  real t478 = q[5] * along[17] + q[3] * along[19];
+  real t481 = q[4] * along[18];
+  real t482 = t481 + t481;
+  real t483 = q[3] * along[17];
+  real t486 = q[5] * along[19];
+  real t487 = t486 + t486;
+  real t489 = q[6] * along[20];
+  real t490 = t489 + t489;
+  real t494 = 2.0 * (t7 * (t482 + (t483 + t483) + t487 + t490) / t6);
+  real t505 = q[6] * along[17] + q[3] * along[20];
+  real t508 = q[5] * along[18] + q[4] * along[19];
+  real t515 = t12 * (t8 * (t475 - t478) - t23 * t494) + (t44 * (t45 * t494 - t8 * (t487 + t490)) +
+    t53 * (t8 * (t505 + t508) - t62 * t494));
+  real t529 = q[6] * along[19] + q[5] * along[20];
+  real t532 = q[4] * along[17] + q[3] * along[18];
+  real t539 = t70 * (t71 * t494 - t8 * (t482 + t487)) + (t78 * (t8 * (t475 + t478) - t81 * t494) +
+    t85 * (t8 * (t529 - t532) - t94 * t494));
+  real t541 = t68 * t515 - t100 * t539;
+  B[18] = t541;
+  real t558 = t104 * (t8 * (t532 + t529) - t11 * t494) + (t110 * (t8 * (t508 - t505) - t43 * t494) +
+    t116 * (t51 * t494 - t8 * (t482 + t490)));
+  real t561 = t100 * t558 - t125 * t515;
+  B[19] = t561;
+  real t564 = t125 * t539 - t68 * t558;
+  B[20] = t564;
+  B[21] = u[5] * t561 - u[4] * t564 + (t138 * t515 - t144 * t539);
+  B[22] = u[3] * t564 - u[5] * t541 + (t144 * t558 - t156 * t515);
+  B[23] = u[4] * t541 - u[3] * t561 + (t156 * t539 - t138 * t558);
+  real t594 = t110 * along[14] + t116 * along[15] + t104 * along[16];
+  real t600 = t44 * along[14] + t53 * along[15] + t12 * along[16];
+  real t606 = t78 * along[14] + t85 * along[15] + t70 * along[16];
+  real t608 = t125 * t600 - t68 * t606;
+  real t612 = t100 * t606 - t125 * t594;
+  B[24] = t167 * t561 - t169 * t564 + (t280 + (t182 * t515 + (t138 * t594 + (t272 + (t68 * t608 -
+    t100 * t612)) - t144 * t600) - t223 * t539));
+  real t631 = t68 * t594 - t100 * t600;
+  B[25] = t228 * t564 - t167 * t541 + (t223 * t558 + (t144 * t606 + (t100 * t631 - t125 * t608 -
+    t460 - t156 * t594) - t257 * t515) - t456);
+  B[26] = t169 * t541 - t228 * t561 + (scale[0] + (t257 * t539 + (t156 * t600 + (t125 * t612 - t68 *
+    t631) - t138 * t606) - t182 * t558));
+  real t662 = q[6] * along[25] + q[4] * along[27];
+  real t665 = q[5] * along[24] + q[3] * along[26];
+  real t668 = q[4] * along[25];
+  real t669 = t668 + t668;
+  real t670 = q[3] * along[24];
+  real t673 = q[5] * along[26];
+  real t674 = t673 + t673;
+  real t676 = q[6] * along[27];
+  real t677 = t676 + t676;
+  real t681 = 2.0 * (t7 * (t669 + (t670 + t670) + t674 + t677) / t6);
+  real t692 = q[6] * along[24] + q[3] * along[27];
+  real t695 = q[5] * along[25] + q[4] * along[26];
+  real t702 = t12 * (t8 * (t662 - t665) - t23 * t681) + (t44 * (t45 * t681 - t8 * (t674 + t677)) +
+    t53 * (t8 * (t692 + t695) - t62 * t681));
+  real t716 = q[6] * along[26] + q[5] * along[27];
+  real t719 = q[4] * along[24] + q[3] * along[25];
+  real t726 = t70 * (t71 * t681 - t8 * (t669 + t674)) + (t78 * (t8 * (t662 + t665) - t81 * t681) +
+    t85 * (t8 * (t716 - t719) - t94 * t681));
+  real t728 = t68 * t702 - t100 * t726;
+  B[27] = rate[0] + t728;
+  real t746 = t104 * (t8 * (t719 + t716) - t11 * t681) + (t110 * (t8 * (t695 - t692) - t43 * t681) +
+    t116 * (t51 * t681 - t8 * (t669 + t677)));
+  real t749 = t100 * t746 - t125 * t702;
+  B[28] = t749;
+  real t752 = t125 * t726 - t68 * t746;
+  B[29] = t752;
+  B[30] = u[5] * t749 - u[4] * t752 + (scale[0] + (t138 * t702 - t144 * t726));
+  B[31] = u[3] * t752 - u[5] * t728 + (t144 * t746 + (t235 - t156 * t702));
+  B[32] = u[4] * t728 - u[3] * t749 + (t156 * t726 - t271 - t138 * t746);
+  real t785 = t110 * along[21] + t116 * along[22] + t104 * along[23];
+  real t791 = t44 * along[21] + t53 * along[22] + t12 * along[23];
+  real t797 = t78 * along[21] + t85 * along[22] + t70 * along[23];
+  real t799 = t125 * t791 - t68 * t797;
+  real t803 = t100 * t797 - t125 * t785;
+  B[33] = t167 * t749 - t169 * t752 + (t182 * t702 + (t138 * t785 + (t68 * t799 - t100 * t803) -
+    t144 * t791) - t223 * t726);
+  real t820 = t68 * t785 - t100 * t791;
+  real t830 = u[2] * rate[0];
+  B[34] = t228 * t752 - t167 * t728 + (t223 * t746 + (t144 * t797 + (t100 * t820 - t125 * t799 -
+    t156 * t785) - t257 * t702) - t830);
+  real t836 = u[1] * rate[0];
+  B[35] = t169 * t728 - t228 * t749 + (t836 + (t257 * t726 + (t156 * t791 + (t125 * t803 - t68 *
+    t820) - t138 * t797) - t182 * t746));
+  real t852 = q[6] * along[32] + q[4] * along[34];
+  real t855 = q[5] * along[31] + q[3] * along[33];
+  real t858 = q[4] * along[32];
+  real t859 = t858 + t858;
+  real t860 = q[3] * along[31];
+  real t863 = q[5] * along[33];
+  real t864 = t863 + t863;
+  real t866 = q[6] * along[34];
+  real t867 = t866 + t866;
+  real t871 = 2.0 * (t7 * (t859 + (t860 + t860) + t864 + t867) / t6);
+  real t882 = q[6] * along[31] + q[3] * along[34];
+  real t885 = q[5] * along[32] + q[4] * along[33];
+  real t892 = t12 * (t8 * (t852 - t855) - t23 * t871) + (t44 * (t45 * t871 - t8 * (t864 + t867)) +
+    t53 * (t8 * (t882 + t885) - t62 * t871));
+  real t906 = q[6] * along[33] + q[5] * along[34];
+  real t909 = q[4] * along[31] + q[3] * along[32];
+  real t916 = t70 * (t71 * t871 - t8 * (t859 + t864)) + (t78 * (t8 * (t852 + t855) - t81 * t871) +
+    t85 * (t8 * (t906 - t909) - t94 * t871));
+  real t918 = t68 * t892 - t100 * t916;
+  B[36] = t918;
+  real t935 = t104 * (t8 * (t909 + t906) - t11 * t871) + (t110 * (t8 * (t885 - t882) - t43 * t871) +
+    t116 * (t51 * t871 - t8 * (t859 + t867)));
+  real t938 = t100 * t935 - t125 * t892;
+  B[37] = rate[0] + t938;
+  real t942 = t125 * t916 - t68 * t935;
+  B[38] = t942;
+  B[39] = u[5] * t938 - u[4] * t942 + (t138 * t892 - t235 - t144 * t916);
+  B[40] = u[3] * t942 - u[5] * t918 + (scale[0] + (t144 * t935 - t156 * t892));
+  B[41] = u[4] * t918 - u[3] * t938 + (t459 + t156 * t916 - t138 * t935);
+  real t975 = t110 * along[28] + t116 * along[29] + t104 * along[30];
+  real t981 = t44 * along[28] + t53 * along[29] + t12 * along[30];
+  real t987 = t78 * along[28] + t85 * along[29] + t70 * along[30];
+  real t989 = t125 * t981 - t68 * t987;
+  real t993 = t100 * t987 - t125 * t975;
+  B[42] = t167 * t938 - t169 * t942 + (t830 + (t182 * t892 + (t138 * t975 + (t68 * t989 - t100 *
+    t993) - t144 * t981) - t223 * t916));
+  real t1011 = t68 * t975 - t100 * t981;
+  B[43] = t228 * t942 - t167 * t918 + (t223 * t935 + (t144 * t987 + (t100 * t1011 - t125 * t989 -
+    t156 * t975) - t257 * t892));
+  real t1036 = u[0] * rate[0];
+  B[44] = t169 * t918 - t228 * t938 + (t257 * t916 + (t156 * t981 + (t125 * t993 - t68 * t1011) -
+    t138 * t987) - t182 * t935 - t1036);
+  real t1041 = q[6] * along[39] + q[4] * along[41];
+  real t1044 = q[5] * along[38] + q[3] * along[40];
+  real t1047 = q[4] * along[39];
+  real t1048 = t1047 + t1047;
+  real t1049 = q[3] * along[38];
+  real t1052 = q[5] * along[40];
+  real t1053 = t1052 + t1052;
+  real t1055 = q[6] * along[41];
+  real t1056 = t1055 + t1055;
+  real t1060 = 2.0 * (t7 * (t1048 + (t1049 + t1049) + t1053 + t1056) / t6);
+  real t1071 = q[6] * along[38] + q[3] * along[41];
+  real t1074 = q[5] * along[39] + q[4] * along[40];
+  real t1081 = t12 * (t8 * (t1041 - t1044) - t23 * t1060) + (t44 * (t45 * t1060 - t8 * (t1053 +
+    t1056)) + t53 * (t8 * (t1071 + t1074) - t62 * t1060));
+  real t1095 = q[6] * along[40] + q[5] * along[41];
+  real t1098 = q[4] * along[38] + q[3] * along[39];
+  real t1105 = t70 * (t71 * t1060 - t8 * (t1048 + t1053)) + (t78 * (t8 * (t1041 + t1044) - t81 *
+    t1060) + t85 * (t8 * (t1095 - t1098) - t94 * t1060));
+  real t1107 = t68 * t1081 - t100 * t1105;
+  B[45] = t1107;
+  real t1124 = t104 * (t8 * (t1098 + t1095) - t11 * t1060) + (t110 * (t8 * (t1074 - t1071) - t43 *
+    t1060) + t116 * (t51 * t1060 - t8 * (t1048 + t1056)));
+  real t1127 = t100 * t1124 - t125 * t1081;
+  B[46] = t1127;
+  real t1130 = t125 * t1105 - t68 * t1124;
+  B[47] = rate[0] + t1130;
+  B[48] = u[5] * t1127 - u[4] * t1130 + (t271 + t138 * t1081 - t144 * t1105);
+  B[49] = u[3] * t1130 - u[5] * t1107 + (t144 * t1124 - (t459 + t156 * t1081));
+  B[50] = u[4] * t1107 - u[3] * t1127 + (scale[0] + (t156 * t1105 - t138 * t1124));
+  real t1164 = t110 * along[35] + t116 * along[36] + t104 * along[37];
+  real t1170 = t44 * along[35] + t53 * along[36] + t12 * along[37];
+  real t1176 = t78 * along[35] + t85 * along[36] + t70 * along[37];
+  real t1178 = t125 * t1170 - t68 * t1176;
+  real t1182 = t100 * t1176 - t125 * t1164;
+  B[51] = t167 * t1127 - t169 * t1130 + (t182 * t1081 + (t138 * t1164 + (t68 * t1178 - t100 * t1182)
+    - t144 * t1170) - t223 * t1105 - t836);
+  real t1200 = t68 * t1164 - t100 * t1170;
+  B[52] = t228 * t1130 - t167 * t1107 + (t1036 + (t223 * t1124 + (t144 * t1176 + (t100 * t1200 -
+    t125 * t1178 - t156 * t1164) - t257 * t1081)));
+  B[53] = t169 * t1107 - t228 * t1127 + (t257 * t1105 + (t156 * t1170 + (t125 * t1182 - t68 * t1200)
+    - t138 * t1176) - t182 * t1124);
+  G[0] = f[2] * t99 - f[1] * t67;
+  G[1] = f[0] * t67 - f[2] * t123;
+  G[2] = f[1] * t123 - f[0] * t99;
+  G[3] = f[5] * t99 + (f[2] * t194 - f[1] * t188 - f[4] * t67);
+  G[4] = f[3] * t67 + (f[0] * t188 - f[2] * t200) - f[5] * t123;
+  G[5] = f[4] * t123 + (f[1] * t200 - f[0] * t194 - f[3] * t99);
+  G[6] = f[2] * t349 - f[1] * t325;
+  G[7] = f[0] * t325 - f[2] * t368;
+  G[8] = f[1] * t368 - f[0] * t349;
+  G[9] = f[5] * t349 + (f[2] * t410 - f[1] * t404 - f[4] * t325);
+  G[10] = f[3] * t325 + (f[0] * t404 - f[2] * t416) - f[5] * t368;
+  G[11] = f[4] * t368 + (f[1] * t416 - f[0] * t410 - f[3] * t349);
+  G[12] = f[2] * t539 - f[1] * t515;
+  G[13] = f[0] * t515 - f[2] * t558;
+  G[14] = f[1] * t558 - f[0] * t539;
+  G[15] = f[5] * t539 + (f[2] * t600 - f[1] * t594 - f[4] * t515);
+  G[16] = f[3] * t515 + (f[0] * t594 - f[2] * t606) - f[5] * t558;
+  G[17] = f[4] * t558 + (f[1] * t606 - f[0] * t600 - f[3] * t539);
+  G[18] = f[2] * t726 - f[1] * t702;
+  G[19] = f[0] * t702 - f[2] * t746;
+  G[20] = f[1] * t746 - f[0] * t726;
+  G[21] = f[5] * t726 + (f[2] * t791 - f[1] * t785 - f[4] * t702);
+  G[22] = f[3] * t702 + (f[0] * t785 - f[2] * t797) - f[5] * t746;
+  G[23] = f[4] * t746 + (f[1] * t797 - f[0] * t791 - f[3] * t726);
+  G[24] = f[2] * t916 - f[1] * t892;
+  G[25] = f[0] * t892 - f[2] * t935;
+  G[26] = f[1] * t935 - f[0] * t916;
+  G[27] = f[5] * t916 + (f[2] * t981 - f[1] * t975 - f[4] * t892);
+  G[28] = f[3] * t892 + (f[0] * t975 - f[2] * t987) - f[5] * t935;
+  G[29] = f[4] * t935 + (f[1] * t987 - f[0] * t981 - f[3] * t916);
+  G[30] = f[2] * t1105 - f[1] * t1081;
+  G[31] = f[0] * t1081 - f[2] * t1124;
+  G[32] = f[1] * t1124 - f[0] * t1105;
+  G[33] = f[5] * t1105 + (f[2] * t1170 - f[1] * t1164 - f[4] * t1081);
+  G[34] = f[3] * t1081 + (f[0] * t1164 - f[2] * t1176) - f[5] * t1124;
+  G[35] = f[4] * t1124 + (f[1] * t1176 - f[0] * t1170 - f[3] * t1105);
+  W[0] = J[0] * scale[0] - laws[0];
+  W[1] = -laws[1];
+  W[2] = -laws[2];
+  W[3] = -laws[3];
+  W[4] = -laws[4];
+  W[5] = -laws[5];
+  W[6] = -laws[6];
+  W[7] = J[1] * scale[0] - laws[7];
+  W[8] = -laws[8];
+  W[9] = -laws[9];
+  W[10] = -laws[10];
+  W[11] = -laws[11];
+  W[12] = -laws[12];
+  W[13] = -laws[13];
+  W[14] = J[2] * scale[0] - laws[14];
+  W[15] = -laws[15];
+  W[16] = -laws[16];
+  W[17] = -laws[17];
+  W[18] = -laws[18];
+  W[19] = -laws[19];
+  W[20] = -laws[20];
+  W[21] = J[3] * scale[0] - laws[21];
+  W[22] = -laws[22];
+  W[23] = -laws[23];
+  W[24] = -laws[24];
+  W[25] = -laws[25];
+  W[26] = -laws[26];
+  W[27] = -laws[27];
+  W[28] = J[4] * scale[0] - laws[28];
+  W[29] = -laws[29];
+  W[30] = -laws[30];
+  W[31] = -laws[31];
+  W[32] = -laws[32];
+  W[33] = -laws[33];
+  W[34] = -laws[34];
+  W[35] = J[5] * scale[0] - laws[35];
+  H[0] = 1.0;
+  H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = 0.0;
+  H[7] = 1.0;
+  H[8] = H[9] = H[10] = H[11] = H[12] = H[13] = 0.0;
+  H[14] = 1.0;
+  H[15] = H[16] = H[17] = H[18] = H[19] = H[20] = 0.0;
+  H[21] = 1.0;
+  H[22] = H[23] = H[24] = H[25] = H[26] = H[27] = 0.0;
+  H[28] = 1.0;
+  H[29] = H[30] = H[31] = H[32] = H[33] = H[34] = 0.0;
+  H[35] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_free_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_free_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_free_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"laws", 36, "", 0, 0},
-    {"along", 42, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_free_directions_outputs[] = {
-    {"B", 54, "", 0, 0},
-    {"G", 36, "", 0, 0},
-    {"W", 36, "", 0, 0},
-    {"H", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_free_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_free_q_names[] = {
     "x", "y", "z", "qw", "qx", "qy", "qz",
@@ -4320,121 +1314,76 @@ static const char *const mstmm_hinge_free_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_free_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_free_hinge,
-        .call = mstmm_hinge_free_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_free_hinge_inputs,
-        .outputs = mstmm_hinge_free_hinge_outputs,
-        .ir_hash = "7b7dde5b751875e75a0e31db6e1f581508a2d3ba893eaaf752012272f3474c07",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_free_forward,
-        .call = mstmm_hinge_free_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_free_forward_inputs,
-        .outputs = mstmm_hinge_free_forward_outputs,
-        .ir_hash = "09e8103e7f70b320021284642fa5de7d8844158550fb96bb088f412664a9f4ea",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_free_condense,
-        .call = mstmm_hinge_free_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_free_condense_inputs,
-        .outputs = mstmm_hinge_free_condense_outputs,
-        .ir_hash = "1b054bbbc373f72a4f28cb5d5392d1dc192747323ec6080bd051171d917e9101",
-        .n_guards = 18,
-        .guards = mstmm_hinge_free_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_free_recover,
-        .call = mstmm_hinge_free_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_free_recover_inputs,
-        .outputs = mstmm_hinge_free_recover_outputs,
-        .ir_hash = "257bdfa5a5fc5cad8c7887121ffc61c67d566c74911859aeacf58225606f3f46",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_free_hinge_slope,
-        .call = mstmm_hinge_free_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_free_hinge_slope_inputs,
-        .outputs = mstmm_hinge_free_hinge_slope_outputs,
-        .ir_hash = "5e6423f8b0b3ace9fe5e808709416aa2612a5d6f61b2282d10dabfc1bf6abfe5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_free_rates_by_coordinates,
-        .call = mstmm_hinge_free_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_free_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_free_rates_by_coordinates_outputs,
-        .ir_hash = "aad784b0adbce085e0d6b4fe44b264392bebcb9d1df6f550d17583290519ad60",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_free_rates_by_speeds,
-        .call = mstmm_hinge_free_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_free_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_free_rates_by_speeds_outputs,
-        .ir_hash = "b6714a2e6e0d166da24621885a5604769f3dcd6bdf169b527e811e31ee2ae126",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_free_body_motion,
-        .call = mstmm_hinge_free_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_free_body_motion_inputs,
-        .outputs = mstmm_hinge_free_body_motion_outputs,
-        .ir_hash = "1070516cdb03f9582f347f36abb5b24fcbeed6036aef048363a51ab666d706ca",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_free_directions,
-        .call = mstmm_hinge_free_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_free_directions_inputs,
-        .outputs = mstmm_hinge_free_directions_outputs,
-        .ir_hash = "769df7a6e1787bf2a2e0c1ebe472d20854f178f9b8a8e6a148822a7c074405ad",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_free_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0, 0},
+    {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m",
+    0, 0}, {"H", 36, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 7, "", 0, 0}},
+    "236bb354a9148a32e5794096afb5fa0a2f3f740882e0d44da5c50df8113b90d2", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_free_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "", 0,
+    0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}, {"s", 6,
+    "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m",
+    0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 7, "", 0, 0}},
+    "72af608c3253ac36babead2d5967145b1fc8ebad6c9292cbe4a0a716e31ca8cf", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_free_condense), 8, 4, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 7, "", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 6, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"G", 36, "", 0, 0}, {"g", 6, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "10c1ca36ddcf797bc55adeb8dbde28ad480c3a31e5f66b8a1c91cb78b0fd6d6d", 18, (const
+    mstmm_guard[]){{1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 6 of 6 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_free_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "", 0,
+    0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 7, "", 0, 0}, {"G", 36, "", 0, 0}, {"g", 6,
+    "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 6, "", 0, 0}, {"delta", 6,
+    "", 0, 0}}, "d4b1d297c8b90566e6e60decb6a56d42f6ed9c52de003d09f8c6edce6c053be7", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_free_hinge_slope), 5, 7, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}, {"d_q", 7, "", 0, 0}, {"d_u", 6, "", 0, 0}},
+    (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 36, "", 0, 0}, {"d_v",
+    3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot", 7, "",
+    0, 0}}, "e75c77cdc7b869db9b78c9f21ee173c67ee3ae94a60b63aa21b9b0c657216b80", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_free_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 49, "", 0, 0}},
+    "1ec8c44b0da9a14203197bc28fc4897483a900133addd63bd1369ef8a38c4332", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_free_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 42, "", 0, 0}},
+    "7e53028cdfee8a22002484610c52786216dd78ec32515b6fd160c5ea76416cab", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_free_body_motion), 7, 10, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 6, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 7, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "5672f78863f8b04d57aae0c12867e6d6aba4764c71199bd2e114f0334f9562c5", 0,
+    NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_free_directions), 12, 4, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}, {"s", 6, "", 0, 0}, {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0}, {"J", 6, "kg*m2 or kg", 0, 0}, {"laws", 36, "", 0, 0}, {"along", 42,
+    "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1, "1/s", 0, 0}}, (const
+    mstmm_port[]){{"B", 54, "", 0, 0}, {"G", 36, "", 0, 0}, {"W", 36, "", 0, 0}, {"H", 36, "", 0,
+    0}}, "e38e770183b43fbe7055c59eddf339404ed2abfd3b95653b70d2870a19693a6e", 0, NULL},
 };
 
 const mstmm_element mstmm_hinge_free = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "free",
-    .hash = "27987257501b4d52f00ead213b218dc68e809f730cc9969190aed89218f335d6",
+    .hash = "3f3c772875e24574610e9910112f24d4183c182fc5b82ac2cb5a8222456ee4c3",
     .nq = 7,
     .nu = 6,
     .np = 0,

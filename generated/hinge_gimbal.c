@@ -8,42 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_gimbal;
-int mstmm_hinge_gimbal_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_gimbal_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_gimbal_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
-    real *restrict measure);
-int mstmm_hinge_gimbal_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_gimbal_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_gimbal_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the gimbal hinge (three angles)
  * in  p[0] parameters
  * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
@@ -56,127 +20,58 @@ int mstmm_hinge_gimbal_directions(const real *restrict p, const real *restrict q
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[3] coordinate rates
  */
-int mstmm_hinge_gimbal_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_gimbal_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    const real t1 = cos(q[2]);
-    const real t2 = t0 * t1;
-    R[0] = t2;
-    const real t3 = sin(q[0]);
-    const real t4 = sin(q[1]);
-    const real t5 = t3 * t4;
-    const real t6 = t1 * t5;
-    const real t7 = sin(q[2]);
-    const real t8 = cos(q[0]);
-    const real t9 = t7 * t8;
-    const real t10 = t6 - t9;
-    R[1] = t10;
-    const real t11 = t7 * t3;
-    const real t12 = t8 * t4;
-    const real t13 = t1 * t12;
-    const real t14 = t11 + t13;
-    R[2] = t14;
-    const real t15 = t0 * t7;
-    R[3] = t15;
-    const real t16 = t1 * t8;
-    const real t17 = t7 * t5;
-    const real t18 = t16 + t17;
-    R[4] = t18;
-    const real t19 = t7 * t4;
-    const real t20 = t8 * t19;
-    const real t21 = t1 * t3;
-    const real t22 = t20 - t21;
-    R[5] = t22;
-    const real t23 = -t4;
-    R[6] = t23;
-    const real t24 = t0 * t3;
-    R[7] = t24;
-    const real t25 = t0 * t8;
-    R[8] = t25;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 1.0;
-    H[10] = 0.0;
-    H[11] = t23;
-    H[12] = 0.0;
-    H[13] = t8;
-    H[14] = t24;
-    H[15] = 0.0;
-    const real t26 = -t3;
-    H[16] = t26;
-    H[17] = t25;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    const real t27 = u[2] * t4;
-    const real t28 = u[0] - t27;
-    w[0] = t28;
-    const real t29 = u[1] * t8;
-    const real t30 = u[2] * t24;
-    const real t31 = t29 + t30;
-    w[1] = t31;
-    const real t32 = u[2] * t25;
-    const real t33 = u[1] * t3;
-    const real t34 = t32 - t33;
-    w[2] = t34;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    const real t35 = u[1] * t0;
-    const real t36 = u[2] * t35;
-    const real t37 = -t36;
-    c[3] = t37;
-    const real t38 = u[0] * t34;
-    const real t39 = u[1] * t5;
-    const real t40 = u[2] * t39;
-    const real t41 = t38 - t40;
-    c[4] = t41;
-    const real t42 = u[0] * t31;
-    const real t43 = u[1] * t12;
-    const real t44 = u[2] * t43;
-    const real t45 = t42 + t44;
-    const real t46 = -t45;
-    c[5] = t46;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    qdot[2] = u[2];
-    return 0;
+  (void)p;
+  real t0 = cos(q[1]);
+  real t1 = cos(q[2]);
+  R[0] = t0 * t1;
+  real t3 = sin(q[0]);
+  real t4 = sin(q[1]);
+  real t5 = t3 * t4;
+  real t7 = sin(q[2]);
+  real t8 = cos(q[0]);
+  R[1] = t1 * t5 - t7 * t8;
+  real t12 = t8 * t4;
+  R[2] = t7 * t3 + t1 * t12;
+  R[3] = t0 * t7;
+  R[4] = t1 * t8 + t7 * t5;
+  R[5] = t8 * (t7 * t4) - t1 * t3;
+  real t23 = -t4;
+  R[6] = t23;
+  real t24 = t0 * t3;
+  R[7] = t24;
+  real t25 = t0 * t8;
+  R[8] = t25;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = H[7] = H[8] = 0.0;
+  H[9] = 1.0;
+  H[10] = 0.0;
+  H[11] = t23;
+  H[12] = 0.0;
+  H[13] = t8;
+  H[14] = t24;
+  H[15] = 0.0;
+  H[16] = -t3;
+  H[17] = t25;
+  v[0] = v[1] = v[2] = 0.0;
+  w[0] = u[0] - u[2] * t4;
+  real t31 = u[1] * t8 + u[2] * t24;
+  w[1] = t31;
+  real t34 = u[2] * t25 - u[1] * t3;
+  w[2] = t34;
+  c[0] = c[1] = c[2] = 0.0;
+  c[3] = -(u[2] * (u[1] * t0));
+  c[4] = u[0] * t34 - u[2] * (u[1] * t5);
+  c[5] = -(u[0] * t31 + u[2] * (u[1] * t12));
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  qdot[2] = u[2];
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the gimbal hinge (three angles)
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -193,256 +88,85 @@ static const mstmm_port mstmm_hinge_gimbal_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[3] coordinate rates
  */
-int mstmm_hinge_gimbal_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_gimbal_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    const real t1 = cos(q[2]);
-    const real t2 = t0 * t1;
-    const real t3 = Rt[0] * t2;
-    const real t4 = sin(q[2]);
-    const real t5 = t0 * t4;
-    const real t6 = Rt[1] * t5;
-    const real t7 = t3 + t6;
-    const real t8 = sin(q[1]);
-    const real t9 = Rt[2] * t8;
-    const real t10 = t7 - t9;
-    Rc[0] = t10;
-    const real t11 = sin(q[0]);
-    const real t12 = t11 * t8;
-    const real t13 = t1 * t12;
-    const real t14 = cos(q[0]);
-    const real t15 = t4 * t14;
-    const real t16 = t13 - t15;
-    const real t17 = Rt[0] * t16;
-    const real t18 = t1 * t14;
-    const real t19 = t4 * t12;
-    const real t20 = t18 + t19;
-    const real t21 = Rt[1] * t20;
-    const real t22 = t17 + t21;
-    const real t23 = t0 * t11;
-    const real t24 = Rt[2] * t23;
-    const real t25 = t22 + t24;
-    Rc[1] = t25;
-    const real t26 = t4 * t11;
-    const real t27 = t14 * t8;
-    const real t28 = t1 * t27;
-    const real t29 = t26 + t28;
-    const real t30 = Rt[0] * t29;
-    const real t31 = t4 * t8;
-    const real t32 = t14 * t31;
-    const real t33 = t1 * t11;
-    const real t34 = t32 - t33;
-    const real t35 = Rt[1] * t34;
-    const real t36 = t30 + t35;
-    const real t37 = t0 * t14;
-    const real t38 = Rt[2] * t37;
-    const real t39 = t36 + t38;
-    Rc[2] = t39;
-    const real t40 = Rt[3] * t2;
-    const real t41 = Rt[4] * t5;
-    const real t42 = t40 + t41;
-    const real t43 = Rt[5] * t8;
-    const real t44 = t42 - t43;
-    Rc[3] = t44;
-    const real t45 = Rt[3] * t16;
-    const real t46 = Rt[4] * t20;
-    const real t47 = t45 + t46;
-    const real t48 = Rt[5] * t23;
-    const real t49 = t47 + t48;
-    Rc[4] = t49;
-    const real t50 = Rt[3] * t29;
-    const real t51 = Rt[4] * t34;
-    const real t52 = t50 + t51;
-    const real t53 = Rt[5] * t37;
-    const real t54 = t52 + t53;
-    Rc[5] = t54;
-    const real t55 = Rt[6] * t2;
-    const real t56 = Rt[7] * t5;
-    const real t57 = t55 + t56;
-    const real t58 = Rt[8] * t8;
-    const real t59 = t57 - t58;
-    Rc[6] = t59;
-    const real t60 = Rt[6] * t16;
-    const real t61 = Rt[7] * t20;
-    const real t62 = t60 + t61;
-    const real t63 = Rt[8] * t23;
-    const real t64 = t62 + t63;
-    Rc[7] = t64;
-    const real t65 = Rt[6] * t29;
-    const real t66 = Rt[7] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = Rt[8] * t37;
-    const real t69 = t67 + t68;
-    Rc[8] = t69;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t70 = motion_I[0] * t10;
-    const real t71 = motion_I[1] * t44;
-    const real t72 = t70 + t71;
-    const real t73 = motion_I[2] * t59;
-    const real t74 = t72 + t73;
-    const real t75 = u[2] * t8;
-    const real t76 = u[0] - t75;
-    const real t77 = t74 + t76;
-    motion[0] = t77;
-    const real t78 = motion_I[0] * t25;
-    const real t79 = motion_I[1] * t49;
-    const real t80 = t78 + t79;
-    const real t81 = motion_I[2] * t64;
-    const real t82 = t80 + t81;
-    const real t83 = u[1] * t14;
-    const real t84 = u[2] * t23;
-    const real t85 = t83 + t84;
-    const real t86 = t82 + t85;
-    motion[1] = t86;
-    const real t87 = motion_I[0] * t39;
-    const real t88 = motion_I[1] * t54;
-    const real t89 = t87 + t88;
-    const real t90 = motion_I[2] * t69;
-    const real t91 = t89 + t90;
-    const real t92 = u[2] * t37;
-    const real t93 = u[1] * t11;
-    const real t94 = t92 - t93;
-    const real t95 = t91 + t94;
-    motion[2] = t95;
-    const real t96 = motion_I[3] * t10;
-    const real t97 = motion_I[4] * t44;
-    const real t98 = t96 + t97;
-    const real t99 = motion_I[5] * t59;
-    const real t100 = t98 + t99;
-    const real t101 = s[2] * t8;
-    const real t102 = s[0] - t101;
-    const real t103 = u[1] * t0;
-    const real t104 = u[2] * t103;
-    const real t105 = t102 - t104;
-    const real t106 = t82 * t94;
-    const real t107 = t91 * t85;
-    const real t108 = t106 - t107;
-    const real t109 = t105 + t108;
-    const real t110 = t100 + t109;
-    motion[3] = t110;
-    const real t111 = motion_I[3] * t25;
-    const real t112 = motion_I[4] * t49;
-    const real t113 = t111 + t112;
-    const real t114 = motion_I[5] * t64;
-    const real t115 = t113 + t114;
-    const real t116 = s[1] * t14;
-    const real t117 = s[2] * t23;
-    const real t118 = t116 + t117;
-    const real t119 = u[0] * t94;
-    const real t120 = u[1] * t12;
-    const real t121 = u[2] * t120;
-    const real t122 = t119 - t121;
-    const real t123 = t118 + t122;
-    const real t124 = t91 * t76;
-    const real t125 = t74 * t94;
-    const real t126 = t124 - t125;
-    const real t127 = t123 + t126;
-    const real t128 = t115 + t127;
-    motion[4] = t128;
-    const real t129 = motion_I[3] * t39;
-    const real t130 = motion_I[4] * t54;
-    const real t131 = t129 + t130;
-    const real t132 = motion_I[5] * t69;
-    const real t133 = t131 + t132;
-    const real t134 = s[2] * t37;
-    const real t135 = s[1] * t11;
-    const real t136 = t134 - t135;
-    const real t137 = u[0] * t85;
-    const real t138 = u[1] * t27;
-    const real t139 = u[2] * t138;
-    const real t140 = t137 + t139;
-    const real t141 = t136 - t140;
-    const real t142 = t74 * t85;
-    const real t143 = t82 * t76;
-    const real t144 = t142 - t143;
-    const real t145 = t141 + t144;
-    const real t146 = t133 + t145;
-    motion[5] = t146;
-    const real t147 = motion_I[0] * motion_I[1];
-    const real t148 = t147 - motion_I[5];
-    const real t149 = ro[1] * t148;
-    const real t150 = motion_I[1] * motion_I[1];
-    const real t151 = motion_I[2] * motion_I[2];
-    const real t152 = t150 + t151;
-    const real t153 = ro[0] * t152;
-    const real t154 = t149 - t153;
-    const real t155 = motion_I[0] * motion_I[2];
-    const real t156 = motion_I[4] + t155;
-    const real t157 = ro[2] * t156;
-    const real t158 = t154 + t157;
-    const real t159 = motion_I[6] + t158;
-    const real t160 = t10 * t159;
-    const real t161 = motion_I[5] + t147;
-    const real t162 = ro[0] * t161;
-    const real t163 = motion_I[0] * motion_I[0];
-    const real t164 = t151 + t163;
-    const real t165 = ro[1] * t164;
-    const real t166 = t162 - t165;
-    const real t167 = motion_I[1] * motion_I[2];
-    const real t168 = t167 - motion_I[3];
-    const real t169 = ro[2] * t168;
-    const real t170 = t166 + t169;
-    const real t171 = motion_I[7] + t170;
-    const real t172 = t44 * t171;
-    const real t173 = t160 + t172;
-    const real t174 = t155 - motion_I[4];
-    const real t175 = ro[0] * t174;
-    const real t176 = motion_I[3] + t167;
-    const real t177 = ro[1] * t176;
-    const real t178 = t175 + t177;
-    const real t179 = t150 + t163;
-    const real t180 = ro[2] * t179;
-    const real t181 = t178 - t180;
-    const real t182 = motion_I[8] + t181;
-    const real t183 = t59 * t182;
-    const real t184 = t173 + t183;
-    motion[6] = t184;
-    const real t185 = t25 * t159;
-    const real t186 = t49 * t171;
-    const real t187 = t185 + t186;
-    const real t188 = t64 * t182;
-    const real t189 = t187 + t188;
-    motion[7] = t189;
-    const real t190 = t39 * t159;
-    const real t191 = t54 * t171;
-    const real t192 = t190 + t191;
-    const real t193 = t69 * t182;
-    const real t194 = t192 + t193;
-    motion[8] = t194;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    qdot[2] = u[2];
-    return 0;
+  (void)p;
+  real t0 = cos(q[1]);
+  real t1 = cos(q[2]);
+  real t2 = t0 * t1;
+  real t4 = sin(q[2]);
+  real t5 = t0 * t4;
+  real t8 = sin(q[1]);
+  real t10 = Rt[0] * t2 + Rt[1] * t5 - Rt[2] * t8;
+  Rc[0] = t10;
+  real t11 = sin(q[0]);
+  real t12 = t11 * t8;
+  real t14 = cos(q[0]);
+  real t16 = t1 * t12 - t4 * t14;
+  real t20 = t1 * t14 + t4 * t12;
+  real t23 = t0 * t11;
+  real t25 = Rt[0] * t16 + Rt[1] * t20 + Rt[2] * t23;
+  Rc[1] = t25;
+  real t27 = t14 * t8;
+  real t29 = t4 * t11 + t1 * t27;
+  real t34 = t14 * (t4 * t8) - t1 * t11;
+  real t37 = t0 * t14;
+  real t39 = Rt[0] * t29 + Rt[1] * t34 + Rt[2] * t37;
+  Rc[2] = t39;
+  real t44 = Rt[3] * t2 + Rt[4] * t5 - Rt[5] * t8;
+  Rc[3] = t44;
+  real t49 = Rt[3] * t16 + Rt[4] * t20 + Rt[5] * t23;
+  Rc[4] = t49;
+  real t54 = Rt[3] * t29 + Rt[4] * t34 + Rt[5] * t37;
+  Rc[5] = t54;
+  real t59 = Rt[6] * t2 + Rt[7] * t5 - Rt[8] * t8;
+  Rc[6] = t59;
+  real t64 = Rt[6] * t16 + Rt[7] * t20 + Rt[8] * t23;
+  Rc[7] = t64;
+  real t69 = Rt[6] * t29 + Rt[7] * t34 + Rt[8] * t37;
+  Rc[8] = t69;
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t74 = motion_I[0] * t10 + motion_I[1] * t44 + motion_I[2] * t59;
+  real t76 = u[0] - u[2] * t8;
+  motion[0] = t74 + t76;
+  real t82 = motion_I[0] * t25 + motion_I[1] * t49 + motion_I[2] * t64;
+  real t85 = u[1] * t14 + u[2] * t23;
+  motion[1] = t82 + t85;
+  real t91 = motion_I[0] * t39 + motion_I[1] * t54 + motion_I[2] * t69;
+  real t94 = u[2] * t37 - u[1] * t11;
+  motion[2] = t91 + t94;
+  motion[3] = motion_I[3] * t10 + motion_I[4] * t44 + motion_I[5] * t59 + (s[0] - s[2] * t8 - u[2] *
+    (u[1] * t0) + (t82 * t94 - t91 * t85));
+  motion[4] = motion_I[3] * t25 + motion_I[4] * t49 + motion_I[5] * t64 + (s[1] * t14 + s[2] * t23 +
+    (u[0] * t94 - u[2] * (u[1] * t12)) + (t91 * t76 - t74 * t94));
+  motion[5] = motion_I[3] * t39 + motion_I[4] * t54 + motion_I[5] * t69 + (s[2] * t37 - s[1] * t11 -
+    (u[0] * t85 + u[2] * (u[1] * t27)) + (t74 * t85 - t82 * t76));
+  real t147 = motion_I[0] * motion_I[1];
+  real t150 = motion_I[1] * motion_I[1];
+  real t151 = motion_I[2] * motion_I[2];
+  real t155 = motion_I[0] * motion_I[2];
+  real t159 = motion_I[6] + (ro[1] * (t147 - motion_I[5]) - ro[0] * (t150 + t151) + ro[2] *
+    (motion_I[4] + t155));
+  real t163 = motion_I[0] * motion_I[0];
+  real t167 = motion_I[1] * motion_I[2];
+  real t171 = motion_I[7] + (ro[0] * (motion_I[5] + t147) - ro[1] * (t151 + t163) + ro[2] * (t167 -
+    motion_I[3]));
+  real t182 = motion_I[8] + (ro[0] * (t155 - motion_I[4]) + ro[1] * (motion_I[3] + t167) - ro[2] *
+    (t150 + t163));
+  motion[6] = t10 * t159 + t44 * t171 + t59 * t182;
+  motion[7] = t25 * t159 + t49 * t171 + t64 * t182;
+  motion[8] = t39 * t159 + t54 * t171 + t69 * t182;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  qdot[2] = u[2];
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -460,770 +184,208 @@ static const mstmm_port mstmm_hinge_gimbal_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_gimbal_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_gimbal_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = 0.0 < S[15];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t1 = cos(q[0]);
-    const real t2 = S[18] * t1;
-    const real t3 = sin(q[0]);
-    const real t4 = S[19] * t3;
-    const real t5 = t2 - t4;
-    const real t6 = t1 * t5;
-    const real t7 = S[19] * t1;
-    const real t8 = S[20] * t3;
-    const real t9 = t7 - t8;
-    const real t10 = t3 * t9;
-    const real t11 = t6 - t10;
-    const real t12 = t11 * ((real)1 / (real)10000000000000);
-    const real t13 = S[16] * t1;
-    const real t14 = S[17] * t3;
-    const real t15 = t13 - t14;
-    const real t16 = 1.0 / S[15];
-    const real t17 = t15 * t16;
-    const real t18 = t15 * t17;
-    const real t19 = t11 - t18;
-    const real t20 = t12 < t19;
-    if (!(t20 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t21 = cos(q[1]);
-    const real t22 = t3 * t21;
-    const real t23 = S[18] * t22;
-    const real t24 = sin(q[1]);
-    const real t25 = S[16] * t24;
-    const real t26 = t23 - t25;
-    const real t27 = t1 * t21;
-    const real t28 = S[19] * t27;
-    const real t29 = t26 + t28;
-    const real t30 = t22 * t29;
-    const real t31 = S[16] * t22;
-    const real t32 = S[15] * t24;
-    const real t33 = t31 - t32;
-    const real t34 = S[17] * t27;
-    const real t35 = t33 + t34;
-    const real t36 = t24 * t35;
-    const real t37 = t30 - t36;
-    const real t38 = S[19] * t22;
-    const real t39 = S[17] * t24;
-    const real t40 = t38 - t39;
-    const real t41 = S[20] * t27;
-    const real t42 = t40 + t41;
-    const real t43 = t27 * t42;
-    const real t44 = t37 + t43;
-    const real t45 = t44 * ((real)1 / (real)10000000000000);
-    const real t46 = t35 * t16;
-    const real t47 = t35 * t46;
-    const real t48 = t44 - t47;
-    const real t49 = t1 * t29;
-    const real t50 = t3 * t42;
-    const real t51 = t49 - t50;
-    const real t52 = t35 * t17;
-    const real t53 = t51 - t52;
-    const real t54 = 1.0 / t19;
-    const real t55 = t54 * t53;
-    const real t56 = t53 * t55;
-    const real t57 = t48 - t56;
-    const real t58 = t45 < t57;
-    if (!(t58 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t20 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t58 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t59 = 0.0 < floor_[1];
-    const real t60 = S[15] + S[18];
-    const real t61 = S[20] + t60;
-    const real t62 = ((real)1 / (real)300000000000000) * t61;
-    const real t63 = t59 != 0 ? floor_[1] : t62;
-    const real t64 = t63 < S[15];
-    if (!(t64 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t65 = t3 * t3;
-    const real t66 = t1 * t1;
-    const real t67 = t65 + t66;
-    const real t68 = t63 * t67;
-    const real t69 = t68 < t11;
-    if (!(t69 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t70 = t24 * t24;
-    const real t71 = t21 * t21;
-    const real t72 = t65 * t71;
-    const real t73 = t66 * t71;
-    const real t74 = t72 + t73;
-    const real t75 = t70 + t74;
-    const real t76 = t63 * t75;
-    const real t77 = t76 < t44;
-    if (!(t77 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    const real t78 = S[3] * t16;
-    const real t79 = S[4] * t1;
-    const real t80 = S[5] * t3;
-    const real t81 = t79 - t80;
-    const real t82 = S[3] * t17;
-    const real t83 = t81 - t82;
-    const real t84 = t54 * t83;
-    const real t85 = 1.0 / t57;
-    const real t86 = S[4] * t22;
-    const real t87 = S[3] * t24;
-    const real t88 = t86 - t87;
-    const real t89 = S[5] * t27;
-    const real t90 = t88 + t89;
-    const real t91 = S[3] * t46;
-    const real t92 = t90 - t91;
-    const real t93 = t55 * t83;
-    const real t94 = t92 - t93;
-    const real t95 = t85 * t94;
-    const real t96 = t55 * t95;
-    const real t97 = t84 - t96;
-    const real t98 = t17 * t97;
-    const real t99 = t78 - t98;
-    const real t100 = t46 * t95;
-    const real t101 = t99 - t100;
-    G[0] = t101;
-    const real t102 = S[8] * t16;
-    const real t103 = S[9] * t1;
-    const real t104 = S[10] * t3;
-    const real t105 = t103 - t104;
-    const real t106 = S[8] * t17;
-    const real t107 = t105 - t106;
-    const real t108 = t54 * t107;
-    const real t109 = S[9] * t22;
-    const real t110 = S[8] * t24;
-    const real t111 = t109 - t110;
-    const real t112 = S[10] * t27;
-    const real t113 = t111 + t112;
-    const real t114 = S[8] * t46;
-    const real t115 = t113 - t114;
-    const real t116 = t55 * t107;
-    const real t117 = t115 - t116;
-    const real t118 = t85 * t117;
-    const real t119 = t55 * t118;
-    const real t120 = t108 - t119;
-    const real t121 = t17 * t120;
-    const real t122 = t102 - t121;
-    const real t123 = t46 * t118;
-    const real t124 = t122 - t123;
-    G[1] = t124;
-    const real t125 = S[12] * t16;
-    const real t126 = S[13] * t1;
-    const real t127 = S[14] * t3;
-    const real t128 = t126 - t127;
-    const real t129 = S[12] * t17;
-    const real t130 = t128 - t129;
-    const real t131 = t54 * t130;
-    const real t132 = S[13] * t22;
-    const real t133 = S[12] * t24;
-    const real t134 = t132 - t133;
-    const real t135 = S[14] * t27;
-    const real t136 = t134 + t135;
-    const real t137 = S[12] * t46;
-    const real t138 = t136 - t137;
-    const real t139 = t55 * t130;
-    const real t140 = t138 - t139;
-    const real t141 = t85 * t140;
-    const real t142 = t55 * t141;
-    const real t143 = t131 - t142;
-    const real t144 = t17 * t143;
-    const real t145 = t125 - t144;
-    const real t146 = t46 * t141;
-    const real t147 = t145 - t146;
-    G[2] = t147;
-    const real t148 = S[15] * t16;
-    const real t149 = S[15] * t17;
-    const real t150 = t15 - t149;
-    const real t151 = t54 * t150;
-    const real t152 = S[15] * t46;
-    const real t153 = t35 - t152;
-    const real t154 = t55 * t150;
-    const real t155 = t153 - t154;
-    const real t156 = t85 * t155;
-    const real t157 = t55 * t156;
-    const real t158 = t151 - t157;
-    const real t159 = t17 * t158;
-    const real t160 = t148 - t159;
-    const real t161 = t46 * t156;
-    const real t162 = t160 - t161;
-    G[3] = t162;
-    const real t163 = S[16] * t16;
-    const real t164 = S[16] * t17;
-    const real t165 = t5 - t164;
-    const real t166 = t54 * t165;
-    const real t167 = S[16] * t46;
-    const real t168 = t29 - t167;
-    const real t169 = t55 * t165;
-    const real t170 = t168 - t169;
-    const real t171 = t85 * t170;
-    const real t172 = t55 * t171;
-    const real t173 = t166 - t172;
-    const real t174 = t17 * t173;
-    const real t175 = t163 - t174;
-    const real t176 = t46 * t171;
-    const real t177 = t175 - t176;
-    G[4] = t177;
-    const real t178 = S[17] * t16;
-    const real t179 = S[17] * t17;
-    const real t180 = t9 - t179;
-    const real t181 = t54 * t180;
-    const real t182 = S[17] * t46;
-    const real t183 = t42 - t182;
-    const real t184 = t55 * t180;
-    const real t185 = t183 - t184;
-    const real t186 = t85 * t185;
-    const real t187 = t55 * t186;
-    const real t188 = t181 - t187;
-    const real t189 = t17 * t188;
-    const real t190 = t178 - t189;
-    const real t191 = t46 * t186;
-    const real t192 = t190 - t191;
-    G[5] = t192;
-    G[6] = t97;
-    G[7] = t120;
-    G[8] = t143;
-    G[9] = t158;
-    G[10] = t173;
-    G[11] = t188;
-    G[12] = t95;
-    G[13] = t118;
-    G[14] = t141;
-    G[15] = t156;
-    G[16] = t171;
-    G[17] = t186;
-    const real t193 = tau[0] - e[3];
-    const real t194 = t16 * t193;
-    const real t195 = e[5] * t3;
-    const real t196 = e[4] * t1;
-    const real t197 = t195 - t196;
-    const real t198 = tau[1] + t197;
-    const real t199 = t17 * t193;
-    const real t200 = t198 - t199;
-    const real t201 = t54 * t200;
-    const real t202 = e[3] * t24;
-    const real t203 = e[4] * t22;
-    const real t204 = t202 - t203;
-    const real t205 = e[5] * t27;
-    const real t206 = t204 - t205;
-    const real t207 = tau[2] + t206;
-    const real t208 = t46 * t193;
-    const real t209 = t207 - t208;
-    const real t210 = t55 * t200;
-    const real t211 = t209 - t210;
-    const real t212 = t85 * t211;
-    const real t213 = t55 * t212;
-    const real t214 = t201 - t213;
-    const real t215 = t17 * t214;
-    const real t216 = t194 - t215;
-    const real t217 = t46 * t212;
-    const real t218 = t216 - t217;
-    g[0] = t218;
-    g[1] = t214;
-    g[2] = t212;
-    const real t219 = S[3] * t101;
-    const real t220 = t81 * t97;
-    const real t221 = t219 + t220;
-    const real t222 = t90 * t95;
-    const real t223 = t221 + t222;
-    const real t224 = S[0] - t223;
-    const real t225 = Rc[0] * t224;
-    const real t226 = S[3] * t124;
-    const real t227 = t81 * t120;
-    const real t228 = t226 + t227;
-    const real t229 = t90 * t118;
-    const real t230 = t228 + t229;
-    const real t231 = S[1] - t230;
-    const real t232 = Rc[1] * t231;
-    const real t233 = t225 + t232;
-    const real t234 = S[3] * t147;
-    const real t235 = t81 * t143;
-    const real t236 = t234 + t235;
-    const real t237 = t90 * t141;
-    const real t238 = t236 + t237;
-    const real t239 = S[2] - t238;
-    const real t240 = Rc[2] * t239;
-    const real t241 = t233 + t240;
-    const real t242 = Rc[0] * t241;
-    const real t243 = Rc[0] * t231;
-    const real t244 = S[8] * t124;
-    const real t245 = t105 * t120;
-    const real t246 = t244 + t245;
-    const real t247 = t113 * t118;
-    const real t248 = t246 + t247;
-    const real t249 = S[6] - t248;
-    const real t250 = Rc[1] * t249;
-    const real t251 = t243 + t250;
-    const real t252 = S[8] * t147;
-    const real t253 = t105 * t143;
-    const real t254 = t252 + t253;
-    const real t255 = t113 * t141;
-    const real t256 = t254 + t255;
-    const real t257 = S[7] - t256;
-    const real t258 = Rc[2] * t257;
-    const real t259 = t251 + t258;
-    const real t260 = Rc[1] * t259;
-    const real t261 = t242 + t260;
-    const real t262 = Rc[0] * t239;
-    const real t263 = Rc[1] * t257;
-    const real t264 = t262 + t263;
-    const real t265 = S[12] * t147;
-    const real t266 = t128 * t143;
-    const real t267 = t265 + t266;
-    const real t268 = t136 * t141;
-    const real t269 = t267 + t268;
-    const real t270 = S[11] - t269;
-    const real t271 = Rc[2] * t270;
-    const real t272 = t264 + t271;
-    const real t273 = Rc[2] * t272;
-    const real t274 = t261 + t273;
-    S_I[0] += t274;
-    const real t275 = Rc[3] * t241;
-    const real t276 = Rc[4] * t259;
-    const real t277 = t275 + t276;
-    const real t278 = Rc[5] * t272;
-    const real t279 = t277 + t278;
-    S_I[1] += t279;
-    const real t280 = Rc[6] * t241;
-    const real t281 = Rc[7] * t259;
-    const real t282 = t280 + t281;
-    const real t283 = Rc[8] * t272;
-    const real t284 = t282 + t283;
-    S_I[2] += t284;
-    const real t285 = S[3] * t177;
-    const real t286 = t81 * t173;
-    const real t287 = t285 + t286;
-    const real t288 = t90 * t171;
-    const real t289 = t287 + t288;
-    const real t290 = S[4] - t289;
-    const real t291 = Rc[0] * t290;
-    const real t292 = S[8] * t177;
-    const real t293 = t105 * t173;
-    const real t294 = t292 + t293;
-    const real t295 = t113 * t171;
-    const real t296 = t294 + t295;
-    const real t297 = S[9] - t296;
-    const real t298 = Rc[1] * t297;
-    const real t299 = t291 + t298;
-    const real t300 = S[12] * t177;
-    const real t301 = t128 * t173;
-    const real t302 = t300 + t301;
-    const real t303 = t136 * t171;
-    const real t304 = t302 + t303;
-    const real t305 = S[13] - t304;
-    const real t306 = Rc[2] * t305;
-    const real t307 = t299 + t306;
-    const real t308 = Rc[1] * t307;
-    const real t309 = S[3] * t192;
-    const real t310 = t81 * t188;
-    const real t311 = t309 + t310;
-    const real t312 = t90 * t186;
-    const real t313 = t311 + t312;
-    const real t314 = S[5] - t313;
-    const real t315 = Rc[0] * t314;
-    const real t316 = S[8] * t192;
-    const real t317 = t105 * t188;
-    const real t318 = t316 + t317;
-    const real t319 = t113 * t186;
-    const real t320 = t318 + t319;
-    const real t321 = S[10] - t320;
-    const real t322 = Rc[1] * t321;
-    const real t323 = t315 + t322;
-    const real t324 = S[12] * t192;
-    const real t325 = t128 * t188;
-    const real t326 = t324 + t325;
-    const real t327 = t136 * t186;
-    const real t328 = t326 + t327;
-    const real t329 = S[14] - t328;
-    const real t330 = Rc[2] * t329;
-    const real t331 = t323 + t330;
-    const real t332 = Rc[2] * t331;
-    const real t333 = t308 + t332;
-    const real t334 = r[1] * t284;
-    const real t335 = r[2] * t279;
-    const real t336 = t334 - t335;
-    const real t337 = t333 + t336;
-    S_I[3] += t337;
-    const real t338 = Rc[4] * t307;
-    const real t339 = Rc[5] * t331;
-    const real t340 = t338 + t339;
-    const real t341 = r[2] * t274;
-    const real t342 = r[0] * t284;
-    const real t343 = t341 - t342;
-    const real t344 = t340 + t343;
-    S_I[4] += t344;
-    const real t345 = Rc[7] * t307;
-    const real t346 = Rc[8] * t331;
-    const real t347 = t345 + t346;
-    const real t348 = r[0] * t279;
-    const real t349 = r[1] * t274;
-    const real t350 = t348 - t349;
-    const real t351 = t347 + t350;
-    S_I[5] += t351;
-    const real t352 = Rc[3] * t224;
-    const real t353 = Rc[4] * t231;
-    const real t354 = t352 + t353;
-    const real t355 = Rc[5] * t239;
-    const real t356 = t354 + t355;
-    const real t357 = Rc[3] * t356;
-    const real t358 = Rc[3] * t231;
-    const real t359 = Rc[4] * t249;
-    const real t360 = t358 + t359;
-    const real t361 = Rc[5] * t257;
-    const real t362 = t360 + t361;
-    const real t363 = Rc[4] * t362;
-    const real t364 = t357 + t363;
-    const real t365 = Rc[3] * t239;
-    const real t366 = Rc[4] * t257;
-    const real t367 = t365 + t366;
-    const real t368 = Rc[5] * t270;
-    const real t369 = t367 + t368;
-    const real t370 = Rc[5] * t369;
-    const real t371 = t364 + t370;
-    S_I[6] += t371;
-    const real t372 = Rc[6] * t356;
-    const real t373 = Rc[7] * t362;
-    const real t374 = t372 + t373;
-    const real t375 = Rc[8] * t369;
-    const real t376 = t374 + t375;
-    S_I[7] += t376;
-    const real t377 = Rc[3] * t290;
-    const real t378 = Rc[4] * t297;
-    const real t379 = t377 + t378;
-    const real t380 = Rc[5] * t305;
-    const real t381 = t379 + t380;
-    const real t382 = Rc[1] * t381;
-    const real t383 = Rc[3] * t314;
-    const real t384 = Rc[4] * t321;
-    const real t385 = t383 + t384;
-    const real t386 = Rc[5] * t329;
-    const real t387 = t385 + t386;
-    const real t388 = Rc[2] * t387;
-    const real t389 = t382 + t388;
-    const real t390 = r[1] * t376;
-    const real t391 = r[2] * t371;
-    const real t392 = t390 - t391;
-    const real t393 = t389 + t392;
-    S_I[8] += t393;
-    const real t394 = Rc[4] * t381;
-    const real t395 = Rc[5] * t387;
-    const real t396 = t394 + t395;
-    const real t397 = r[0] * t376;
-    const real t398 = t335 - t397;
-    const real t399 = t396 + t398;
-    S_I[9] += t399;
-    const real t400 = Rc[7] * t381;
-    const real t401 = Rc[8] * t387;
-    const real t402 = t400 + t401;
-    const real t403 = r[0] * t371;
-    const real t404 = r[1] * t279;
-    const real t405 = t403 - t404;
-    const real t406 = t402 + t405;
-    S_I[10] += t406;
-    const real t407 = Rc[6] * t224;
-    const real t408 = Rc[7] * t231;
-    const real t409 = t407 + t408;
-    const real t410 = Rc[8] * t239;
-    const real t411 = t409 + t410;
-    const real t412 = Rc[6] * t411;
-    const real t413 = Rc[6] * t231;
-    const real t414 = Rc[7] * t249;
-    const real t415 = t413 + t414;
-    const real t416 = Rc[8] * t257;
-    const real t417 = t415 + t416;
-    const real t418 = Rc[7] * t417;
-    const real t419 = t412 + t418;
-    const real t420 = Rc[6] * t239;
-    const real t421 = Rc[7] * t257;
-    const real t422 = t420 + t421;
-    const real t423 = Rc[8] * t270;
-    const real t424 = t422 + t423;
-    const real t425 = Rc[8] * t424;
-    const real t426 = t419 + t425;
-    S_I[11] += t426;
-    const real t427 = Rc[6] * t290;
-    const real t428 = Rc[7] * t297;
-    const real t429 = t427 + t428;
-    const real t430 = Rc[8] * t305;
-    const real t431 = t429 + t430;
-    const real t432 = Rc[1] * t431;
-    const real t433 = Rc[6] * t314;
-    const real t434 = Rc[7] * t321;
-    const real t435 = t433 + t434;
-    const real t436 = Rc[8] * t329;
-    const real t437 = t435 + t436;
-    const real t438 = Rc[2] * t437;
-    const real t439 = t432 + t438;
-    const real t440 = r[1] * t426;
-    const real t441 = r[2] * t376;
-    const real t442 = t440 - t441;
-    const real t443 = t439 + t442;
-    S_I[12] += t443;
-    const real t444 = Rc[4] * t431;
-    const real t445 = Rc[5] * t437;
-    const real t446 = t444 + t445;
-    const real t447 = r[2] * t284;
-    const real t448 = r[0] * t426;
-    const real t449 = t447 - t448;
-    const real t450 = t446 + t449;
-    S_I[13] += t450;
-    const real t451 = Rc[7] * t431;
-    const real t452 = Rc[8] * t437;
-    const real t453 = t451 + t452;
-    const real t454 = t397 - t334;
-    const real t455 = t453 + t454;
-    S_I[14] += t455;
-    const real t456 = S[16] * t177;
-    const real t457 = t5 * t173;
-    const real t458 = t456 + t457;
-    const real t459 = t29 * t171;
-    const real t460 = t458 + t459;
-    const real t461 = S[18] - t460;
-    const real t462 = Rc[1] * t461;
-    const real t463 = S[16] * t192;
-    const real t464 = t5 * t188;
-    const real t465 = t463 + t464;
-    const real t466 = t29 * t186;
-    const real t467 = t465 + t466;
-    const real t468 = S[19] - t467;
-    const real t469 = Rc[2] * t468;
-    const real t470 = t462 + t469;
-    const real t471 = Rc[1] * t470;
-    const real t472 = Rc[1] * t468;
-    const real t473 = S[17] * t192;
-    const real t474 = t9 * t188;
-    const real t475 = t473 + t474;
-    const real t476 = t42 * t186;
-    const real t477 = t475 + t476;
-    const real t478 = S[20] - t477;
-    const real t479 = Rc[2] * t478;
-    const real t480 = t472 + t479;
-    const real t481 = Rc[2] * t480;
-    const real t482 = t471 + t481;
-    const real t483 = r[1] * t443;
-    const real t484 = r[2] * t393;
-    const real t485 = t483 - t484;
-    const real t486 = r[1] * t439;
-    const real t487 = r[2] * t389;
-    const real t488 = t486 - t487;
-    const real t489 = t485 + t488;
-    const real t490 = t482 + t489;
-    S_I[15] += t490;
-    const real t491 = Rc[4] * t470;
-    const real t492 = Rc[5] * t480;
-    const real t493 = t491 + t492;
-    const real t494 = r[1] * t450;
-    const real t495 = r[2] * t399;
-    const real t496 = t494 - t495;
-    const real t497 = r[2] * t333;
-    const real t498 = r[0] * t439;
-    const real t499 = t497 - t498;
-    const real t500 = t496 + t499;
-    const real t501 = t493 + t500;
-    S_I[16] += t501;
-    const real t502 = Rc[7] * t470;
-    const real t503 = Rc[8] * t480;
-    const real t504 = t502 + t503;
-    const real t505 = r[1] * t455;
-    const real t506 = r[2] * t406;
-    const real t507 = t505 - t506;
-    const real t508 = r[0] * t389;
-    const real t509 = r[1] * t333;
-    const real t510 = t508 - t509;
-    const real t511 = t507 + t510;
-    const real t512 = t504 + t511;
-    S_I[17] += t512;
-    const real t513 = Rc[4] * t461;
-    const real t514 = Rc[5] * t468;
-    const real t515 = t513 + t514;
-    const real t516 = Rc[4] * t515;
-    const real t517 = Rc[4] * t468;
-    const real t518 = Rc[5] * t478;
-    const real t519 = t517 + t518;
-    const real t520 = Rc[5] * t519;
-    const real t521 = t516 + t520;
-    const real t522 = r[2] * t344;
-    const real t523 = r[0] * t450;
-    const real t524 = t522 - t523;
-    const real t525 = r[2] * t340;
-    const real t526 = r[0] * t446;
-    const real t527 = t525 - t526;
-    const real t528 = t524 + t527;
-    const real t529 = t521 + t528;
-    S_I[18] += t529;
-    const real t530 = Rc[7] * t515;
-    const real t531 = Rc[8] * t519;
-    const real t532 = t530 + t531;
-    const real t533 = r[2] * t351;
-    const real t534 = r[0] * t455;
-    const real t535 = t533 - t534;
-    const real t536 = r[0] * t396;
-    const real t537 = r[1] * t340;
-    const real t538 = t536 - t537;
-    const real t539 = t535 + t538;
-    const real t540 = t532 + t539;
-    S_I[19] += t540;
-    const real t541 = Rc[7] * t461;
-    const real t542 = Rc[8] * t468;
-    const real t543 = t541 + t542;
-    const real t544 = Rc[7] * t543;
-    const real t545 = Rc[7] * t468;
-    const real t546 = Rc[8] * t478;
-    const real t547 = t545 + t546;
-    const real t548 = Rc[8] * t547;
-    const real t549 = t544 + t548;
-    const real t550 = r[0] * t406;
-    const real t551 = r[1] * t351;
-    const real t552 = t550 - t551;
-    const real t553 = r[0] * t402;
-    const real t554 = r[1] * t347;
-    const real t555 = t553 - t554;
-    const real t556 = t552 + t555;
-    const real t557 = t549 + t556;
-    S_I[20] += t557;
-    const real t558 = S[3] * t218;
-    const real t559 = t81 * t214;
-    const real t560 = t558 + t559;
-    const real t561 = t90 * t212;
-    const real t562 = t560 + t561;
-    const real t563 = e[0] + t562;
-    const real t564 = Rc[0] * t563;
-    const real t565 = S[8] * t218;
-    const real t566 = t105 * t214;
-    const real t567 = t565 + t566;
-    const real t568 = t113 * t212;
-    const real t569 = t567 + t568;
-    const real t570 = e[1] + t569;
-    const real t571 = Rc[1] * t570;
-    const real t572 = t564 + t571;
-    const real t573 = S[12] * t218;
-    const real t574 = t128 * t214;
-    const real t575 = t573 + t574;
-    const real t576 = t136 * t212;
-    const real t577 = t575 + t576;
-    const real t578 = e[2] + t577;
-    const real t579 = Rc[2] * t578;
-    const real t580 = t572 + t579;
-    e_I[0] += t580;
-    const real t581 = Rc[3] * t563;
-    const real t582 = Rc[4] * t570;
-    const real t583 = t581 + t582;
-    const real t584 = Rc[5] * t578;
-    const real t585 = t583 + t584;
-    e_I[1] += t585;
-    const real t586 = Rc[6] * t563;
-    const real t587 = Rc[7] * t570;
-    const real t588 = t586 + t587;
-    const real t589 = Rc[8] * t578;
-    const real t590 = t588 + t589;
-    e_I[2] += t590;
-    const real t591 = Rc[0] * tau[0];
-    const real t592 = S[16] * t218;
-    const real t593 = t5 * t214;
-    const real t594 = t592 + t593;
-    const real t595 = t29 * t212;
-    const real t596 = t594 + t595;
-    const real t597 = e[4] + t596;
-    const real t598 = Rc[1] * t597;
-    const real t599 = t591 + t598;
-    const real t600 = S[17] * t218;
-    const real t601 = t9 * t214;
-    const real t602 = t600 + t601;
-    const real t603 = t42 * t212;
-    const real t604 = t602 + t603;
-    const real t605 = e[5] + t604;
-    const real t606 = Rc[2] * t605;
-    const real t607 = t599 + t606;
-    const real t608 = Rc[6] * r[1];
-    const real t609 = Rc[3] * r[2];
-    const real t610 = t608 - t609;
-    const real t611 = t563 * t610;
-    const real t612 = Rc[7] * r[1];
-    const real t613 = Rc[4] * r[2];
-    const real t614 = t612 - t613;
-    const real t615 = t570 * t614;
-    const real t616 = t611 + t615;
-    const real t617 = Rc[8] * r[1];
-    const real t618 = Rc[5] * r[2];
-    const real t619 = t617 - t618;
-    const real t620 = t578 * t619;
-    const real t621 = t616 + t620;
-    const real t622 = t607 + t621;
-    e_I[3] += t622;
-    const real t623 = Rc[3] * tau[0];
-    const real t624 = Rc[4] * t597;
-    const real t625 = t623 + t624;
-    const real t626 = Rc[5] * t605;
-    const real t627 = t625 + t626;
-    const real t628 = Rc[0] * r[2];
-    const real t629 = Rc[6] * r[0];
-    const real t630 = t628 - t629;
-    const real t631 = t563 * t630;
-    const real t632 = Rc[1] * r[2];
-    const real t633 = Rc[7] * r[0];
-    const real t634 = t632 - t633;
-    const real t635 = t570 * t634;
-    const real t636 = t631 + t635;
-    const real t637 = Rc[2] * r[2];
-    const real t638 = Rc[8] * r[0];
-    const real t639 = t637 - t638;
-    const real t640 = t578 * t639;
-    const real t641 = t636 + t640;
-    const real t642 = t627 + t641;
-    e_I[4] += t642;
-    const real t643 = Rc[6] * tau[0];
-    const real t644 = Rc[7] * t597;
-    const real t645 = t643 + t644;
-    const real t646 = Rc[8] * t605;
-    const real t647 = t645 + t646;
-    const real t648 = Rc[3] * r[0];
-    const real t649 = Rc[0] * r[1];
-    const real t650 = t648 - t649;
-    const real t651 = t563 * t650;
-    const real t652 = Rc[4] * r[0];
-    const real t653 = Rc[1] * r[1];
-    const real t654 = t652 - t653;
-    const real t655 = t570 * t654;
-    const real t656 = t651 + t655;
-    const real t657 = Rc[5] * r[0];
-    const real t658 = Rc[2] * r[1];
-    const real t659 = t657 - t658;
-    const real t660 = t578 * t659;
-    const real t661 = t656 + t660;
-    const real t662 = t647 + t661;
-    e_I[5] += t662;
-    return 0;
+  (void)p;
+  real t0 = 0.0 < S[15];
+  if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t1 = cos(q[0]);
+  real t3 = sin(q[0]);
+  real t5 = S[18] * t1 - S[19] * t3;
+  real t9 = S[19] * t1 - S[20] * t3;
+  real t11 = t1 * t5 - t3 * t9;
+  real t15 = S[16] * t1 - S[17] * t3;
+  real t16 = 1.0 / S[15];
+  real t17 = t15 * t16;
+  real t19 = t11 - t15 * t17;
+  real t20 = t11 * ((real)1 / (real)10000000000000) < t19;
+  if (!(t20 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t21 = cos(q[1]);
+  real t22 = t3 * t21;
+  real t24 = sin(q[1]);
+  real t27 = t1 * t21;
+  real t29 = S[18] * t22 - S[16] * t24 + S[19] * t27;
+  real t35 = S[16] * t22 - S[15] * t24 + S[17] * t27;
+  real t42 = S[19] * t22 - S[17] * t24 + S[20] * t27;
+  real t44 = t22 * t29 - t24 * t35 + t27 * t42;
+  real t46 = t35 * t16;
+  real t53 = t1 * t29 - t3 * t42 - t35 * t17;
+  real t54 = 1.0 / t19;
+  real t55 = t54 * t53;
+  real t57 = t44 - t35 * t46 - t53 * t55;
+  real t58 = t44 * ((real)1 / (real)10000000000000) < t57;
+  if (!(t58 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t0 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t20 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t58 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t62 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t63 = (0.0 < floor_[1]) ? floor_[1] : t62;
+  if (!((t63 < S[15]))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  real t65 = t3 * t3;
+  real t66 = t1 * t1;
+  if (!((t63 * (t65 + t66) < t11))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  real t71 = t21 * t21;
+  if (!((t63 * (t24 * t24 + (t65 * t71 + t66 * t71)) < t44))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  real t81 = S[4] * t1 - S[5] * t3;
+  real t83 = t81 - S[3] * t17;
+  real t85 = 1.0 / t57;
+  real t90 = S[4] * t22 - S[3] * t24 + S[5] * t27;
+  real t95 = t85 * (t90 - S[3] * t46 - t55 * t83);
+  real t97 = t54 * t83 - t55 * t95;
+  real t101 = S[3] * t16 - t17 * t97 - t46 * t95;
+  G[0] = t101;
+  real t105 = S[9] * t1 - S[10] * t3;
+  real t107 = t105 - S[8] * t17;
+  real t113 = S[9] * t22 - S[8] * t24 + S[10] * t27;
+  real t118 = t85 * (t113 - S[8] * t46 - t55 * t107);
+  real t120 = t54 * t107 - t55 * t118;
+  real t124 = S[8] * t16 - t17 * t120 - t46 * t118;
+  G[1] = t124;
+  real t128 = S[13] * t1 - S[14] * t3;
+  real t130 = t128 - S[12] * t17;
+  real t136 = S[13] * t22 - S[12] * t24 + S[14] * t27;
+  real t141 = t85 * (t136 - S[12] * t46 - t55 * t130);
+  real t143 = t54 * t130 - t55 * t141;
+  real t147 = S[12] * t16 - t17 * t143 - t46 * t141;
+  G[2] = t147;
+  real t150 = t15 - S[15] * t17;
+  real t156 = t85 * (t35 - S[15] * t46 - t55 * t150);
+  real t158 = t54 * t150 - t55 * t156;
+  G[3] = S[15] * t16 - t17 * t158 - t46 * t156;
+  real t165 = t5 - S[16] * t17;
+  real t171 = t85 * (t29 - S[16] * t46 - t55 * t165);
+  real t173 = t54 * t165 - t55 * t171;
+  real t177 = S[16] * t16 - t17 * t173 - t46 * t171;
+  G[4] = t177;
+  real t180 = t9 - S[17] * t17;
+  real t186 = t85 * (t42 - S[17] * t46 - t55 * t180);
+  real t188 = t54 * t180 - t55 * t186;
+  real t192 = S[17] * t16 - t17 * t188 - t46 * t186;
+  G[5] = t192;
+  G[6] = t97;
+  G[7] = t120;
+  G[8] = t143;
+  G[9] = t158;
+  G[10] = t173;
+  G[11] = t188;
+  G[12] = t95;
+  G[13] = t118;
+  G[14] = t141;
+  G[15] = t156;
+  G[16] = t171;
+  G[17] = t186;
+  real t193 = tau[0] - e[3];
+  real t200 = tau[1] + (e[5] * t3 - e[4] * t1) - t17 * t193;
+  real t212 = t85 * (tau[2] + (e[3] * t24 - e[4] * t22 - e[5] * t27) - t46 * t193 - t55 * t200);
+  real t214 = t54 * t200 - t55 * t212;
+  real t218 = t16 * t193 - t17 * t214 - t46 * t212;
+  g[0] = t218;
+  g[1] = t214;
+  g[2] = t212;
+  real t224 = S[0] - (S[3] * t101 + t81 * t97 + t90 * t95);
+  real t231 = S[1] - (S[3] * t124 + t81 * t120 + t90 * t118);
+  real t239 = S[2] - (S[3] * t147 + t81 * t143 + t90 * t141);
+  real t241 = Rc[0] * t224 + Rc[1] * t231 + Rc[2] * t239;
+  real t249 = S[6] - (S[8] * t124 + t105 * t120 + t113 * t118);
+  real t257 = S[7] - (S[8] * t147 + t105 * t143 + t113 * t141);
+  real t259 = Rc[0] * t231 + Rc[1] * t249 + Rc[2] * t257;
+  real t270 = S[11] - (S[12] * t147 + t128 * t143 + t136 * t141);
+  real t272 = Rc[0] * t239 + Rc[1] * t257 + Rc[2] * t270;
+  real t274 = Rc[0] * t241 + Rc[1] * t259 + Rc[2] * t272;
+  S_I[0] += t274;
+  real t279 = Rc[3] * t241 + Rc[4] * t259 + Rc[5] * t272;
+  S_I[1] += t279;
+  real t284 = Rc[6] * t241 + Rc[7] * t259 + Rc[8] * t272;
+  S_I[2] += t284;
+  real t290 = S[4] - (S[3] * t177 + t81 * t173 + t90 * t171);
+  real t297 = S[9] - (S[8] * t177 + t105 * t173 + t113 * t171);
+  real t305 = S[13] - (S[12] * t177 + t128 * t173 + t136 * t171);
+  real t307 = Rc[0] * t290 + Rc[1] * t297 + Rc[2] * t305;
+  real t314 = S[5] - (S[3] * t192 + t81 * t188 + t90 * t186);
+  real t321 = S[10] - (S[8] * t192 + t105 * t188 + t113 * t186);
+  real t329 = S[14] - (S[12] * t192 + t128 * t188 + t136 * t186);
+  real t331 = Rc[0] * t314 + Rc[1] * t321 + Rc[2] * t329;
+  real t333 = Rc[1] * t307 + Rc[2] * t331;
+  real t334 = r[1] * t284;
+  real t335 = r[2] * t279;
+  S_I[3] += t333 + (t334 - t335);
+  real t340 = Rc[4] * t307 + Rc[5] * t331;
+  real t344 = t340 + (r[2] * t274 - r[0] * t284);
+  S_I[4] += t344;
+  real t347 = Rc[7] * t307 + Rc[8] * t331;
+  real t351 = t347 + (r[0] * t279 - r[1] * t274);
+  S_I[5] += t351;
+  real t356 = Rc[3] * t224 + Rc[4] * t231 + Rc[5] * t239;
+  real t362 = Rc[3] * t231 + Rc[4] * t249 + Rc[5] * t257;
+  real t369 = Rc[3] * t239 + Rc[4] * t257 + Rc[5] * t270;
+  real t371 = Rc[3] * t356 + Rc[4] * t362 + Rc[5] * t369;
+  S_I[6] += t371;
+  real t376 = Rc[6] * t356 + Rc[7] * t362 + Rc[8] * t369;
+  S_I[7] += t376;
+  real t381 = Rc[3] * t290 + Rc[4] * t297 + Rc[5] * t305;
+  real t387 = Rc[3] * t314 + Rc[4] * t321 + Rc[5] * t329;
+  real t389 = Rc[1] * t381 + Rc[2] * t387;
+  real t393 = t389 + (r[1] * t376 - r[2] * t371);
+  S_I[8] += t393;
+  real t396 = Rc[4] * t381 + Rc[5] * t387;
+  real t397 = r[0] * t376;
+  real t399 = t396 + (t335 - t397);
+  S_I[9] += t399;
+  real t402 = Rc[7] * t381 + Rc[8] * t387;
+  real t406 = t402 + (r[0] * t371 - r[1] * t279);
+  S_I[10] += t406;
+  real t426 = Rc[6] * (Rc[6] * t224 + Rc[7] * t231 + Rc[8] * t239) + Rc[7] * (Rc[6] * t231 + Rc[7] *
+    t249 + Rc[8] * t257) + Rc[8] * (Rc[6] * t239 + Rc[7] * t257 + Rc[8] * t270);
+  S_I[11] += t426;
+  real t431 = Rc[6] * t290 + Rc[7] * t297 + Rc[8] * t305;
+  real t437 = Rc[6] * t314 + Rc[7] * t321 + Rc[8] * t329;
+  real t439 = Rc[1] * t431 + Rc[2] * t437;
+  real t443 = t439 + (r[1] * t426 - r[2] * t376);
+  S_I[12] += t443;
+  real t446 = Rc[4] * t431 + Rc[5] * t437;
+  real t450 = t446 + (r[2] * t284 - r[0] * t426);
+  S_I[13] += t450;
+  real t455 = Rc[7] * t431 + Rc[8] * t437 + (t397 - t334);
+  S_I[14] += t455;
+  real t461 = S[18] - (S[16] * t177 + t5 * t173 + t29 * t171);
+  real t468 = S[19] - (S[16] * t192 + t5 * t188 + t29 * t186);
+  real t470 = Rc[1] * t461 + Rc[2] * t468;
+  real t478 = S[20] - (S[17] * t192 + t9 * t188 + t42 * t186);
+  real t480 = Rc[1] * t468 + Rc[2] * t478;
+  S_I[15] += Rc[1] * t470 + Rc[2] * t480 + (r[1] * t443 - r[2] * t393 + (r[1] * t439 - r[2] *
+    t389));
+  S_I[16] += Rc[4] * t470 + Rc[5] * t480 + (r[1] * t450 - r[2] * t399 + (r[2] * t333 - r[0] *
+    t439));
+  S_I[17] += Rc[7] * t470 + Rc[8] * t480 + (r[1] * t455 - r[2] * t406 + (r[0] * t389 - r[1] *
+    t333));
+  real t515 = Rc[4] * t461 + Rc[5] * t468;
+  real t519 = Rc[4] * t468 + Rc[5] * t478;
+  S_I[18] += Rc[4] * t515 + Rc[5] * t519 + (r[2] * t344 - r[0] * t450 + (r[2] * t340 - r[0] *
+    t446));
+  S_I[19] += Rc[7] * t515 + Rc[8] * t519 + (r[2] * t351 - r[0] * t455 + (r[0] * t396 - r[1] *
+    t340));
+  S_I[20] += Rc[7] * (Rc[7] * t461 + Rc[8] * t468) + Rc[8] * (Rc[7] * t468 + Rc[8] * t478) + (r[0] *
+    t406 - r[1] * t351 + (r[0] * t402 - r[1] * t347));
+  real t563 = e[0] + (S[3] * t218 + t81 * t214 + t90 * t212);
+  real t570 = e[1] + (S[8] * t218 + t105 * t214 + t113 * t212);
+  real t578 = e[2] + (S[12] * t218 + t128 * t214 + t136 * t212);
+  e_I[0] += Rc[0] * t563 + Rc[1] * t570 + Rc[2] * t578;
+  e_I[1] += Rc[3] * t563 + Rc[4] * t570 + Rc[5] * t578;
+  e_I[2] += Rc[6] * t563 + Rc[7] * t570 + Rc[8] * t578;
+  real t597 = e[4] + (S[16] * t218 + t5 * t214 + t29 * t212);
+  real t605 = e[5] + (S[17] * t218 + t9 * t214 + t42 * t212);
+  e_I[3] += Rc[0] * tau[0] + Rc[1] * t597 + Rc[2] * t605 + (t563 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t570 * (Rc[7] * r[1] - Rc[4] * r[2]) + t578 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * tau[0] + Rc[4] * t597 + Rc[5] * t605 + (t563 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t570 * (Rc[1] * r[2] - Rc[7] * r[0]) + t578 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * tau[0] + Rc[7] * t597 + Rc[8] * t605 + (t563 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t570 * (Rc[4] * r[0] - Rc[1] * r[1]) + t578 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_condense_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_gimbal_condense_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1238,167 +400,54 @@ static const mstmm_guard mstmm_hinge_gimbal_condense_guards[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_gimbal_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_gimbal_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    delta[0] = t16;
-    delta[1] = t22;
-    delta[2] = t29;
-    const real t78 = sin(q[1]);
-    const real t79 = t77 * t78;
-    const real t80 = t53 - t79;
-    const real t81 = t36 + t80;
-    delta[3] = t81;
-    const real t82 = cos(q[0]);
-    const real t83 = t65 * t82;
-    const real t84 = sin(q[0]);
-    const real t85 = cos(q[1]);
-    const real t86 = t84 * t85;
-    const real t87 = t77 * t86;
-    const real t88 = t83 + t87;
-    const real t89 = t43 + t88;
-    delta[4] = t89;
-    const real t90 = t82 * t85;
-    const real t91 = t77 * t90;
-    const real t92 = t65 * t84;
-    const real t93 = t91 - t92;
-    const real t94 = t50 + t93;
-    delta[5] = t94;
-    return 0;
+  (void)p;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29;
+  delta[3] = t36 + (t53 - t77 * sin(q[1]));
+  real t82 = cos(q[0]);
+  real t84 = sin(q[0]);
+  real t85 = cos(q[1]);
+  delta[4] = t43 + (t65 * t82 + t77 * (t84 * t85));
+  delta[5] = t50 + (t77 * (t82 * t85) - t65 * t84);
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_recover_outputs[] = {
-    {"udot", 3, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* distance from the singular configuration
  * in  p[0] parameters
  * in  q[3] coordinates: angle1 [rad], angle2 [rad], angle3 [rad]
  * out measure[1] tends to zero where the coordinates fail
  */
-int mstmm_hinge_gimbal_singularity(const real *restrict p, const real *restrict q,
-    real *restrict measure)
+int mstmm_hinge_gimbal_singularity(in_t p, in_t q, out_t measure)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    measure[0] = t0;
-    return 0;
+  (void)p;
+  measure[0] = cos(q[1]);
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_singularity_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_singularity(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_singularity_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_singularity_outputs[] = {
-    {"measure", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_singularity, (in[0], in[1], out[0]))
 
 /* hinge and its derivative along a direction
  * in  p[0] parameters
@@ -1414,209 +463,70 @@ static const mstmm_port mstmm_hinge_gimbal_singularity_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[3] derivative of qdot
  */
-int mstmm_hinge_gimbal_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_gimbal_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    const real t0 = cos(q[2]);
-    const real t1 = sin(q[1]);
-    const real t2 = t1 * d_q[1];
-    const real t3 = t0 * t2;
-    const real t4 = cos(q[1]);
-    const real t5 = sin(q[2]);
-    const real t6 = t5 * d_q[2];
-    const real t7 = t4 * t6;
-    const real t8 = t3 + t7;
-    const real t9 = -t8;
-    d_R[0] = t9;
-    const real t10 = cos(q[0]);
-    const real t11 = t10 * d_q[0];
-    const real t12 = t1 * t11;
-    const real t13 = sin(q[0]);
-    const real t14 = t4 * d_q[1];
-    const real t15 = t13 * t14;
-    const real t16 = t12 + t15;
-    const real t17 = t0 * t16;
-    const real t18 = t13 * t1;
-    const real t19 = t18 * t6;
-    const real t20 = t17 - t19;
-    const real t21 = t0 * d_q[2];
-    const real t22 = t10 * t21;
-    const real t23 = t13 * d_q[0];
-    const real t24 = t5 * t23;
-    const real t25 = t22 - t24;
-    const real t26 = t20 - t25;
-    d_R[1] = t26;
-    const real t27 = t10 * t14;
-    const real t28 = t1 * t23;
-    const real t29 = t27 - t28;
-    const real t30 = t0 * t29;
-    const real t31 = t1 * t10;
-    const real t32 = t31 * t6;
-    const real t33 = t30 - t32;
-    const real t34 = t5 * t11;
-    const real t35 = t13 * t21;
-    const real t36 = t34 + t35;
-    const real t37 = t33 + t36;
-    d_R[2] = t37;
-    const real t38 = t4 * t21;
-    const real t39 = t5 * t2;
-    const real t40 = t38 - t39;
-    d_R[3] = t40;
-    const real t41 = t5 * t16;
-    const real t42 = t18 * t21;
-    const real t43 = t41 + t42;
-    const real t44 = t10 * t6;
-    const real t45 = t0 * t23;
-    const real t46 = t44 + t45;
-    const real t47 = t43 - t46;
-    d_R[4] = t47;
-    const real t48 = t5 * t14;
-    const real t49 = t1 * t21;
-    const real t50 = t48 + t49;
-    const real t51 = t10 * t50;
-    const real t52 = t1 * t5;
-    const real t53 = t52 * t23;
-    const real t54 = t51 - t53;
-    const real t55 = t0 * t11;
-    const real t56 = t13 * t6;
-    const real t57 = t55 - t56;
-    const real t58 = t54 - t57;
-    d_R[5] = t58;
-    const real t59 = -t14;
-    d_R[6] = t59;
-    const real t60 = t4 * t11;
-    const real t61 = t13 * t2;
-    const real t62 = t60 - t61;
-    d_R[7] = t62;
-    const real t63 = t10 * t2;
-    const real t64 = t4 * t23;
-    const real t65 = t63 + t64;
-    const real t66 = -t65;
-    d_R[8] = t66;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = 0.0;
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_H[6] = 0.0;
-    d_H[7] = 0.0;
-    d_H[8] = 0.0;
-    d_H[9] = 0.0;
-    d_H[10] = 0.0;
-    d_H[11] = t59;
-    d_H[12] = 0.0;
-    const real t67 = -t23;
-    d_H[13] = t67;
-    d_H[14] = t62;
-    d_H[15] = 0.0;
-    const real t68 = -t11;
-    d_H[16] = t68;
-    d_H[17] = t66;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = 0.0;
-    const real t69 = u[2] * t14;
-    const real t70 = t1 * d_u[2];
-    const real t71 = t69 + t70;
-    const real t72 = d_u[0] - t71;
-    d_w[0] = t72;
-    const real t73 = u[2] * t62;
-    const real t74 = t4 * t13;
-    const real t75 = t74 * d_u[2];
-    const real t76 = t73 + t75;
-    const real t77 = t10 * d_u[1];
-    const real t78 = u[1] * t23;
-    const real t79 = t77 - t78;
-    const real t80 = t76 + t79;
-    d_w[1] = t80;
-    const real t81 = t4 * t10;
-    const real t82 = t81 * d_u[2];
-    const real t83 = u[2] * t65;
-    const real t84 = t82 - t83;
-    const real t85 = u[1] * t11;
-    const real t86 = t13 * d_u[1];
-    const real t87 = t85 + t86;
-    const real t88 = t84 - t87;
-    d_w[2] = t88;
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    const real t89 = t4 * u[1];
-    const real t90 = t89 * d_u[2];
-    const real t91 = t4 * d_u[1];
-    const real t92 = u[1] * t2;
-    const real t93 = t91 - t92;
-    const real t94 = u[2] * t93;
-    const real t95 = t90 + t94;
-    const real t96 = -t95;
-    d_c[3] = t96;
-    const real t97 = t81 * u[2];
-    const real t98 = t13 * u[1];
-    const real t99 = t97 - t98;
-    const real t100 = t99 * d_u[0];
-    const real t101 = u[0] * t88;
-    const real t102 = t100 + t101;
-    const real t103 = t18 * u[1];
-    const real t104 = t103 * d_u[2];
-    const real t105 = u[1] * t16;
-    const real t106 = t18 * d_u[1];
-    const real t107 = t105 + t106;
-    const real t108 = u[2] * t107;
-    const real t109 = t104 + t108;
-    const real t110 = t102 - t109;
-    d_c[4] = t110;
-    const real t111 = t31 * u[1];
-    const real t112 = t111 * d_u[2];
-    const real t113 = u[1] * t29;
-    const real t114 = t31 * d_u[1];
-    const real t115 = t113 + t114;
-    const real t116 = u[2] * t115;
-    const real t117 = t112 + t116;
-    const real t118 = t10 * u[1];
-    const real t119 = t74 * u[2];
-    const real t120 = t118 + t119;
-    const real t121 = t120 * d_u[0];
-    const real t122 = u[0] * t80;
-    const real t123 = t121 + t122;
-    const real t124 = t117 + t123;
-    const real t125 = -t124;
-    d_c[5] = t125;
-    d_qdot[0] = d_u[0];
-    d_qdot[1] = d_u[1];
-    d_qdot[2] = d_u[2];
-    return 0;
+  (void)p;
+  real t0 = cos(q[2]);
+  real t1 = sin(q[1]);
+  real t2 = t1 * d_q[1];
+  real t4 = cos(q[1]);
+  real t5 = sin(q[2]);
+  real t6 = t5 * d_q[2];
+  d_R[0] = -(t0 * t2 + t4 * t6);
+  real t10 = cos(q[0]);
+  real t11 = t10 * d_q[0];
+  real t13 = sin(q[0]);
+  real t14 = t4 * d_q[1];
+  real t16 = t1 * t11 + t13 * t14;
+  real t18 = t13 * t1;
+  real t21 = t0 * d_q[2];
+  real t23 = t13 * d_q[0];
+  d_R[1] = t0 * t16 - t18 * t6 - (t10 * t21 - t5 * t23);
+  real t29 = t10 * t14 - t1 * t23;
+  real t31 = t1 * t10;
+  d_R[2] = t0 * t29 - t31 * t6 + (t5 * t11 + t13 * t21);
+  d_R[3] = t4 * t21 - t5 * t2;
+  d_R[4] = t5 * t16 + t18 * t21 - (t10 * t6 + t0 * t23);
+  d_R[5] = t10 * (t5 * t14 + t1 * t21) - t1 * t5 * t23 - (t0 * t11 - t13 * t6);
+  real t59 = -t14;
+  d_R[6] = t59;
+  real t62 = t4 * t11 - t13 * t2;
+  d_R[7] = t62;
+  real t65 = t10 * t2 + t4 * t23;
+  real t66 = -t65;
+  d_R[8] = t66;
+  d_d[0] = d_d[1] = d_d[2] = d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = d_H[6] = d_H[7] =
+    d_H[8] = d_H[9] = d_H[10] = 0.0;
+  d_H[11] = t59;
+  d_H[12] = 0.0;
+  d_H[13] = -t23;
+  d_H[14] = t62;
+  d_H[15] = 0.0;
+  d_H[16] = -t11;
+  d_H[17] = t66;
+  d_v[0] = d_v[1] = d_v[2] = 0.0;
+  d_w[0] = d_u[0] - (u[2] * t14 + t1 * d_u[2]);
+  real t74 = t4 * t13;
+  real t80 = u[2] * t62 + t74 * d_u[2] + (t10 * d_u[1] - u[1] * t23);
+  d_w[1] = t80;
+  real t81 = t4 * t10;
+  real t88 = t81 * d_u[2] - u[2] * t65 - (u[1] * t11 + t13 * d_u[1]);
+  d_w[2] = t88;
+  d_c[0] = d_c[1] = d_c[2] = 0.0;
+  d_c[3] = -(t4 * u[1] * d_u[2] + u[2] * (t4 * d_u[1] - u[1] * t2));
+  d_c[4] = (t81 * u[2] - t13 * u[1]) * d_u[0] + u[0] * t88 - (t18 * u[1] * d_u[2] + u[2] * (u[1] *
+    t16 + t18 * d_u[1]));
+  d_c[5] = -(t31 * u[1] * d_u[2] + u[2] * (u[1] * t29 + t31 * d_u[1]) + ((t10 * u[1] + t74 * u[2]) *
+    d_u[0] + u[0] * t80));
+  d_qdot[0] = d_u[0];
+  d_qdot[1] = d_u[1];
+  d_qdot[2] = d_u[2];
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"d_q", 3, "", 0, 0},
-    {"d_u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 18, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[0] parameters
@@ -1624,39 +534,16 @@ static const mstmm_port mstmm_hinge_gimbal_hinge_slope_outputs[] = {
  * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
  * out J[3][3] qdot by q, transposed
  */
-int mstmm_hinge_gimbal_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_gimbal_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    J[4] = 0.0;
-    J[5] = 0.0;
-    J[6] = 0.0;
-    J[7] = 0.0;
-    J[8] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = J[1] = J[2] = J[3] = J[4] = J[5] = J[6] = J[7] = J[8] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_rates_by_coordinates_outputs[] = {
-    {"J", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[0] parameters
@@ -1664,39 +551,20 @@ static const mstmm_port mstmm_hinge_gimbal_rates_by_coordinates_outputs[] = {
  * in  u[3] speeds: angle1_rate [rad/s], angle2_rate [rad/s], angle3_rate [rad/s]
  * out J[3][3] qdot by u, transposed
  */
-int mstmm_hinge_gimbal_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_gimbal_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    J[4] = 1.0;
-    J[5] = 0.0;
-    J[6] = 0.0;
-    J[7] = 0.0;
-    J[8] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  J[1] = J[2] = J[3] = 0.0;
+  J[4] = 1.0;
+  J[5] = J[6] = J[7] = 0.0;
+  J[8] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_outputs[] = {
-    {"J", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[0] parameters
@@ -1717,309 +585,117 @@ static const mstmm_port mstmm_hinge_gimbal_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_gimbal_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_gimbal_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    (void)p;
-    const real t0 = cos(q[1]);
-    const real t1 = cos(q[2]);
-    const real t2 = t0 * t1;
-    R[0] = t2;
-    const real t3 = sin(q[0]);
-    const real t4 = sin(q[1]);
-    const real t5 = t3 * t4;
-    const real t6 = t1 * t5;
-    const real t7 = sin(q[2]);
-    const real t8 = cos(q[0]);
-    const real t9 = t7 * t8;
-    const real t10 = t6 - t9;
-    R[1] = t10;
-    const real t11 = t3 * t7;
-    const real t12 = t4 * t8;
-    const real t13 = t1 * t12;
-    const real t14 = t11 + t13;
-    R[2] = t14;
-    const real t15 = t0 * t7;
-    R[3] = t15;
-    const real t16 = t1 * t8;
-    const real t17 = t5 * t7;
-    const real t18 = t16 + t17;
-    R[4] = t18;
-    const real t19 = t4 * t7;
-    const real t20 = t8 * t19;
-    const real t21 = t1 * t3;
-    const real t22 = t20 - t21;
-    R[5] = t22;
-    const real t23 = -t4;
-    R[6] = t23;
-    const real t24 = t0 * t3;
-    R[7] = t24;
-    const real t25 = t0 * t8;
-    R[8] = t25;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 1.0;
-    H[10] = 0.0;
-    H[11] = t23;
-    H[12] = 0.0;
-    H[13] = t8;
-    H[14] = t24;
-    H[15] = 0.0;
-    const real t26 = -t3;
-    H[16] = t26;
-    H[17] = t25;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    const real t27 = u[2] * t4;
-    const real t28 = u[0] - t27;
-    w[0] = t28;
-    const real t29 = u[1] * t8;
-    const real t30 = u[2] * t24;
-    const real t31 = t29 + t30;
-    w[1] = t31;
-    const real t32 = u[2] * t25;
-    const real t33 = u[1] * t3;
-    const real t34 = t32 - t33;
-    w[2] = t34;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    const real t35 = u[1] * t0;
-    const real t36 = u[2] * t35;
-    const real t37 = -t36;
-    c[3] = t37;
-    const real t38 = u[0] * t34;
-    const real t39 = u[1] * t5;
-    const real t40 = u[2] * t39;
-    const real t41 = t38 - t40;
-    c[4] = t41;
-    const real t42 = u[0] * t31;
-    const real t43 = u[1] * t12;
-    const real t44 = u[2] * t43;
-    const real t45 = t42 + t44;
-    const real t46 = -t45;
-    c[5] = t46;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    qdot[2] = u[2];
-    const real t47 = t2 * Rt[0];
-    const real t48 = t15 * Rt[1];
-    const real t49 = t47 + t48;
-    const real t50 = t4 * Rt[2];
-    const real t51 = t49 - t50;
-    Rc[0] = t51;
-    const real t52 = t10 * Rt[0];
-    const real t53 = t18 * Rt[1];
-    const real t54 = t52 + t53;
-    const real t55 = t24 * Rt[2];
-    const real t56 = t54 + t55;
-    Rc[1] = t56;
-    const real t57 = t14 * Rt[0];
-    const real t58 = t22 * Rt[1];
-    const real t59 = t57 + t58;
-    const real t60 = t25 * Rt[2];
-    const real t61 = t59 + t60;
-    Rc[2] = t61;
-    const real t62 = t2 * Rt[3];
-    const real t63 = t15 * Rt[4];
-    const real t64 = t62 + t63;
-    const real t65 = t4 * Rt[5];
-    const real t66 = t64 - t65;
-    Rc[3] = t66;
-    const real t67 = t10 * Rt[3];
-    const real t68 = t18 * Rt[4];
-    const real t69 = t67 + t68;
-    const real t70 = t24 * Rt[5];
-    const real t71 = t69 + t70;
-    Rc[4] = t71;
-    const real t72 = t14 * Rt[3];
-    const real t73 = t22 * Rt[4];
-    const real t74 = t72 + t73;
-    const real t75 = t25 * Rt[5];
-    const real t76 = t74 + t75;
-    Rc[5] = t76;
-    const real t77 = t2 * Rt[6];
-    const real t78 = t15 * Rt[7];
-    const real t79 = t77 + t78;
-    const real t80 = t4 * Rt[8];
-    const real t81 = t79 - t80;
-    Rc[6] = t81;
-    const real t82 = t10 * Rt[6];
-    const real t83 = t18 * Rt[7];
-    const real t84 = t82 + t83;
-    const real t85 = t24 * Rt[8];
-    const real t86 = t84 + t85;
-    Rc[7] = t86;
-    const real t87 = t14 * Rt[6];
-    const real t88 = t22 * Rt[7];
-    const real t89 = t87 + t88;
-    const real t90 = t25 * Rt[8];
-    const real t91 = t89 + t90;
-    Rc[8] = t91;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t92 = motion_I[0] * t51;
-    const real t93 = motion_I[1] * t66;
-    const real t94 = t92 + t93;
-    const real t95 = motion_I[2] * t81;
-    const real t96 = t94 + t95;
-    const real t97 = t28 + t96;
-    motion[0] = t97;
-    const real t98 = motion_I[0] * t56;
-    const real t99 = motion_I[1] * t71;
-    const real t100 = t98 + t99;
-    const real t101 = motion_I[2] * t86;
-    const real t102 = t100 + t101;
-    const real t103 = t31 + t102;
-    motion[1] = t103;
-    const real t104 = motion_I[0] * t61;
-    const real t105 = motion_I[1] * t76;
-    const real t106 = t104 + t105;
-    const real t107 = motion_I[2] * t91;
-    const real t108 = t106 + t107;
-    const real t109 = t34 + t108;
-    motion[2] = t109;
-    const real t110 = motion_I[3] * t51;
-    const real t111 = motion_I[4] * t66;
-    const real t112 = t110 + t111;
-    const real t113 = motion_I[5] * t81;
-    const real t114 = t112 + t113;
-    const real t115 = t4 * s[2];
-    const real t116 = s[0] - t115;
-    const real t117 = t116 - t36;
-    const real t118 = t34 * t102;
-    const real t119 = t31 * t108;
-    const real t120 = t118 - t119;
-    const real t121 = t117 + t120;
-    const real t122 = t114 + t121;
-    motion[3] = t122;
-    const real t123 = motion_I[3] * t56;
-    const real t124 = motion_I[4] * t71;
-    const real t125 = t123 + t124;
-    const real t126 = motion_I[5] * t86;
-    const real t127 = t125 + t126;
-    const real t128 = t8 * s[1];
-    const real t129 = t24 * s[2];
-    const real t130 = t128 + t129;
-    const real t131 = t41 + t130;
-    const real t132 = t28 * t108;
-    const real t133 = t34 * t96;
-    const real t134 = t132 - t133;
-    const real t135 = t131 + t134;
-    const real t136 = t127 + t135;
-    motion[4] = t136;
-    const real t137 = motion_I[3] * t61;
-    const real t138 = motion_I[4] * t76;
-    const real t139 = t137 + t138;
-    const real t140 = motion_I[5] * t91;
-    const real t141 = t139 + t140;
-    const real t142 = t25 * s[2];
-    const real t143 = t3 * s[1];
-    const real t144 = t142 - t143;
-    const real t145 = t144 - t45;
-    const real t146 = t31 * t96;
-    const real t147 = t28 * t102;
-    const real t148 = t146 - t147;
-    const real t149 = t145 + t148;
-    const real t150 = t141 + t149;
-    motion[5] = t150;
-    const real t151 = motion_I[0] * motion_I[1];
-    const real t152 = t151 - motion_I[5];
-    const real t153 = ro[1] * t152;
-    const real t154 = motion_I[1] * motion_I[1];
-    const real t155 = motion_I[2] * motion_I[2];
-    const real t156 = t154 + t155;
-    const real t157 = ro[0] * t156;
-    const real t158 = t153 - t157;
-    const real t159 = motion_I[0] * motion_I[2];
-    const real t160 = motion_I[4] + t159;
-    const real t161 = ro[2] * t160;
-    const real t162 = t158 + t161;
-    const real t163 = motion_I[6] + t162;
-    const real t164 = t51 * t163;
-    const real t165 = motion_I[5] + t151;
-    const real t166 = ro[0] * t165;
-    const real t167 = motion_I[0] * motion_I[0];
-    const real t168 = t155 + t167;
-    const real t169 = ro[1] * t168;
-    const real t170 = t166 - t169;
-    const real t171 = motion_I[1] * motion_I[2];
-    const real t172 = t171 - motion_I[3];
-    const real t173 = ro[2] * t172;
-    const real t174 = t170 + t173;
-    const real t175 = motion_I[7] + t174;
-    const real t176 = t66 * t175;
-    const real t177 = t164 + t176;
-    const real t178 = t159 - motion_I[4];
-    const real t179 = ro[0] * t178;
-    const real t180 = motion_I[3] + t171;
-    const real t181 = ro[1] * t180;
-    const real t182 = t179 + t181;
-    const real t183 = t154 + t167;
-    const real t184 = ro[2] * t183;
-    const real t185 = t182 - t184;
-    const real t186 = motion_I[8] + t185;
-    const real t187 = t81 * t186;
-    const real t188 = t177 + t187;
-    motion[6] = t188;
-    const real t189 = t56 * t163;
-    const real t190 = t71 * t175;
-    const real t191 = t189 + t190;
-    const real t192 = t86 * t186;
-    const real t193 = t191 + t192;
-    motion[7] = t193;
-    const real t194 = t61 * t163;
-    const real t195 = t76 * t175;
-    const real t196 = t194 + t195;
-    const real t197 = t91 * t186;
-    const real t198 = t196 + t197;
-    motion[8] = t198;
-    return 0;
+  (void)p;
+  real t0 = cos(q[1]);
+  real t1 = cos(q[2]);
+  real t2 = t0 * t1;
+  R[0] = t2;
+  real t3 = sin(q[0]);
+  real t4 = sin(q[1]);
+  real t5 = t3 * t4;
+  real t7 = sin(q[2]);
+  real t8 = cos(q[0]);
+  real t10 = t1 * t5 - t7 * t8;
+  R[1] = t10;
+  real t12 = t4 * t8;
+  real t14 = t3 * t7 + t1 * t12;
+  R[2] = t14;
+  real t15 = t0 * t7;
+  R[3] = t15;
+  real t18 = t1 * t8 + t5 * t7;
+  R[4] = t18;
+  real t22 = t8 * (t4 * t7) - t1 * t3;
+  R[5] = t22;
+  real t23 = -t4;
+  R[6] = t23;
+  real t24 = t0 * t3;
+  R[7] = t24;
+  real t25 = t0 * t8;
+  R[8] = t25;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = H[7] = H[8] = 0.0;
+  H[9] = 1.0;
+  H[10] = 0.0;
+  H[11] = t23;
+  H[12] = 0.0;
+  H[13] = t8;
+  H[14] = t24;
+  H[15] = 0.0;
+  H[16] = -t3;
+  H[17] = t25;
+  v[0] = v[1] = v[2] = 0.0;
+  real t28 = u[0] - u[2] * t4;
+  w[0] = t28;
+  real t31 = u[1] * t8 + u[2] * t24;
+  w[1] = t31;
+  real t34 = u[2] * t25 - u[1] * t3;
+  w[2] = t34;
+  c[0] = c[1] = c[2] = 0.0;
+  real t36 = u[2] * (u[1] * t0);
+  c[3] = -t36;
+  real t41 = u[0] * t34 - u[2] * (u[1] * t5);
+  c[4] = t41;
+  real t45 = u[0] * t31 + u[2] * (u[1] * t12);
+  c[5] = -t45;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  qdot[2] = u[2];
+  real t51 = t2 * Rt[0] + t15 * Rt[1] - t4 * Rt[2];
+  Rc[0] = t51;
+  real t56 = t10 * Rt[0] + t18 * Rt[1] + t24 * Rt[2];
+  Rc[1] = t56;
+  real t61 = t14 * Rt[0] + t22 * Rt[1] + t25 * Rt[2];
+  Rc[2] = t61;
+  real t66 = t2 * Rt[3] + t15 * Rt[4] - t4 * Rt[5];
+  Rc[3] = t66;
+  real t71 = t10 * Rt[3] + t18 * Rt[4] + t24 * Rt[5];
+  Rc[4] = t71;
+  real t76 = t14 * Rt[3] + t22 * Rt[4] + t25 * Rt[5];
+  Rc[5] = t76;
+  real t81 = t2 * Rt[6] + t15 * Rt[7] - t4 * Rt[8];
+  Rc[6] = t81;
+  real t86 = t10 * Rt[6] + t18 * Rt[7] + t24 * Rt[8];
+  Rc[7] = t86;
+  real t91 = t14 * Rt[6] + t22 * Rt[7] + t25 * Rt[8];
+  Rc[8] = t91;
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t96 = motion_I[0] * t51 + motion_I[1] * t66 + motion_I[2] * t81;
+  motion[0] = t28 + t96;
+  real t102 = motion_I[0] * t56 + motion_I[1] * t71 + motion_I[2] * t86;
+  motion[1] = t31 + t102;
+  real t108 = motion_I[0] * t61 + motion_I[1] * t76 + motion_I[2] * t91;
+  motion[2] = t34 + t108;
+  motion[3] = motion_I[3] * t51 + motion_I[4] * t66 + motion_I[5] * t81 + (s[0] - t4 * s[2] - t36 +
+    (t34 * t102 - t31 * t108));
+  motion[4] = motion_I[3] * t56 + motion_I[4] * t71 + motion_I[5] * t86 + (t41 + (t8 * s[1] + t24 *
+    s[2]) + (t28 * t108 - t34 * t96));
+  motion[5] = motion_I[3] * t61 + motion_I[4] * t76 + motion_I[5] * t91 + (t25 * s[2] - t3 * s[1] -
+    t45 + (t31 * t96 - t28 * t102));
+  real t151 = motion_I[0] * motion_I[1];
+  real t154 = motion_I[1] * motion_I[1];
+  real t155 = motion_I[2] * motion_I[2];
+  real t159 = motion_I[0] * motion_I[2];
+  real t163 = motion_I[6] + (ro[1] * (t151 - motion_I[5]) - ro[0] * (t154 + t155) + ro[2] *
+    (motion_I[4] + t159));
+  real t167 = motion_I[0] * motion_I[0];
+  real t171 = motion_I[1] * motion_I[2];
+  real t175 = motion_I[7] + (ro[0] * (motion_I[5] + t151) - ro[1] * (t155 + t167) + ro[2] * (t171 -
+    motion_I[3]));
+  real t186 = motion_I[8] + (ro[0] * (t159 - motion_I[4]) + ro[1] * (motion_I[3] + t171) - ro[2] *
+    (t154 + t167));
+  motion[6] = t51 * t163 + t66 * t175 + t81 * t186;
+  motion[7] = t56 * t163 + t71 * t175 + t86 * t186;
+  motion[8] = t61 * t163 + t76 * t175 + t91 * t186;
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 3, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2041,462 +717,138 @@ static const mstmm_port mstmm_hinge_gimbal_body_motion_outputs[] = {
  * out W[3][3] slopes of the rows by load, rotors and laws
  * out H[6][3] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_gimbal_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_gimbal_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)along;
-    B[0] = rate[0];
-    const real t0 = cos(q[1]);
-    const real t1 = cos(q[0]);
-    const real t2 = 1.0 / sq[0];
-    const real t3 = t1 * t2;
-    const real t4 = t0 * t3;
-    const real t5 = u[2] * t4;
-    const real t6 = sin(q[0]);
-    const real t7 = t6 * t2;
-    const real t8 = u[1] * t7;
-    const real t9 = t5 - t8;
-    const real t10 = t0 * t1;
-    const real t11 = u[2] * t10;
-    const real t12 = u[1] * t6;
-    const real t13 = t11 - t12;
-    const real t14 = motion[2] - t13;
-    const real t15 = t2 * t14;
-    const real t16 = t9 + t15;
-    B[1] = t16;
-    const real t17 = u[1] * t3;
-    const real t18 = t0 * t7;
-    const real t19 = u[2] * t18;
-    const real t20 = t17 + t19;
-    const real t21 = u[1] * t1;
-    const real t22 = t0 * t6;
-    const real t23 = u[2] * t22;
-    const real t24 = t21 + t23;
-    const real t25 = motion[1] - t24;
-    const real t26 = t2 * t25;
-    const real t27 = t20 + t26;
-    const real t28 = -t27;
-    B[2] = t28;
-    const real t29 = t13 * t15;
-    const real t30 = t24 * t26;
-    const real t31 = t29 + t30;
-    const real t32 = t20 * t25;
-    const real t33 = t9 * t14;
-    const real t34 = t32 + t33;
-    const real t35 = scale[0] - t34;
-    const real t36 = t31 + t35;
-    B[3] = t36;
-    const real t37 = t13 * rate[0];
-    const real t38 = u[0] * t20;
-    const real t39 = t37 - t38;
-    const real t40 = sin(q[1]);
-    const real t41 = t40 * t3;
-    const real t42 = u[1] * t41;
-    const real t43 = u[2] * t42;
-    const real t44 = t39 - t43;
-    const real t45 = s[2] * t4;
-    const real t46 = s[1] * t7;
-    const real t47 = t45 - t46;
-    const real t48 = t44 + t47;
-    const real t49 = u[2] * t40;
-    const real t50 = u[0] - t49;
-    const real t51 = t50 * t25;
-    const real t52 = motion[0] - t50;
-    const real t53 = t24 * t52;
-    const real t54 = t51 - t53;
-    const real t55 = t10 * s[2];
-    const real t56 = t6 * s[1];
-    const real t57 = t55 - t56;
-    const real t58 = u[0] * t24;
-    const real t59 = t40 * t1;
-    const real t60 = u[1] * t59;
-    const real t61 = u[2] * t60;
-    const real t62 = t58 + t61;
-    const real t63 = t57 - t62;
-    const real t64 = t54 - t63;
-    const real t65 = motion[5] + t64;
-    const real t66 = t2 * t65;
-    const real t67 = rate[0] * t14;
-    const real t68 = t20 * t52;
-    const real t69 = t67 + t68;
-    const real t70 = t66 + t69;
-    const real t71 = t48 + t70;
-    const real t72 = t50 * t26;
-    const real t73 = t71 - t72;
-    B[4] = t73;
-    const real t74 = t40 * t7;
-    const real t75 = u[1] * t74;
-    const real t76 = u[2] * t75;
-    const real t77 = t24 * rate[0];
-    const real t78 = u[0] * t9;
-    const real t79 = t77 + t78;
-    const real t80 = t76 - t79;
-    const real t81 = s[1] * t3;
-    const real t82 = s[2] * t18;
-    const real t83 = t81 + t82;
-    const real t84 = t80 - t83;
-    const real t85 = t9 * t52;
-    const real t86 = rate[0] * t25;
-    const real t87 = t85 - t86;
-    const real t88 = t13 * t52;
-    const real t89 = t50 * t14;
-    const real t90 = t88 - t89;
-    const real t91 = u[0] * t13;
-    const real t92 = t6 * t40;
-    const real t93 = u[1] * t92;
-    const real t94 = u[2] * t93;
-    const real t95 = t91 - t94;
-    const real t96 = t1 * s[1];
-    const real t97 = t22 * s[2];
-    const real t98 = t96 + t97;
-    const real t99 = t95 + t98;
-    const real t100 = t90 - t99;
-    const real t101 = motion[4] + t100;
-    const real t102 = t2 * t101;
-    const real t103 = t87 - t102;
-    const real t104 = t84 + t103;
-    const real t105 = t50 * t15;
-    const real t106 = t104 - t105;
-    B[5] = t106;
-    B[6] = 0.0;
-    const real t107 = motion[8] * t2;
-    B[7] = t107;
-    const real t108 = motion[7] * t2;
-    const real t109 = -t108;
-    B[8] = t109;
-    const real t110 = t0 * t2;
-    const real t111 = u[2] * t110;
-    const real t112 = t7 * t25;
-    const real t113 = t3 * t14;
-    const real t114 = t112 + t113;
-    const real t115 = t111 + t114;
-    const real t116 = -t115;
-    B[9] = t116;
-    const real t117 = t1 * rate[0];
-    const real t118 = t40 * t2;
-    const real t119 = t6 * t118;
-    const real t120 = u[2] * t119;
-    const real t121 = t117 - t120;
-    const real t122 = t7 * t52;
-    const real t123 = t121 + t122;
-    B[10] = t123;
-    const real t124 = t3 * t52;
-    const real t125 = t6 * rate[0];
-    const real t126 = t1 * t118;
-    const real t127 = u[2] * t126;
-    const real t128 = t125 + t127;
-    const real t129 = t124 - t128;
-    B[11] = t129;
-    const real t130 = t13 * t122;
-    const real t131 = t24 * t124;
-    const real t132 = t130 - t131;
-    const real t133 = t0 * rate[0];
-    const real t134 = u[1] * t118;
-    const real t135 = t133 - t134;
-    const real t136 = u[2] * t135;
-    const real t137 = s[2] * t110;
-    const real t138 = t136 + t137;
-    const real t139 = t7 * t101;
-    const real t140 = t25 * t128;
-    const real t141 = t14 * t121;
-    const real t142 = t140 + t141;
-    const real t143 = t139 + t142;
-    const real t144 = t3 * t65;
-    const real t145 = t143 + t144;
-    const real t146 = t138 + t145;
-    const real t147 = t132 - t146;
-    B[12] = t147;
-    const real t148 = t50 * t124;
-    const real t149 = t13 * t114;
-    const real t150 = t148 + t149;
-    const real t151 = t1 * scale[0];
-    const real t152 = s[2] * t119;
-    const real t153 = t151 - t152;
-    const real t154 = t92 * rate[0];
-    const real t155 = t6 * t110;
-    const real t156 = u[1] * t155;
-    const real t157 = t154 + t156;
-    const real t158 = u[2] * t157;
-    const real t159 = u[0] * t128;
-    const real t160 = t158 + t159;
-    const real t161 = t153 - t160;
-    const real t162 = t52 * t128;
-    const real t163 = t14 * t111;
-    const real t164 = t162 - t163;
-    const real t165 = t24 * t14;
-    const real t166 = t13 * t25;
-    const real t167 = t165 - t166;
-    const real t168 = t40 * s[2];
-    const real t169 = s[0] - t168;
-    const real t170 = u[1] * t0;
-    const real t171 = u[2] * t170;
-    const real t172 = t169 - t171;
-    const real t173 = t167 - t172;
-    const real t174 = motion[3] + t173;
-    const real t175 = t7 * t174;
-    const real t176 = t164 + t175;
-    const real t177 = t161 + t176;
-    const real t178 = t150 + t177;
-    B[13] = t178;
-    const real t179 = t3 * t174;
-    const real t180 = t52 * t121;
-    const real t181 = t25 * t111;
-    const real t182 = t180 + t181;
-    const real t183 = t179 + t182;
-    const real t184 = t59 * rate[0];
-    const real t185 = t1 * t110;
-    const real t186 = u[1] * t185;
-    const real t187 = t184 + t186;
-    const real t188 = u[2] * t187;
-    const real t189 = u[0] * t121;
-    const real t190 = t188 + t189;
-    const real t191 = t6 * scale[0];
-    const real t192 = s[2] * t126;
-    const real t193 = t191 + t192;
-    const real t194 = t190 + t193;
-    const real t195 = t183 - t194;
-    const real t196 = t24 * t114;
-    const real t197 = t50 * t122;
-    const real t198 = t196 + t197;
-    const real t199 = t195 - t198;
-    B[14] = t199;
-    const real t200 = motion[7] * t7;
-    const real t201 = motion[8] * t3;
-    const real t202 = t200 + t201;
-    const real t203 = -t202;
-    B[15] = t203;
-    const real t204 = motion[6] * t7;
-    B[16] = t204;
-    const real t205 = motion[6] * t3;
-    B[17] = t205;
-    const real t206 = t10 * t2;
-    const real t207 = t25 * t206;
-    const real t208 = t22 * t2;
-    const real t209 = t14 * t208;
-    const real t210 = t207 - t209;
-    const real t211 = t40 * rate[0];
-    const real t212 = t210 - t211;
-    B[18] = t212;
-    const real t213 = t22 * rate[0];
-    const real t214 = t14 * t118;
-    const real t215 = t52 * t206;
-    const real t216 = t214 + t215;
-    const real t217 = t213 - t216;
-    B[19] = t217;
-    const real t218 = t10 * rate[0];
-    const real t219 = t52 * t208;
-    const real t220 = t25 * t118;
-    const real t221 = t219 + t220;
-    const real t222 = t218 + t221;
-    B[20] = t222;
-    const real t223 = t101 * t206;
-    const real t224 = t25 * t218;
-    const real t225 = t14 * t213;
-    const real t226 = t224 - t225;
-    const real t227 = t223 + t226;
-    const real t228 = t65 * t208;
-    const real t229 = t227 - t228;
-    const real t230 = t170 * rate[0];
-    const real t231 = t40 * scale[0];
-    const real t232 = t230 + t231;
-    const real t233 = t229 - t232;
-    const real t234 = t13 * t216;
-    const real t235 = t24 * t221;
-    const real t236 = t234 + t235;
-    const real t237 = t233 - t236;
-    B[21] = t237;
-    const real t238 = t50 * t221;
-    const real t239 = t13 * t210;
-    const real t240 = t238 - t239;
-    const real t241 = u[0] * t218;
-    const real t242 = t93 * rate[0];
-    const real t243 = t241 - t242;
-    const real t244 = t22 * scale[0];
-    const real t245 = t243 + t244;
-    const real t246 = t65 * t118;
-    const real t247 = t14 * t211;
-    const real t248 = t52 * t218;
-    const real t249 = t247 + t248;
-    const real t250 = t174 * t206;
-    const real t251 = t249 + t250;
-    const real t252 = t246 + t251;
-    const real t253 = t245 - t252;
-    const real t254 = t240 + t253;
-    B[22] = t254;
-    const real t255 = t24 * t210;
-    const real t256 = t50 * t216;
-    const real t257 = t255 + t256;
-    const real t258 = t10 * scale[0];
-    const real t259 = t60 * rate[0];
-    const real t260 = u[0] * t213;
-    const real t261 = t259 + t260;
-    const real t262 = t258 - t261;
-    const real t263 = t174 * t208;
-    const real t264 = t52 * t213;
-    const real t265 = t25 * t211;
-    const real t266 = t264 + t265;
-    const real t267 = t263 + t266;
-    const real t268 = t101 * t118;
-    const real t269 = t267 + t268;
-    const real t270 = t262 + t269;
-    const real t271 = t257 + t270;
-    B[23] = t271;
-    const real t272 = motion[7] * t206;
-    const real t273 = motion[8] * t208;
-    const real t274 = t272 - t273;
-    B[24] = t274;
-    const real t275 = motion[8] * t118;
-    const real t276 = motion[6] * t206;
-    const real t277 = t275 + t276;
-    const real t278 = -t277;
-    B[25] = t278;
-    const real t279 = motion[6] * t208;
-    const real t280 = motion[7] * t118;
-    const real t281 = t279 + t280;
-    B[26] = t281;
-    G[0] = 0.0;
-    const real t282 = f[2] * t2;
-    const real t283 = -t282;
-    G[1] = t283;
-    const real t284 = f[1] * t2;
-    G[2] = t284;
-    G[3] = 0.0;
-    const real t285 = f[5] * t2;
-    const real t286 = -t285;
-    G[4] = t286;
-    const real t287 = f[4] * t2;
-    G[5] = t287;
-    const real t288 = f[2] * t3;
-    const real t289 = f[1] * t7;
-    const real t290 = t288 + t289;
-    G[6] = t290;
-    const real t291 = f[0] * t7;
-    const real t292 = -t291;
-    G[7] = t292;
-    const real t293 = f[0] * t3;
-    const real t294 = -t293;
-    G[8] = t294;
-    const real t295 = f[4] * t7;
-    const real t296 = f[5] * t3;
-    const real t297 = t295 + t296;
-    G[9] = t297;
-    const real t298 = f[3] * t7;
-    const real t299 = -t298;
-    G[10] = t299;
-    const real t300 = f[3] * t3;
-    const real t301 = -t300;
-    G[11] = t301;
-    const real t302 = f[2] * t208;
-    const real t303 = f[1] * t206;
-    const real t304 = t302 - t303;
-    G[12] = t304;
-    const real t305 = f[0] * t206;
-    const real t306 = f[2] * t118;
-    const real t307 = t305 + t306;
-    G[13] = t307;
-    const real t308 = f[1] * t118;
-    const real t309 = f[0] * t208;
-    const real t310 = t308 + t309;
-    const real t311 = -t310;
-    G[14] = t311;
-    const real t312 = f[5] * t208;
-    const real t313 = f[4] * t206;
-    const real t314 = t312 - t313;
-    G[15] = t314;
-    const real t315 = f[3] * t206;
-    const real t316 = f[5] * t118;
-    const real t317 = t315 + t316;
-    G[16] = t317;
-    const real t318 = f[4] * t118;
-    const real t319 = f[3] * t208;
-    const real t320 = t318 + t319;
-    const real t321 = -t320;
-    G[17] = t321;
-    const real t322 = J[0] * scale[0];
-    const real t323 = t322 - laws[0];
-    W[0] = t323;
-    const real t324 = laws[1] + t297;
-    const real t325 = -t324;
-    W[1] = t325;
-    const real t326 = f[4] * t4;
-    const real t327 = f[5] * t18;
-    const real t328 = t326 - t327;
-    const real t329 = t328 - laws[2];
-    W[2] = t329;
-    const real t330 = -laws[3];
-    W[3] = t330;
-    const real t331 = J[1] * scale[0];
-    const real t332 = t331 - laws[4];
-    W[4] = t332;
-    const real t333 = f[3] * t110;
-    const real t334 = f[4] * t119;
-    const real t335 = t333 + t334;
-    const real t336 = f[5] * t126;
-    const real t337 = t335 + t336;
-    const real t338 = laws[5] + t337;
-    const real t339 = -t338;
-    W[5] = t339;
-    const real t340 = -laws[6];
-    W[6] = t340;
-    const real t341 = -laws[7];
-    W[7] = t341;
-    const real t342 = J[2] * scale[0];
-    const real t343 = t342 - laws[8];
-    W[8] = t343;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 1.0;
-    H[10] = 0.0;
-    const real t344 = -t40;
-    H[11] = t344;
-    H[12] = 0.0;
-    H[13] = t1;
-    H[14] = t22;
-    H[15] = 0.0;
-    const real t345 = -t6;
-    H[16] = t345;
-    H[17] = t10;
-    return 0;
+  (void)p;
+  (void)along;
+  B[0] = rate[0];
+  real t0 = cos(q[1]);
+  real t1 = cos(q[0]);
+  real t2 = 1.0 / sq[0];
+  real t3 = t1 * t2;
+  real t4 = t0 * t3;
+  real t6 = sin(q[0]);
+  real t7 = t6 * t2;
+  real t9 = u[2] * t4 - u[1] * t7;
+  real t10 = t0 * t1;
+  real t13 = u[2] * t10 - u[1] * t6;
+  real t14 = motion[2] - t13;
+  real t15 = t2 * t14;
+  B[1] = t9 + t15;
+  real t18 = t0 * t7;
+  real t20 = u[1] * t3 + u[2] * t18;
+  real t22 = t0 * t6;
+  real t24 = u[1] * t1 + u[2] * t22;
+  real t25 = motion[1] - t24;
+  real t26 = t2 * t25;
+  B[2] = -(t20 + t26);
+  B[3] = t13 * t15 + t24 * t26 + (scale[0] - (t20 * t25 + t9 * t14));
+  real t40 = sin(q[1]);
+  real t50 = u[0] - u[2] * t40;
+  real t52 = motion[0] - t50;
+  real t59 = t40 * t1;
+  real t60 = u[1] * t59;
+  real t65 = motion[5] + (t50 * t25 - t24 * t52 - (t10 * s[2] - t6 * s[1] - (u[0] * t24 + u[2] *
+    t60)));
+  B[4] = t13 * rate[0] - u[0] * t20 - u[2] * (u[1] * (t40 * t3)) + (s[2] * t4 - s[1] * t7) + (t2 *
+    t65 + (rate[0] * t14 + t20 * t52)) - t50 * t26;
+  real t92 = t6 * t40;
+  real t93 = u[1] * t92;
+  real t101 = motion[4] + (t13 * t52 - t50 * t14 - (u[0] * t13 - u[2] * t93 + (t1 * s[1] + t22 *
+    s[2])));
+  B[5] = u[2] * (u[1] * (t40 * t7)) - (t24 * rate[0] + u[0] * t9) - (s[1] * t3 + s[2] * t18) + (t9 *
+    t52 - rate[0] * t25 - t2 * t101) - t50 * t15;
+  B[6] = 0.0;
+  B[7] = motion[8] * t2;
+  B[8] = -(motion[7] * t2);
+  real t110 = t0 * t2;
+  real t111 = u[2] * t110;
+  real t114 = t7 * t25 + t3 * t14;
+  B[9] = -(t111 + t114);
+  real t118 = t40 * t2;
+  real t119 = t6 * t118;
+  real t121 = t1 * rate[0] - u[2] * t119;
+  real t122 = t7 * t52;
+  B[10] = t121 + t122;
+  real t124 = t3 * t52;
+  real t126 = t1 * t118;
+  real t128 = t6 * rate[0] + u[2] * t126;
+  B[11] = t124 - t128;
+  B[12] = t13 * t122 - t24 * t124 - (u[2] * (t0 * rate[0] - u[1] * t118) + s[2] * t110 + (t7 * t101
+    + (t25 * t128 + t14 * t121) + t3 * t65));
+  real t170 = u[1] * t0;
+  real t174 = motion[3] + (t24 * t14 - t13 * t25 - (s[0] - t40 * s[2] - u[2] * t170));
+  B[13] = t50 * t124 + t13 * t114 + (t1 * scale[0] - s[2] * t119 - (u[2] * (t92 * rate[0] + u[1] *
+    (t6 * t110)) + u[0] * t128) + (t52 * t128 - t14 * t111 + t7 * t174));
+  B[14] = t3 * t174 + (t52 * t121 + t25 * t111) - (u[2] * (t59 * rate[0] + u[1] * (t1 * t110)) +
+    u[0] * t121 + (t6 * scale[0] + s[2] * t126)) - (t24 * t114 + t50 * t122);
+  B[15] = -(motion[7] * t7 + motion[8] * t3);
+  B[16] = motion[6] * t7;
+  B[17] = motion[6] * t3;
+  real t206 = t10 * t2;
+  real t208 = t22 * t2;
+  real t210 = t25 * t206 - t14 * t208;
+  real t211 = t40 * rate[0];
+  B[18] = t210 - t211;
+  real t213 = t22 * rate[0];
+  real t216 = t14 * t118 + t52 * t206;
+  B[19] = t213 - t216;
+  real t218 = t10 * rate[0];
+  real t221 = t52 * t208 + t25 * t118;
+  B[20] = t218 + t221;
+  B[21] = t101 * t206 + (t25 * t218 - t14 * t213) - t65 * t208 - (t170 * rate[0] + t40 * scale[0]) -
+    (t13 * t216 + t24 * t221);
+  B[22] = t50 * t221 - t13 * t210 + (u[0] * t218 - t93 * rate[0] + t22 * scale[0] - (t65 * t118 +
+    (t14 * t211 + t52 * t218 + t174 * t206)));
+  B[23] = t24 * t210 + t50 * t216 + (t10 * scale[0] - (t60 * rate[0] + u[0] * t213) + (t174 * t208 +
+    (t52 * t213 + t25 * t211) + t101 * t118));
+  B[24] = motion[7] * t206 - motion[8] * t208;
+  B[25] = -(motion[8] * t118 + motion[6] * t206);
+  B[26] = motion[6] * t208 + motion[7] * t118;
+  G[0] = 0.0;
+  G[1] = -(f[2] * t2);
+  G[2] = f[1] * t2;
+  G[3] = 0.0;
+  G[4] = -(f[5] * t2);
+  G[5] = f[4] * t2;
+  G[6] = f[2] * t3 + f[1] * t7;
+  G[7] = -(f[0] * t7);
+  G[8] = -(f[0] * t3);
+  real t297 = f[4] * t7 + f[5] * t3;
+  G[9] = t297;
+  G[10] = -(f[3] * t7);
+  G[11] = -(f[3] * t3);
+  G[12] = f[2] * t208 - f[1] * t206;
+  G[13] = f[0] * t206 + f[2] * t118;
+  G[14] = -(f[1] * t118 + f[0] * t208);
+  G[15] = f[5] * t208 - f[4] * t206;
+  G[16] = f[3] * t206 + f[5] * t118;
+  G[17] = -(f[4] * t118 + f[3] * t208);
+  W[0] = J[0] * scale[0] - laws[0];
+  W[1] = -(laws[1] + t297);
+  W[2] = f[4] * t4 - f[5] * t18 - laws[2];
+  W[3] = -laws[3];
+  W[4] = J[1] * scale[0] - laws[4];
+  W[5] = -(laws[5] + (f[3] * t110 + f[4] * t119 + f[5] * t126));
+  W[6] = -laws[6];
+  W[7] = -laws[7];
+  W[8] = J[2] * scale[0] - laws[8];
+  H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = H[6] = H[7] = H[8] = 0.0;
+  H[9] = 1.0;
+  H[10] = 0.0;
+  H[11] = -t40;
+  H[12] = 0.0;
+  H[13] = t1;
+  H[14] = t22;
+  H[15] = 0.0;
+  H[16] = -t6;
+  H[17] = t10;
+  return 0;
 }
 
-static int mstmm_hinge_gimbal_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_gimbal_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_gimbal_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"laws", 9, "", 0, 0},
-    {"along", 9, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_gimbal_directions_outputs[] = {
-    {"B", 27, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"W", 9, "", 0, 0},
-    {"H", 18, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_gimbal_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_gimbal_q_names[] = {
     "angle1", "angle2", "angle3",
@@ -2515,133 +867,70 @@ static const char *const mstmm_hinge_gimbal_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_gimbal_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_gimbal_hinge,
-        .call = mstmm_hinge_gimbal_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_gimbal_hinge_inputs,
-        .outputs = mstmm_hinge_gimbal_hinge_outputs,
-        .ir_hash = "08e2e4f238112e9ca51c7cdfc6de7703fe54f97b846f952cfdf0c51da60768d1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_gimbal_forward,
-        .call = mstmm_hinge_gimbal_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_gimbal_forward_inputs,
-        .outputs = mstmm_hinge_gimbal_forward_outputs,
-        .ir_hash = "b362fe0a251548752a6c5cb0d0a5fb845b854f1638aac60aa311a1c0b4a4ab2a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_gimbal_condense,
-        .call = mstmm_hinge_gimbal_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_gimbal_condense_inputs,
-        .outputs = mstmm_hinge_gimbal_condense_outputs,
-        .ir_hash = "324e921df20e065c74398ebbdd6e4fb9bbf0ceec0f6ef5a8126cb9648bcaf6d0",
-        .n_guards = 9,
-        .guards = mstmm_hinge_gimbal_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_gimbal_recover,
-        .call = mstmm_hinge_gimbal_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_gimbal_recover_inputs,
-        .outputs = mstmm_hinge_gimbal_recover_outputs,
-        .ir_hash = "45a8dc21ecfe8852232780a99f45c759d6b9fa4221a59b6e47590e52b4376685",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "singularity",
-        .function = (void (*)(void))mstmm_hinge_gimbal_singularity,
-        .call = mstmm_hinge_gimbal_singularity_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_gimbal_singularity_inputs,
-        .outputs = mstmm_hinge_gimbal_singularity_outputs,
-        .ir_hash = "d5750e1067ccdd6a42036ac4618ccb23f9035a8c6ae3f2f163bfcf54081edbb5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_gimbal_hinge_slope,
-        .call = mstmm_hinge_gimbal_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_gimbal_hinge_slope_inputs,
-        .outputs = mstmm_hinge_gimbal_hinge_slope_outputs,
-        .ir_hash = "2a5d8027188443898bd2a08d1e47967e1a76f8db941d8ae64a8171f65641358c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_gimbal_rates_by_coordinates,
-        .call = mstmm_hinge_gimbal_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_gimbal_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_gimbal_rates_by_coordinates_outputs,
-        .ir_hash = "0e4b457fb4aa2743b62cfd97bd7dbed337a3b8e03cb04f9388d1b54b2fb9d8aa",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_gimbal_rates_by_speeds,
-        .call = mstmm_hinge_gimbal_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_gimbal_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_gimbal_rates_by_speeds_outputs,
-        .ir_hash = "f64f673cc8dd9c141d86e88f7334b2cb781161b4027452586c171b2a535106f5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_gimbal_body_motion,
-        .call = mstmm_hinge_gimbal_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_gimbal_body_motion_inputs,
-        .outputs = mstmm_hinge_gimbal_body_motion_outputs,
-        .ir_hash = "f19233f77038c2adf451e44efe5d0d999728590bd3ccfc9ac8e29bb80bbf72ea",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_gimbal_directions,
-        .call = mstmm_hinge_gimbal_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_gimbal_directions_inputs,
-        .outputs = mstmm_hinge_gimbal_directions_outputs,
-        .ir_hash = "eb49dca82ca22f7eafd019623133467b110ef9033185dcb93211eaefbea5bf94",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0,
+    0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3,
+    "m", 0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 3, "", 0, 0}},
+    "d4da682195939cd651a3e6908fcaee2937729903095a83d3e26a390241819708", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "",
+    0, 0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"s",
+    3, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3,
+    "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 3, "", 0, 0}},
+    "a7fa7cba232ae7294712e0552bb55d3e8af8796a0ffce319d6374e9fdeaae420", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 18, "", 0, 0}, {"g", 3, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "e15d41710fcc01548d05289bc77ce70dda88bcb734d3f5c9364db91d1bfca07b", 9, (const
+    mstmm_guard[]){{1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"G", 18, "", 0, 0}, {"g",
+    3, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 3, "", 0, 0}, {"delta",
+    6, "", 0, 0}}, "880da53b95970d978d74ea3c2985d78ba3ed0dbb00332b6a402259cbaff3ead1", 0, NULL},
+  {"singularity", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_singularity), 2, 1, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}}, (const mstmm_port[]){{"measure", 1, "", 0, 0}},
+    "87388d071d6915989ac5b0d2c4088f3c1960a33710cb13b4137445454ab45ac2", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_hinge_slope), 5, 7, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"d_q", 3, "", 0, 0}, {"d_u", 3, "", 0,
+    0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot",
+    3, "", 0, 0}}, "3f2d9c8f45a21005d7835c8907d7d2b8a0ae77f58975d6187cc79c4f0367cc88", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 9, "", 0, 0}},
+    "95df98465eb5df768aa9784f3dea8bfec3c413d0477eb117ec27e07ad293b4be", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 9, "", 0, 0}},
+    "e3d6bb3113f0f7afac43ca3cbe3f2596df390490e827304889f7a14a20847e40", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_body_motion), 7, 10, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 3, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 3, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "8333c9d3c61e780c79560c86ec42235bc399a2144270468a8eb79c6c01243e7b", 0,
+    NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_gimbal_directions), 12, 4, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"s", 3, "", 0, 0}, {"motion", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"laws", 9, "", 0, 0}, {"along", 9,
+    "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1, "1/s", 0, 0}}, (const
+    mstmm_port[]){{"B", 27, "", 0, 0}, {"G", 18, "", 0, 0}, {"W", 9, "", 0, 0}, {"H", 18, "", 0,
+    0}}, "7efd32febc17c1deacd1e52a48a34444b0363754464253a45bf130af4f0208ba", 0, NULL},
 };
 
 const mstmm_element mstmm_hinge_gimbal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "gimbal",
-    .hash = "5b7388a87835692e6f80099f404ad720e1d5cfc68b2c9be230941c4f41dab969",
+    .hash = "244ec7adc01583301efba5b5f4b68de94a83983a775269fd5b56a74b8f651b5f",
     .nq = 3,
     .nu = 3,
     .np = 0,

@@ -9,42 +9,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_pin;
-int mstmm_hinge_pin_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
-    const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_pin_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_pin_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_pin_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the pin hinge
- * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
@@ -56,69 +21,30 @@ int mstmm_hinge_pin_directions(const real *restrict p, const real *restrict q,
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[1] coordinate rates
  */
-int mstmm_hinge_pin_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_pin_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[0]);
-    R[0] = t0;
-    const real t1 = sin(q[0]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[0];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  real t0 = cos(q[0]);
+  R[0] = t0;
+  real t1 = sin(q[0]);
+  R[1] = -t1;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = 0.0;
+  H[5] = 1.0;
+  v[0] = v[1] = v[2] = w[0] = w[1] = 0.0;
+  w[2] = u[0];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_hinge_pin_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_pin_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -135,163 +61,59 @@ static const mstmm_port mstmm_hinge_pin_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[1] coordinate rates
  */
-int mstmm_hinge_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_pin_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[0]);
-    const real t1 = Rt[0] * t0;
-    const real t2 = sin(q[0]);
-    const real t3 = Rt[1] * t2;
-    const real t4 = t1 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[1] * t0;
-    const real t6 = Rt[0] * t2;
-    const real t7 = t5 - t6;
-    Rc[1] = t7;
-    Rc[2] = Rt[2];
-    const real t8 = Rt[3] * t0;
-    const real t9 = Rt[4] * t2;
-    const real t10 = t8 + t9;
-    Rc[3] = t10;
-    const real t11 = Rt[4] * t0;
-    const real t12 = Rt[3] * t2;
-    const real t13 = t11 - t12;
-    Rc[4] = t13;
-    Rc[5] = Rt[5];
-    const real t14 = Rt[6] * t0;
-    const real t15 = Rt[7] * t2;
-    const real t16 = t14 + t15;
-    Rc[6] = t16;
-    const real t17 = Rt[7] * t0;
-    const real t18 = Rt[6] * t2;
-    const real t19 = t17 - t18;
-    Rc[7] = t19;
-    Rc[8] = Rt[8];
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t20 = motion_I[0] * t4;
-    const real t21 = motion_I[1] * t10;
-    const real t22 = t20 + t21;
-    const real t23 = motion_I[2] * t16;
-    const real t24 = t22 + t23;
-    motion[0] = t24;
-    const real t25 = motion_I[0] * t7;
-    const real t26 = motion_I[1] * t13;
-    const real t27 = t25 + t26;
-    const real t28 = motion_I[2] * t19;
-    const real t29 = t27 + t28;
-    motion[1] = t29;
-    const real t30 = Rt[2] * motion_I[0];
-    const real t31 = Rt[5] * motion_I[1];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * motion_I[2];
-    const real t34 = t32 + t33;
-    const real t35 = u[0] + t34;
-    motion[2] = t35;
-    const real t36 = motion_I[3] * t4;
-    const real t37 = motion_I[4] * t10;
-    const real t38 = t36 + t37;
-    const real t39 = motion_I[5] * t16;
-    const real t40 = t38 + t39;
-    const real t41 = u[0] * t29;
-    const real t42 = t40 + t41;
-    motion[3] = t42;
-    const real t43 = motion_I[3] * t7;
-    const real t44 = motion_I[4] * t13;
-    const real t45 = t43 + t44;
-    const real t46 = motion_I[5] * t19;
-    const real t47 = t45 + t46;
-    const real t48 = u[0] * t24;
-    const real t49 = t47 - t48;
-    motion[4] = t49;
-    const real t50 = Rt[2] * motion_I[3];
-    const real t51 = Rt[5] * motion_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rt[8] * motion_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = s[0] + t54;
-    motion[5] = t55;
-    const real t56 = motion_I[0] * motion_I[1];
-    const real t57 = t56 - motion_I[5];
-    const real t58 = ro[1] * t57;
-    const real t59 = motion_I[1] * motion_I[1];
-    const real t60 = motion_I[2] * motion_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[0] * t61;
-    const real t63 = t58 - t62;
-    const real t64 = motion_I[0] * motion_I[2];
-    const real t65 = motion_I[4] + t64;
-    const real t66 = ro[2] * t65;
-    const real t67 = t63 + t66;
-    const real t68 = motion_I[6] + t67;
-    const real t69 = t4 * t68;
-    const real t70 = motion_I[5] + t56;
-    const real t71 = ro[0] * t70;
-    const real t72 = motion_I[0] * motion_I[0];
-    const real t73 = t60 + t72;
-    const real t74 = ro[1] * t73;
-    const real t75 = t71 - t74;
-    const real t76 = motion_I[1] * motion_I[2];
-    const real t77 = t76 - motion_I[3];
-    const real t78 = ro[2] * t77;
-    const real t79 = t75 + t78;
-    const real t80 = motion_I[7] + t79;
-    const real t81 = t10 * t80;
-    const real t82 = t69 + t81;
-    const real t83 = t64 - motion_I[4];
-    const real t84 = ro[0] * t83;
-    const real t85 = motion_I[3] + t76;
-    const real t86 = ro[1] * t85;
-    const real t87 = t84 + t86;
-    const real t88 = t59 + t72;
-    const real t89 = ro[2] * t88;
-    const real t90 = t87 - t89;
-    const real t91 = motion_I[8] + t90;
-    const real t92 = t16 * t91;
-    const real t93 = t82 + t92;
-    motion[6] = t93;
-    const real t94 = t7 * t68;
-    const real t95 = t13 * t80;
-    const real t96 = t94 + t95;
-    const real t97 = t19 * t91;
-    const real t98 = t96 + t97;
-    motion[7] = t98;
-    const real t99 = Rt[2] * t68;
-    const real t100 = Rt[5] * t80;
-    const real t101 = t99 + t100;
-    const real t102 = Rt[8] * t91;
-    const real t103 = t101 + t102;
-    motion[8] = t103;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  real t0 = cos(q[0]);
+  real t2 = sin(q[0]);
+  real t4 = Rt[0] * t0 + Rt[1] * t2;
+  Rc[0] = t4;
+  real t7 = Rt[1] * t0 - Rt[0] * t2;
+  Rc[1] = t7;
+  Rc[2] = Rt[2];
+  real t10 = Rt[3] * t0 + Rt[4] * t2;
+  Rc[3] = t10;
+  real t13 = Rt[4] * t0 - Rt[3] * t2;
+  Rc[4] = t13;
+  Rc[5] = Rt[5];
+  real t16 = Rt[6] * t0 + Rt[7] * t2;
+  Rc[6] = t16;
+  real t19 = Rt[7] * t0 - Rt[6] * t2;
+  Rc[7] = t19;
+  Rc[8] = Rt[8];
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t24 = motion_I[0] * t4 + motion_I[1] * t10 + motion_I[2] * t16;
+  motion[0] = t24;
+  real t29 = motion_I[0] * t7 + motion_I[1] * t13 + motion_I[2] * t19;
+  motion[1] = t29;
+  motion[2] = u[0] + (Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2]);
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t10 + motion_I[5] * t16 + u[0] * t29;
+  motion[4] = motion_I[3] * t7 + motion_I[4] * t13 + motion_I[5] * t19 - u[0] * t24;
+  motion[5] = s[0] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t56 = motion_I[0] * motion_I[1];
+  real t59 = motion_I[1] * motion_I[1];
+  real t60 = motion_I[2] * motion_I[2];
+  real t64 = motion_I[0] * motion_I[2];
+  real t68 = motion_I[6] + (ro[1] * (t56 - motion_I[5]) - ro[0] * (t59 + t60) + ro[2] * (motion_I[4]
+    + t64));
+  real t72 = motion_I[0] * motion_I[0];
+  real t76 = motion_I[1] * motion_I[2];
+  real t80 = motion_I[7] + (ro[0] * (motion_I[5] + t56) - ro[1] * (t60 + t72) + ro[2] * (t76 -
+    motion_I[3]));
+  real t91 = motion_I[8] + (ro[0] * (t64 - motion_I[4]) + ro[1] * (motion_I[3] + t76) - ro[2] * (t59
+    + t72));
+  motion[6] = t4 * t68 + t10 * t80 + t16 * t91;
+  motion[7] = t7 * t68 + t13 * t80 + t19 * t91;
+  motion[8] = Rt[2] * t68 + Rt[5] * t80 + Rt[8] * t91;
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_hinge_pin_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_pin_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -309,462 +131,129 @@ static const mstmm_port mstmm_hinge_pin_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_pin_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_pin_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e, in_t tau,
+    out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[20];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t1 = 0.0 < floor_[1];
-    const real t2 = S[15] + S[18];
-    const real t3 = S[20] + t2;
-    const real t4 = ((real)1 / (real)300000000000000) * t3;
-    const real t5 = t1 != 0 ? floor_[1] : t4;
-    const real t6 = t5 < S[20];
-    if (!(t6 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t7 = 1.0 / S[20];
-    const real t8 = S[5] * t7;
-    G[0] = t8;
-    const real t9 = S[10] * t7;
-    G[1] = t9;
-    const real t10 = S[14] * t7;
-    G[2] = t10;
-    const real t11 = S[17] * t7;
-    G[3] = t11;
-    const real t12 = S[19] * t7;
-    G[4] = t12;
-    const real t13 = S[20] * t7;
-    G[5] = t13;
-    const real t14 = tau[0] - e[5];
-    const real t15 = t7 * t14;
-    g[0] = t15;
-    const real t16 = S[5] * t8;
-    const real t17 = S[0] - t16;
-    const real t18 = Rc[0] * t17;
-    const real t19 = S[5] * t9;
-    const real t20 = S[1] - t19;
-    const real t21 = Rc[1] * t20;
-    const real t22 = t18 + t21;
-    const real t23 = S[5] * t10;
-    const real t24 = S[2] - t23;
-    const real t25 = Rc[2] * t24;
-    const real t26 = t22 + t25;
-    const real t27 = Rc[0] * t26;
-    const real t28 = Rc[0] * t20;
-    const real t29 = S[10] * t9;
-    const real t30 = S[6] - t29;
-    const real t31 = Rc[1] * t30;
-    const real t32 = t28 + t31;
-    const real t33 = S[10] * t10;
-    const real t34 = S[7] - t33;
-    const real t35 = Rc[2] * t34;
-    const real t36 = t32 + t35;
-    const real t37 = Rc[1] * t36;
-    const real t38 = t27 + t37;
-    const real t39 = Rc[0] * t24;
-    const real t40 = Rc[1] * t34;
-    const real t41 = t39 + t40;
-    const real t42 = S[14] * t10;
-    const real t43 = S[11] - t42;
-    const real t44 = Rc[2] * t43;
-    const real t45 = t41 + t44;
-    const real t46 = Rc[2] * t45;
-    const real t47 = t38 + t46;
-    S_I[0] += t47;
-    const real t48 = Rc[3] * t26;
-    const real t49 = Rc[4] * t36;
-    const real t50 = t48 + t49;
-    const real t51 = Rc[5] * t45;
-    const real t52 = t50 + t51;
-    S_I[1] += t52;
-    const real t53 = Rc[6] * t26;
-    const real t54 = Rc[7] * t36;
-    const real t55 = t53 + t54;
-    const real t56 = Rc[8] * t45;
-    const real t57 = t55 + t56;
-    S_I[2] += t57;
-    const real t58 = S[5] * t11;
-    const real t59 = S[3] - t58;
-    const real t60 = Rc[0] * t59;
-    const real t61 = S[10] * t11;
-    const real t62 = S[8] - t61;
-    const real t63 = Rc[1] * t62;
-    const real t64 = t60 + t63;
-    const real t65 = S[14] * t11;
-    const real t66 = S[12] - t65;
-    const real t67 = Rc[2] * t66;
-    const real t68 = t64 + t67;
-    const real t69 = Rc[0] * t68;
-    const real t70 = S[5] * t12;
-    const real t71 = S[4] - t70;
-    const real t72 = Rc[0] * t71;
-    const real t73 = S[10] * t12;
-    const real t74 = S[9] - t73;
-    const real t75 = Rc[1] * t74;
-    const real t76 = t72 + t75;
-    const real t77 = S[14] * t12;
-    const real t78 = S[13] - t77;
-    const real t79 = Rc[2] * t78;
-    const real t80 = t76 + t79;
-    const real t81 = Rc[1] * t80;
-    const real t82 = t69 + t81;
-    const real t83 = r[1] * t57;
-    const real t84 = r[2] * t52;
-    const real t85 = t83 - t84;
-    const real t86 = t82 + t85;
-    S_I[3] += t86;
-    const real t87 = Rc[3] * t68;
-    const real t88 = Rc[4] * t80;
-    const real t89 = t87 + t88;
-    const real t90 = r[2] * t47;
-    const real t91 = r[0] * t57;
-    const real t92 = t90 - t91;
-    const real t93 = t89 + t92;
-    S_I[4] += t93;
-    const real t94 = Rc[6] * t68;
-    const real t95 = Rc[7] * t80;
-    const real t96 = t94 + t95;
-    const real t97 = r[0] * t52;
-    const real t98 = r[1] * t47;
-    const real t99 = t97 - t98;
-    const real t100 = t96 + t99;
-    S_I[5] += t100;
-    const real t101 = Rc[3] * t17;
-    const real t102 = Rc[4] * t20;
-    const real t103 = t101 + t102;
-    const real t104 = Rc[5] * t24;
-    const real t105 = t103 + t104;
-    const real t106 = Rc[3] * t105;
-    const real t107 = Rc[3] * t20;
-    const real t108 = Rc[4] * t30;
-    const real t109 = t107 + t108;
-    const real t110 = Rc[5] * t34;
-    const real t111 = t109 + t110;
-    const real t112 = Rc[4] * t111;
-    const real t113 = t106 + t112;
-    const real t114 = Rc[3] * t24;
-    const real t115 = Rc[4] * t34;
-    const real t116 = t114 + t115;
-    const real t117 = Rc[5] * t43;
-    const real t118 = t116 + t117;
-    const real t119 = Rc[5] * t118;
-    const real t120 = t113 + t119;
-    S_I[6] += t120;
-    const real t121 = Rc[6] * t105;
-    const real t122 = Rc[7] * t111;
-    const real t123 = t121 + t122;
-    const real t124 = Rc[8] * t118;
-    const real t125 = t123 + t124;
-    S_I[7] += t125;
-    const real t126 = Rc[3] * t59;
-    const real t127 = Rc[4] * t62;
-    const real t128 = t126 + t127;
-    const real t129 = Rc[5] * t66;
-    const real t130 = t128 + t129;
-    const real t131 = Rc[0] * t130;
-    const real t132 = Rc[3] * t71;
-    const real t133 = Rc[4] * t74;
-    const real t134 = t132 + t133;
-    const real t135 = Rc[5] * t78;
-    const real t136 = t134 + t135;
-    const real t137 = Rc[1] * t136;
-    const real t138 = t131 + t137;
-    const real t139 = r[1] * t125;
-    const real t140 = r[2] * t120;
-    const real t141 = t139 - t140;
-    const real t142 = t138 + t141;
-    S_I[8] += t142;
-    const real t143 = Rc[3] * t130;
-    const real t144 = Rc[4] * t136;
-    const real t145 = t143 + t144;
-    const real t146 = r[0] * t125;
-    const real t147 = t84 - t146;
-    const real t148 = t145 + t147;
-    S_I[9] += t148;
-    const real t149 = Rc[6] * t130;
-    const real t150 = Rc[7] * t136;
-    const real t151 = t149 + t150;
-    const real t152 = r[0] * t120;
-    const real t153 = r[1] * t52;
-    const real t154 = t152 - t153;
-    const real t155 = t151 + t154;
-    S_I[10] += t155;
-    const real t156 = Rc[6] * t17;
-    const real t157 = Rc[7] * t20;
-    const real t158 = t156 + t157;
-    const real t159 = Rc[8] * t24;
-    const real t160 = t158 + t159;
-    const real t161 = Rc[6] * t160;
-    const real t162 = Rc[6] * t20;
-    const real t163 = Rc[7] * t30;
-    const real t164 = t162 + t163;
-    const real t165 = Rc[8] * t34;
-    const real t166 = t164 + t165;
-    const real t167 = Rc[7] * t166;
-    const real t168 = t161 + t167;
-    const real t169 = Rc[6] * t24;
-    const real t170 = Rc[7] * t34;
-    const real t171 = t169 + t170;
-    const real t172 = Rc[8] * t43;
-    const real t173 = t171 + t172;
-    const real t174 = Rc[8] * t173;
-    const real t175 = t168 + t174;
-    S_I[11] += t175;
-    const real t176 = Rc[6] * t59;
-    const real t177 = Rc[7] * t62;
-    const real t178 = t176 + t177;
-    const real t179 = Rc[8] * t66;
-    const real t180 = t178 + t179;
-    const real t181 = Rc[0] * t180;
-    const real t182 = Rc[6] * t71;
-    const real t183 = Rc[7] * t74;
-    const real t184 = t182 + t183;
-    const real t185 = Rc[8] * t78;
-    const real t186 = t184 + t185;
-    const real t187 = Rc[1] * t186;
-    const real t188 = t181 + t187;
-    const real t189 = r[1] * t175;
-    const real t190 = r[2] * t125;
-    const real t191 = t189 - t190;
-    const real t192 = t188 + t191;
-    S_I[12] += t192;
-    const real t193 = Rc[3] * t180;
-    const real t194 = Rc[4] * t186;
-    const real t195 = t193 + t194;
-    const real t196 = r[2] * t57;
-    const real t197 = r[0] * t175;
-    const real t198 = t196 - t197;
-    const real t199 = t195 + t198;
-    S_I[13] += t199;
-    const real t200 = Rc[6] * t180;
-    const real t201 = Rc[7] * t186;
-    const real t202 = t200 + t201;
-    const real t203 = t146 - t83;
-    const real t204 = t202 + t203;
-    S_I[14] += t204;
-    const real t205 = S[17] * t11;
-    const real t206 = S[15] - t205;
-    const real t207 = Rc[0] * t206;
-    const real t208 = S[17] * t12;
-    const real t209 = S[16] - t208;
-    const real t210 = Rc[1] * t209;
-    const real t211 = t207 + t210;
-    const real t212 = Rc[0] * t211;
-    const real t213 = Rc[0] * t209;
-    const real t214 = S[19] * t12;
-    const real t215 = S[18] - t214;
-    const real t216 = Rc[1] * t215;
-    const real t217 = t213 + t216;
-    const real t218 = Rc[1] * t217;
-    const real t219 = t212 + t218;
-    const real t220 = r[1] * t192;
-    const real t221 = r[2] * t142;
-    const real t222 = t220 - t221;
-    const real t223 = r[1] * t188;
-    const real t224 = r[2] * t138;
-    const real t225 = t223 - t224;
-    const real t226 = t222 + t225;
-    const real t227 = t219 + t226;
-    S_I[15] += t227;
-    const real t228 = Rc[3] * t211;
-    const real t229 = Rc[4] * t217;
-    const real t230 = t228 + t229;
-    const real t231 = r[1] * t199;
-    const real t232 = r[2] * t148;
-    const real t233 = t231 - t232;
-    const real t234 = r[2] * t82;
-    const real t235 = r[0] * t188;
-    const real t236 = t234 - t235;
-    const real t237 = t233 + t236;
-    const real t238 = t230 + t237;
-    S_I[16] += t238;
-    const real t239 = Rc[6] * t211;
-    const real t240 = Rc[7] * t217;
-    const real t241 = t239 + t240;
-    const real t242 = r[1] * t204;
-    const real t243 = r[2] * t155;
-    const real t244 = t242 - t243;
-    const real t245 = r[0] * t138;
-    const real t246 = r[1] * t82;
-    const real t247 = t245 - t246;
-    const real t248 = t244 + t247;
-    const real t249 = t241 + t248;
-    S_I[17] += t249;
-    const real t250 = Rc[3] * t206;
-    const real t251 = Rc[4] * t209;
-    const real t252 = t250 + t251;
-    const real t253 = Rc[3] * t252;
-    const real t254 = Rc[3] * t209;
-    const real t255 = Rc[4] * t215;
-    const real t256 = t254 + t255;
-    const real t257 = Rc[4] * t256;
-    const real t258 = t253 + t257;
-    const real t259 = r[2] * t93;
-    const real t260 = r[0] * t199;
-    const real t261 = t259 - t260;
-    const real t262 = r[2] * t89;
-    const real t263 = r[0] * t195;
-    const real t264 = t262 - t263;
-    const real t265 = t261 + t264;
-    const real t266 = t258 + t265;
-    S_I[18] += t266;
-    const real t267 = Rc[6] * t252;
-    const real t268 = Rc[7] * t256;
-    const real t269 = t267 + t268;
-    const real t270 = r[2] * t100;
-    const real t271 = r[0] * t204;
-    const real t272 = t270 - t271;
-    const real t273 = r[0] * t145;
-    const real t274 = r[1] * t89;
-    const real t275 = t273 - t274;
-    const real t276 = t272 + t275;
-    const real t277 = t269 + t276;
-    S_I[19] += t277;
-    const real t278 = Rc[6] * t206;
-    const real t279 = Rc[7] * t209;
-    const real t280 = t278 + t279;
-    const real t281 = Rc[6] * t280;
-    const real t282 = Rc[6] * t209;
-    const real t283 = Rc[7] * t215;
-    const real t284 = t282 + t283;
-    const real t285 = Rc[7] * t284;
-    const real t286 = t281 + t285;
-    const real t287 = r[0] * t155;
-    const real t288 = r[1] * t100;
-    const real t289 = t287 - t288;
-    const real t290 = r[0] * t151;
-    const real t291 = r[1] * t96;
-    const real t292 = t290 - t291;
-    const real t293 = t289 + t292;
-    const real t294 = t286 + t293;
-    S_I[20] += t294;
-    const real t295 = S[5] * t15;
-    const real t296 = e[0] + t295;
-    const real t297 = Rc[0] * t296;
-    const real t298 = S[10] * t15;
-    const real t299 = e[1] + t298;
-    const real t300 = Rc[1] * t299;
-    const real t301 = t297 + t300;
-    const real t302 = S[14] * t15;
-    const real t303 = e[2] + t302;
-    const real t304 = Rc[2] * t303;
-    const real t305 = t301 + t304;
-    e_I[0] += t305;
-    const real t306 = Rc[3] * t296;
-    const real t307 = Rc[4] * t299;
-    const real t308 = t306 + t307;
-    const real t309 = Rc[5] * t303;
-    const real t310 = t308 + t309;
-    e_I[1] += t310;
-    const real t311 = Rc[6] * t296;
-    const real t312 = Rc[7] * t299;
-    const real t313 = t311 + t312;
-    const real t314 = Rc[8] * t303;
-    const real t315 = t313 + t314;
-    e_I[2] += t315;
-    const real t316 = S[17] * t15;
-    const real t317 = e[3] + t316;
-    const real t318 = Rc[0] * t317;
-    const real t319 = S[19] * t15;
-    const real t320 = e[4] + t319;
-    const real t321 = Rc[1] * t320;
-    const real t322 = t318 + t321;
-    const real t323 = Rc[2] * tau[0];
-    const real t324 = t322 + t323;
-    const real t325 = Rc[6] * r[1];
-    const real t326 = Rc[3] * r[2];
-    const real t327 = t325 - t326;
-    const real t328 = t296 * t327;
-    const real t329 = Rc[7] * r[1];
-    const real t330 = Rc[4] * r[2];
-    const real t331 = t329 - t330;
-    const real t332 = t299 * t331;
-    const real t333 = t328 + t332;
-    const real t334 = Rc[8] * r[1];
-    const real t335 = Rc[5] * r[2];
-    const real t336 = t334 - t335;
-    const real t337 = t303 * t336;
-    const real t338 = t333 + t337;
-    const real t339 = t324 + t338;
-    e_I[3] += t339;
-    const real t340 = Rc[3] * t317;
-    const real t341 = Rc[4] * t320;
-    const real t342 = t340 + t341;
-    const real t343 = Rc[5] * tau[0];
-    const real t344 = t342 + t343;
-    const real t345 = Rc[0] * r[2];
-    const real t346 = Rc[6] * r[0];
-    const real t347 = t345 - t346;
-    const real t348 = t296 * t347;
-    const real t349 = Rc[1] * r[2];
-    const real t350 = Rc[7] * r[0];
-    const real t351 = t349 - t350;
-    const real t352 = t299 * t351;
-    const real t353 = t348 + t352;
-    const real t354 = Rc[2] * r[2];
-    const real t355 = Rc[8] * r[0];
-    const real t356 = t354 - t355;
-    const real t357 = t303 * t356;
-    const real t358 = t353 + t357;
-    const real t359 = t344 + t358;
-    e_I[4] += t359;
-    const real t360 = Rc[6] * t317;
-    const real t361 = Rc[7] * t320;
-    const real t362 = t360 + t361;
-    const real t363 = Rc[8] * tau[0];
-    const real t364 = t362 + t363;
-    const real t365 = Rc[3] * r[0];
-    const real t366 = Rc[0] * r[1];
-    const real t367 = t365 - t366;
-    const real t368 = t296 * t367;
-    const real t369 = Rc[4] * r[0];
-    const real t370 = Rc[1] * r[1];
-    const real t371 = t369 - t370;
-    const real t372 = t299 * t371;
-    const real t373 = t368 + t372;
-    const real t374 = Rc[5] * r[0];
-    const real t375 = Rc[2] * r[1];
-    const real t376 = t374 - t375;
-    const real t377 = t303 * t376;
-    const real t378 = t373 + t377;
-    const real t379 = t364 + t378;
-    e_I[5] += t379;
-    return 0;
+  (void)p;
+  (void)q;
+  real t0 = 0.0 < S[20];
+  if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t4 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  if (!((((0.0 < floor_[1]) ? floor_[1] : t4) < S[20]))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t7 = 1.0 / S[20];
+  real t8 = S[5] * t7;
+  G[0] = t8;
+  real t9 = S[10] * t7;
+  G[1] = t9;
+  real t10 = S[14] * t7;
+  G[2] = t10;
+  real t11 = S[17] * t7;
+  G[3] = t11;
+  real t12 = S[19] * t7;
+  G[4] = t12;
+  G[5] = S[20] * t7;
+  real t15 = t7 * (tau[0] - e[5]);
+  g[0] = t15;
+  real t17 = S[0] - S[5] * t8;
+  real t20 = S[1] - S[5] * t9;
+  real t24 = S[2] - S[5] * t10;
+  real t26 = Rc[0] * t17 + Rc[1] * t20 + Rc[2] * t24;
+  real t30 = S[6] - S[10] * t9;
+  real t34 = S[7] - S[10] * t10;
+  real t36 = Rc[0] * t20 + Rc[1] * t30 + Rc[2] * t34;
+  real t43 = S[11] - S[14] * t10;
+  real t45 = Rc[0] * t24 + Rc[1] * t34 + Rc[2] * t43;
+  real t47 = Rc[0] * t26 + Rc[1] * t36 + Rc[2] * t45;
+  S_I[0] += t47;
+  real t52 = Rc[3] * t26 + Rc[4] * t36 + Rc[5] * t45;
+  S_I[1] += t52;
+  real t57 = Rc[6] * t26 + Rc[7] * t36 + Rc[8] * t45;
+  S_I[2] += t57;
+  real t59 = S[3] - S[5] * t11;
+  real t62 = S[8] - S[10] * t11;
+  real t66 = S[12] - S[14] * t11;
+  real t68 = Rc[0] * t59 + Rc[1] * t62 + Rc[2] * t66;
+  real t71 = S[4] - S[5] * t12;
+  real t74 = S[9] - S[10] * t12;
+  real t78 = S[13] - S[14] * t12;
+  real t80 = Rc[0] * t71 + Rc[1] * t74 + Rc[2] * t78;
+  real t82 = Rc[0] * t68 + Rc[1] * t80;
+  real t83 = r[1] * t57;
+  real t84 = r[2] * t52;
+  S_I[3] += t82 + (t83 - t84);
+  real t89 = Rc[3] * t68 + Rc[4] * t80;
+  real t93 = t89 + (r[2] * t47 - r[0] * t57);
+  S_I[4] += t93;
+  real t96 = Rc[6] * t68 + Rc[7] * t80;
+  real t100 = t96 + (r[0] * t52 - r[1] * t47);
+  S_I[5] += t100;
+  real t105 = Rc[3] * t17 + Rc[4] * t20 + Rc[5] * t24;
+  real t111 = Rc[3] * t20 + Rc[4] * t30 + Rc[5] * t34;
+  real t118 = Rc[3] * t24 + Rc[4] * t34 + Rc[5] * t43;
+  real t120 = Rc[3] * t105 + Rc[4] * t111 + Rc[5] * t118;
+  S_I[6] += t120;
+  real t125 = Rc[6] * t105 + Rc[7] * t111 + Rc[8] * t118;
+  S_I[7] += t125;
+  real t130 = Rc[3] * t59 + Rc[4] * t62 + Rc[5] * t66;
+  real t136 = Rc[3] * t71 + Rc[4] * t74 + Rc[5] * t78;
+  real t138 = Rc[0] * t130 + Rc[1] * t136;
+  real t142 = t138 + (r[1] * t125 - r[2] * t120);
+  S_I[8] += t142;
+  real t145 = Rc[3] * t130 + Rc[4] * t136;
+  real t146 = r[0] * t125;
+  real t148 = t145 + (t84 - t146);
+  S_I[9] += t148;
+  real t151 = Rc[6] * t130 + Rc[7] * t136;
+  real t155 = t151 + (r[0] * t120 - r[1] * t52);
+  S_I[10] += t155;
+  real t175 = Rc[6] * (Rc[6] * t17 + Rc[7] * t20 + Rc[8] * t24) + Rc[7] * (Rc[6] * t20 + Rc[7] * t30
+    + Rc[8] * t34) + Rc[8] * (Rc[6] * t24 + Rc[7] * t34 + Rc[8] * t43);
+  S_I[11] += t175;
+  real t180 = Rc[6] * t59 + Rc[7] * t62 + Rc[8] * t66;
+  real t186 = Rc[6] * t71 + Rc[7] * t74 + Rc[8] * t78;
+  real t188 = Rc[0] * t180 + Rc[1] * t186;
+  real t192 = t188 + (r[1] * t175 - r[2] * t125);
+  S_I[12] += t192;
+  real t195 = Rc[3] * t180 + Rc[4] * t186;
+  real t199 = t195 + (r[2] * t57 - r[0] * t175);
+  S_I[13] += t199;
+  real t204 = Rc[6] * t180 + Rc[7] * t186 + (t146 - t83);
+  S_I[14] += t204;
+  real t206 = S[15] - S[17] * t11;
+  real t209 = S[16] - S[17] * t12;
+  real t211 = Rc[0] * t206 + Rc[1] * t209;
+  real t215 = S[18] - S[19] * t12;
+  real t217 = Rc[0] * t209 + Rc[1] * t215;
+  S_I[15] += Rc[0] * t211 + Rc[1] * t217 + (r[1] * t192 - r[2] * t142 + (r[1] * t188 - r[2] *
+    t138));
+  S_I[16] += Rc[3] * t211 + Rc[4] * t217 + (r[1] * t199 - r[2] * t148 + (r[2] * t82 - r[0] * t188));
+  S_I[17] += Rc[6] * t211 + Rc[7] * t217 + (r[1] * t204 - r[2] * t155 + (r[0] * t138 - r[1] * t82));
+  real t252 = Rc[3] * t206 + Rc[4] * t209;
+  real t256 = Rc[3] * t209 + Rc[4] * t215;
+  S_I[18] += Rc[3] * t252 + Rc[4] * t256 + (r[2] * t93 - r[0] * t199 + (r[2] * t89 - r[0] * t195));
+  S_I[19] += Rc[6] * t252 + Rc[7] * t256 + (r[2] * t100 - r[0] * t204 + (r[0] * t145 - r[1] * t89));
+  S_I[20] += Rc[6] * (Rc[6] * t206 + Rc[7] * t209) + Rc[7] * (Rc[6] * t209 + Rc[7] * t215) + (r[0] *
+    t155 - r[1] * t100 + (r[0] * t151 - r[1] * t96));
+  real t296 = e[0] + S[5] * t15;
+  real t299 = e[1] + S[10] * t15;
+  real t303 = e[2] + S[14] * t15;
+  e_I[0] += Rc[0] * t296 + Rc[1] * t299 + Rc[2] * t303;
+  e_I[1] += Rc[3] * t296 + Rc[4] * t299 + Rc[5] * t303;
+  e_I[2] += Rc[6] * t296 + Rc[7] * t299 + Rc[8] * t303;
+  real t317 = e[3] + S[17] * t15;
+  real t320 = e[4] + S[19] * t15;
+  e_I[3] += Rc[0] * t317 + Rc[1] * t320 + Rc[2] * tau[0] + (t296 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t299 * (Rc[7] * r[1] - Rc[4] * r[2]) + t303 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t317 + Rc[4] * t320 + Rc[5] * tau[0] + (t296 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t299 * (Rc[1] * r[2] - Rc[7] * r[0]) + t303 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t317 + Rc[7] * t320 + Rc[8] * tau[0] + (t296 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t299 * (Rc[4] * r[0] - Rc[1] * r[1]) + t303 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_pin_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_pin_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_pin_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_pin_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -779,100 +268,35 @@ static const mstmm_guard mstmm_hinge_pin_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_pin_recover(const real *restrict Rc, const real *restrict r, const real *restrict p,
-    const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_pin_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    (void)q;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    delta[0] = t16;
-    delta[1] = t22;
-    delta[2] = t29;
-    delta[3] = t36;
-    delta[4] = t43;
-    const real t54 = t50 + t53;
-    delta[5] = t54;
-    return 0;
+  (void)p;
+  (void)q;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29;
+  delta[3] = t36;
+  delta[4] = t43;
+  delta[5] = t50 + t53;
+  return 0;
 }
 
-static int mstmm_hinge_pin_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_pin_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
- * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
@@ -886,145 +310,64 @@ static const mstmm_port mstmm_hinge_pin_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[1] derivative of qdot
  */
-int mstmm_hinge_pin_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_pin_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    (void)u;
-    const real t0 = sin(q[0]);
-    const real t1 = t0 * d_q[0];
-    const real t2 = -t1;
-    d_R[0] = t2;
-    const real t3 = cos(q[0]);
-    const real t4 = t3 * d_q[0];
-    const real t5 = -t4;
-    d_R[1] = t5;
-    d_R[2] = 0.0;
-    d_R[3] = t4;
-    d_R[4] = t2;
-    d_R[5] = 0.0;
-    d_R[6] = 0.0;
-    d_R[7] = 0.0;
-    d_R[8] = 0.0;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = 0.0;
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = 0.0;
-    d_w[0] = 0.0;
-    d_w[1] = 0.0;
-    d_w[2] = d_u[0];
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    d_qdot[0] = d_u[0];
-    return 0;
+  (void)p;
+  (void)u;
+  real t2 = -(sin(q[0]) * d_q[0]);
+  d_R[0] = t2;
+  real t4 = cos(q[0]) * d_q[0];
+  d_R[1] = -t4;
+  d_R[2] = 0.0;
+  d_R[3] = t4;
+  d_R[4] = t2;
+  d_R[5] = d_R[6] = d_R[7] = d_R[8] = d_d[0] = d_d[1] = d_d[2] = d_H[0] = d_H[1] = d_H[2] = d_H[3] =
+    d_H[4] = d_H[5] = d_v[0] = d_v[1] = d_v[2] = d_w[0] = d_w[1] = 0.0;
+  d_w[2] = d_u[0];
+  d_c[0] = d_c[1] = d_c[2] = d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = d_u[0];
+  return 0;
 }
 
-static int mstmm_hinge_pin_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_pin_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"d_q", 1, "", 0, 0},
-    {"d_u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 6, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2],
+  out[3], out[4], out[5], out[6]))
 
 /* hinge by q
- * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
  * out J[1][1] qdot by q, transposed
  */
-int mstmm_hinge_pin_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_pin_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_pin_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_pin_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_rates_by_coordinates_outputs[] = {
-    {"J", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
- * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
  * out J[1][1] qdot by u, transposed
  */
-int mstmm_hinge_pin_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_pin_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_pin_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_pin_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_rates_by_speeds_outputs[] = {
-    {"J", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
- * source: Rui, Wang, Zhang, ch. 5, (5.50)-(5.54)
  * in  p[0] parameters
  * in  q[1] coordinates: angle [rad]
  * in  u[1] speeds: angle_rate [rad/s]
@@ -1043,201 +386,72 @@ static const mstmm_port mstmm_hinge_pin_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_pin_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_pin_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    (void)p;
-    const real t0 = cos(q[0]);
-    R[0] = t0;
-    const real t1 = sin(q[0]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[0];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    const real t3 = t0 * Rt[0];
-    const real t4 = t1 * Rt[1];
-    const real t5 = t3 + t4;
-    Rc[0] = t5;
-    const real t6 = t0 * Rt[1];
-    const real t7 = t1 * Rt[0];
-    const real t8 = t6 - t7;
-    Rc[1] = t8;
-    Rc[2] = Rt[2];
-    const real t9 = t0 * Rt[3];
-    const real t10 = t1 * Rt[4];
-    const real t11 = t9 + t10;
-    Rc[3] = t11;
-    const real t12 = t0 * Rt[4];
-    const real t13 = t1 * Rt[3];
-    const real t14 = t12 - t13;
-    Rc[4] = t14;
-    Rc[5] = Rt[5];
-    const real t15 = t0 * Rt[6];
-    const real t16 = t1 * Rt[7];
-    const real t17 = t15 + t16;
-    Rc[6] = t17;
-    const real t18 = t0 * Rt[7];
-    const real t19 = t1 * Rt[6];
-    const real t20 = t18 - t19;
-    Rc[7] = t20;
-    Rc[8] = Rt[8];
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t21 = motion_I[0] * t5;
-    const real t22 = motion_I[1] * t11;
-    const real t23 = t21 + t22;
-    const real t24 = motion_I[2] * t17;
-    const real t25 = t23 + t24;
-    motion[0] = t25;
-    const real t26 = motion_I[0] * t8;
-    const real t27 = motion_I[1] * t14;
-    const real t28 = t26 + t27;
-    const real t29 = motion_I[2] * t20;
-    const real t30 = t28 + t29;
-    motion[1] = t30;
-    const real t31 = Rt[2] * motion_I[0];
-    const real t32 = Rt[5] * motion_I[1];
-    const real t33 = t31 + t32;
-    const real t34 = Rt[8] * motion_I[2];
-    const real t35 = t33 + t34;
-    const real t36 = u[0] + t35;
-    motion[2] = t36;
-    const real t37 = motion_I[3] * t5;
-    const real t38 = motion_I[4] * t11;
-    const real t39 = t37 + t38;
-    const real t40 = motion_I[5] * t17;
-    const real t41 = t39 + t40;
-    const real t42 = u[0] * t30;
-    const real t43 = t41 + t42;
-    motion[3] = t43;
-    const real t44 = motion_I[3] * t8;
-    const real t45 = motion_I[4] * t14;
-    const real t46 = t44 + t45;
-    const real t47 = motion_I[5] * t20;
-    const real t48 = t46 + t47;
-    const real t49 = u[0] * t25;
-    const real t50 = t48 - t49;
-    motion[4] = t50;
-    const real t51 = Rt[2] * motion_I[3];
-    const real t52 = Rt[5] * motion_I[4];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[8] * motion_I[5];
-    const real t55 = t53 + t54;
-    const real t56 = s[0] + t55;
-    motion[5] = t56;
-    const real t57 = motion_I[0] * motion_I[1];
-    const real t58 = t57 - motion_I[5];
-    const real t59 = ro[1] * t58;
-    const real t60 = motion_I[1] * motion_I[1];
-    const real t61 = motion_I[2] * motion_I[2];
-    const real t62 = t60 + t61;
-    const real t63 = ro[0] * t62;
-    const real t64 = t59 - t63;
-    const real t65 = motion_I[0] * motion_I[2];
-    const real t66 = motion_I[4] + t65;
-    const real t67 = ro[2] * t66;
-    const real t68 = t64 + t67;
-    const real t69 = motion_I[6] + t68;
-    const real t70 = t5 * t69;
-    const real t71 = motion_I[5] + t57;
-    const real t72 = ro[0] * t71;
-    const real t73 = motion_I[0] * motion_I[0];
-    const real t74 = t61 + t73;
-    const real t75 = ro[1] * t74;
-    const real t76 = t72 - t75;
-    const real t77 = motion_I[1] * motion_I[2];
-    const real t78 = t77 - motion_I[3];
-    const real t79 = ro[2] * t78;
-    const real t80 = t76 + t79;
-    const real t81 = motion_I[7] + t80;
-    const real t82 = t11 * t81;
-    const real t83 = t70 + t82;
-    const real t84 = t65 - motion_I[4];
-    const real t85 = ro[0] * t84;
-    const real t86 = motion_I[3] + t77;
-    const real t87 = ro[1] * t86;
-    const real t88 = t85 + t87;
-    const real t89 = t60 + t73;
-    const real t90 = ro[2] * t89;
-    const real t91 = t88 - t90;
-    const real t92 = motion_I[8] + t91;
-    const real t93 = t17 * t92;
-    const real t94 = t83 + t93;
-    motion[6] = t94;
-    const real t95 = t8 * t69;
-    const real t96 = t14 * t81;
-    const real t97 = t95 + t96;
-    const real t98 = t20 * t92;
-    const real t99 = t97 + t98;
-    motion[7] = t99;
-    const real t100 = Rt[2] * t69;
-    const real t101 = Rt[5] * t81;
-    const real t102 = t100 + t101;
-    const real t103 = Rt[8] * t92;
-    const real t104 = t102 + t103;
-    motion[8] = t104;
-    return 0;
+  (void)p;
+  real t0 = cos(q[0]);
+  R[0] = t0;
+  real t1 = sin(q[0]);
+  R[1] = -t1;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = 0.0;
+  H[5] = 1.0;
+  v[0] = v[1] = v[2] = w[0] = w[1] = 0.0;
+  w[2] = u[0];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  real t5 = t0 * Rt[0] + t1 * Rt[1];
+  Rc[0] = t5;
+  real t8 = t0 * Rt[1] - t1 * Rt[0];
+  Rc[1] = t8;
+  Rc[2] = Rt[2];
+  real t11 = t0 * Rt[3] + t1 * Rt[4];
+  Rc[3] = t11;
+  real t14 = t0 * Rt[4] - t1 * Rt[3];
+  Rc[4] = t14;
+  Rc[5] = Rt[5];
+  real t17 = t0 * Rt[6] + t1 * Rt[7];
+  Rc[6] = t17;
+  real t20 = t0 * Rt[7] - t1 * Rt[6];
+  Rc[7] = t20;
+  Rc[8] = Rt[8];
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t25 = motion_I[0] * t5 + motion_I[1] * t11 + motion_I[2] * t17;
+  motion[0] = t25;
+  real t30 = motion_I[0] * t8 + motion_I[1] * t14 + motion_I[2] * t20;
+  motion[1] = t30;
+  motion[2] = u[0] + (Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2]);
+  motion[3] = motion_I[3] * t5 + motion_I[4] * t11 + motion_I[5] * t17 + u[0] * t30;
+  motion[4] = motion_I[3] * t8 + motion_I[4] * t14 + motion_I[5] * t20 - u[0] * t25;
+  motion[5] = s[0] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t57 = motion_I[0] * motion_I[1];
+  real t60 = motion_I[1] * motion_I[1];
+  real t61 = motion_I[2] * motion_I[2];
+  real t65 = motion_I[0] * motion_I[2];
+  real t69 = motion_I[6] + (ro[1] * (t57 - motion_I[5]) - ro[0] * (t60 + t61) + ro[2] * (motion_I[4]
+    + t65));
+  real t73 = motion_I[0] * motion_I[0];
+  real t77 = motion_I[1] * motion_I[2];
+  real t81 = motion_I[7] + (ro[0] * (motion_I[5] + t57) - ro[1] * (t61 + t73) + ro[2] * (t77 -
+    motion_I[3]));
+  real t92 = motion_I[8] + (ro[0] * (t65 - motion_I[4]) + ro[1] * (motion_I[3] + t77) - ro[2] * (t60
+    + t73));
+  motion[6] = t5 * t69 + t11 * t81 + t17 * t92;
+  motion[7] = t8 * t69 + t14 * t81 + t20 * t92;
+  motion[8] = Rt[2] * t69 + Rt[5] * t81 + Rt[8] * t92;
+  return 0;
 }
 
-static int mstmm_hinge_pin_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_pin_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 1, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1259,98 +473,39 @@ static const mstmm_port mstmm_hinge_pin_body_motion_outputs[] = {
  * out W[1][1] slopes of the rows by load, rotors and laws
  * out H[6] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_pin_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_pin_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)q;
-    (void)s;
-    (void)along;
-    const real t0 = 1.0 / sq[0];
-    const real t1 = motion[1] * t0;
-    B[0] = t1;
-    const real t2 = motion[0] * t0;
-    const real t3 = -t2;
-    B[1] = t3;
-    B[2] = rate[0];
-    const real t4 = u[0] * motion[0];
-    const real t5 = motion[4] + t4;
-    const real t6 = t0 * t5;
-    const real t7 = motion[1] * rate[0];
-    const real t8 = t6 + t7;
-    const real t9 = u[0] * t2;
-    const real t10 = t8 - t9;
-    B[3] = t10;
-    const real t11 = u[0] * t1;
-    const real t12 = motion[0] * rate[0];
-    const real t13 = u[0] * motion[1];
-    const real t14 = motion[3] - t13;
-    const real t15 = t0 * t14;
-    const real t16 = t12 + t15;
-    const real t17 = t11 + t16;
-    const real t18 = -t17;
-    B[4] = t18;
-    B[5] = scale[0];
-    const real t19 = motion[7] * t0;
-    B[6] = t19;
-    const real t20 = motion[6] * t0;
-    const real t21 = -t20;
-    B[7] = t21;
-    B[8] = 0.0;
-    const real t22 = f[1] * t0;
-    const real t23 = -t22;
-    G[0] = t23;
-    const real t24 = f[0] * t0;
-    G[1] = t24;
-    G[2] = 0.0;
-    const real t25 = f[4] * t0;
-    const real t26 = -t25;
-    G[3] = t26;
-    const real t27 = f[3] * t0;
-    G[4] = t27;
-    G[5] = 0.0;
-    const real t28 = J[0] * scale[0];
-    const real t29 = t28 - laws[0];
-    W[0] = t29;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)s;
+  (void)along;
+  real t0 = 1.0 / sq[0];
+  real t1 = motion[1] * t0;
+  B[0] = t1;
+  real t2 = motion[0] * t0;
+  B[1] = -t2;
+  B[2] = rate[0];
+  B[3] = t0 * (motion[4] + u[0] * motion[0]) + motion[1] * rate[0] - u[0] * t2;
+  B[4] = -(u[0] * t1 + (motion[0] * rate[0] + t0 * (motion[3] - u[0] * motion[1])));
+  B[5] = scale[0];
+  B[6] = motion[7] * t0;
+  B[7] = -(motion[6] * t0);
+  B[8] = 0.0;
+  G[0] = -(f[1] * t0);
+  G[1] = f[0] * t0;
+  G[2] = 0.0;
+  G[3] = -(f[4] * t0);
+  G[4] = f[3] * t0;
+  G[5] = 0.0;
+  W[0] = J[0] * scale[0] - laws[0];
+  H[0] = H[1] = H[2] = H[3] = H[4] = 0.0;
+  H[5] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_pin_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_pin_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_pin_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"laws", 1, "", 0, 0},
-    {"along", 1, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_pin_directions_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"W", 1, "", 0, 0},
-    {"H", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_pin_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_pin_q_names[] = {
     "angle",
@@ -1369,121 +524,61 @@ static const char *const mstmm_hinge_pin_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_pin_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_pin_hinge,
-        .call = mstmm_hinge_pin_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_pin_hinge_inputs,
-        .outputs = mstmm_hinge_pin_hinge_outputs,
-        .ir_hash = "0d03f7790d259a43a3bfa19d01815b0f37df96e964ebf81adf24e7e3c32cf69c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_pin_forward,
-        .call = mstmm_hinge_pin_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_pin_forward_inputs,
-        .outputs = mstmm_hinge_pin_forward_outputs,
-        .ir_hash = "ad59a8a02758225b89441b6a60f335634183445bcbdc4fe8c92ca383d101f6fa",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_pin_condense,
-        .call = mstmm_hinge_pin_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_pin_condense_inputs,
-        .outputs = mstmm_hinge_pin_condense_outputs,
-        .ir_hash = "fc471306a2d01387817da8b6115c960af9013b8d53e9615acfd8e09cf5ca4e34",
-        .n_guards = 3,
-        .guards = mstmm_hinge_pin_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_pin_recover,
-        .call = mstmm_hinge_pin_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_pin_recover_inputs,
-        .outputs = mstmm_hinge_pin_recover_outputs,
-        .ir_hash = "cbf6e99ca785286b046ad59e858198dcda62af58fca85713c63b4b0bcc3d9638",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_pin_hinge_slope,
-        .call = mstmm_hinge_pin_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_pin_hinge_slope_inputs,
-        .outputs = mstmm_hinge_pin_hinge_slope_outputs,
-        .ir_hash = "3307cc5226bba84468699030adee6342767f21ea1aafb24960a4043d50edaeae",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_pin_rates_by_coordinates,
-        .call = mstmm_hinge_pin_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_pin_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_pin_rates_by_coordinates_outputs,
-        .ir_hash = "57982938d8ebc8269f5a755a18064d53d0b790fcb2fdfd197221c0699ca05273",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_pin_rates_by_speeds,
-        .call = mstmm_hinge_pin_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_pin_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_pin_rates_by_speeds_outputs,
-        .ir_hash = "39d517b9dc18b22a376ae3ab27ab13f1ab01445ad9f2acb1392d9321e43c6084",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_pin_body_motion,
-        .call = mstmm_hinge_pin_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_pin_body_motion_inputs,
-        .outputs = mstmm_hinge_pin_body_motion_outputs,
-        .ir_hash = "e9376904d70a756b681f13dcbcc0dfe1272e996504142d2855e5658090f1ab70",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_pin_directions,
-        .call = mstmm_hinge_pin_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_pin_directions_inputs,
-        .outputs = mstmm_hinge_pin_directions_outputs,
-        .ir_hash = "b8f83974e03d816f95905bd617612dfaf5f9d56933492a258904d1d1617752c9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_pin_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0, 0},
+    {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m",
+    0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "0f4ee08088e4a897a78c5833b5cd13adfcd2d0219ce03de72f9d2e1e6ef73fbb", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_pin_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "", 0,
+    0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"s", 1,
+    "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m",
+    0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "2840513725fb9a8c65dd5442937963487ddde9b46c8d243b31912868fe92a804", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_pin_condense), 8, 4, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "70c85612df16c6a1624b623f423bd2293fbfbfc95c7d53cf7796ec85ebbe9978", 3, (const
+    mstmm_guard[]){{1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_pin_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "", 0,
+    0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"G", 6, "", 0, 0}, {"g", 1,
+    "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6,
+    "", 0, 0}}, "491f1b8d79b0d0add4c1206df6b6a317fa5952f47366e877ad7a066415bf99dd", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_pin_hinge_slope), 5, 7, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"d_q", 1, "", 0, 0}, {"d_u", 1, "", 0, 0}},
+    (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 6, "", 0, 0}, {"d_v",
+    3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot", 1, "",
+    0, 0}}, "d5cb397008b8302ba696466a63a04b041054b580da3fdc87a2d72ccf46ecf99d", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_pin_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 1, "", 0, 0}},
+    "4ba4baa9d944999a5fad9ddd76641018443a1aad8649c4e9252d72bb19cca761", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_pin_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 1, "", 0, 0}},
+    "fb0daebe7150e18a5220c0a93fc5a22bf0b1d116bb0092284c1f8c1e00561c6a", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_pin_body_motion), 7, 10, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 1, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "868ebcbf9c4ead19b546d54e00fb0344cf31748448596ad46b25364480a276df", 0,
+    NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_pin_directions), 12, 4, (const mstmm_port[]){{"p", 0,
+    "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"s", 1, "", 0, 0}, {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"laws", 1, "", 0, 0}, {"along", 1, "",
+    0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1, "1/s", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"W", 1, "", 0, 0}, {"H", 6, "", 0, 0}},
+    "8a822f5d4d5028fc953db1df34256d52fc40b235d5308e9c70518f8f38eebb4a", 0, NULL},
 };
 
 const mstmm_element mstmm_hinge_pin = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "pin",
-    .hash = "70b10cae83c73c023e9bbc417ef6cb07a1bfb29d70c937c00b01eca3006ba7cc",
+    .hash = "44118d11b88c7bfd9c30467d05460f5b91915fde74e0ed320b2305f1e7eb0d70",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -8,40 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_planar;
-int mstmm_hinge_planar_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_planar_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_planar_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_planar_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_planar_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the planar hinge
  * in  p[0] parameters
  * in  q[3] coordinates: x [m], y [m], angle [rad]
@@ -54,89 +20,43 @@ int mstmm_hinge_planar_directions(const real *restrict p, const real *restrict q
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[3] coordinate rates
  */
-int mstmm_hinge_planar_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_planar_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[2]);
-    R[0] = t0;
-    const real t1 = sin(q[2]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = q[0];
-    d[1] = q[1];
-    d[2] = 0.0;
-    H[0] = t0;
-    H[1] = t1;
-    H[2] = 0.0;
-    H[3] = t2;
-    H[4] = t0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 0.0;
-    H[14] = 0.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 1.0;
-    const real t3 = u[1] * t1;
-    const real t4 = u[0] * t0;
-    const real t5 = t3 + t4;
-    v[0] = t5;
-    const real t6 = u[1] * t0;
-    const real t7 = u[0] * t1;
-    const real t8 = t6 - t7;
-    v[1] = t8;
-    v[2] = 0.0;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[2];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    qdot[2] = u[2];
-    return 0;
+  (void)p;
+  real t0 = cos(q[2]);
+  R[0] = t0;
+  real t1 = sin(q[2]);
+  real t2 = -t1;
+  R[1] = t2;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = q[0];
+  d[1] = q[1];
+  d[2] = 0.0;
+  H[0] = t0;
+  H[1] = t1;
+  H[2] = 0.0;
+  H[3] = t2;
+  H[4] = t0;
+  H[5] = H[6] = H[7] = H[8] = H[9] = H[10] = H[11] = H[12] = H[13] = H[14] = H[15] = H[16] = 0.0;
+  H[17] = 1.0;
+  v[0] = u[1] * t1 + u[0] * t0;
+  v[1] = u[1] * t0 - u[0] * t1;
+  v[2] = w[0] = w[1] = 0.0;
+  w[2] = u[2];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  qdot[2] = u[2];
+  return 0;
 }
 
-static int mstmm_hinge_planar_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_planar_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the planar hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -153,203 +73,67 @@ static const mstmm_port mstmm_hinge_planar_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[3] coordinate rates
  */
-int mstmm_hinge_planar_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_planar_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[2]);
-    const real t1 = Rt[0] * t0;
-    const real t2 = sin(q[2]);
-    const real t3 = Rt[1] * t2;
-    const real t4 = t1 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[1] * t0;
-    const real t6 = Rt[0] * t2;
-    const real t7 = t5 - t6;
-    Rc[1] = t7;
-    Rc[2] = Rt[2];
-    const real t8 = Rt[3] * t0;
-    const real t9 = Rt[4] * t2;
-    const real t10 = t8 + t9;
-    Rc[3] = t10;
-    const real t11 = Rt[4] * t0;
-    const real t12 = Rt[3] * t2;
-    const real t13 = t11 - t12;
-    Rc[4] = t13;
-    Rc[5] = Rt[5];
-    const real t14 = Rt[6] * t0;
-    const real t15 = Rt[7] * t2;
-    const real t16 = t14 + t15;
-    Rc[6] = t16;
-    const real t17 = Rt[7] * t0;
-    const real t18 = Rt[6] * t2;
-    const real t19 = t17 - t18;
-    Rc[7] = t19;
-    Rc[8] = Rt[8];
-    const real t20 = Rt[0] * q[0];
-    const real t21 = Rt[1] * q[1];
-    const real t22 = t20 + t21;
-    const real t23 = ro[0] + t22;
-    r[0] = t23;
-    const real t24 = Rt[3] * q[0];
-    const real t25 = Rt[4] * q[1];
-    const real t26 = t24 + t25;
-    const real t27 = ro[1] + t26;
-    r[1] = t27;
-    const real t28 = Rt[6] * q[0];
-    const real t29 = Rt[7] * q[1];
-    const real t30 = t28 + t29;
-    const real t31 = ro[2] + t30;
-    r[2] = t31;
-    const real t32 = motion_I[0] * t4;
-    const real t33 = motion_I[1] * t10;
-    const real t34 = t32 + t33;
-    const real t35 = motion_I[2] * t16;
-    const real t36 = t34 + t35;
-    motion[0] = t36;
-    const real t37 = motion_I[0] * t7;
-    const real t38 = motion_I[1] * t13;
-    const real t39 = t37 + t38;
-    const real t40 = motion_I[2] * t19;
-    const real t41 = t39 + t40;
-    motion[1] = t41;
-    const real t42 = Rt[2] * motion_I[0];
-    const real t43 = Rt[5] * motion_I[1];
-    const real t44 = t42 + t43;
-    const real t45 = Rt[8] * motion_I[2];
-    const real t46 = t44 + t45;
-    const real t47 = u[2] + t46;
-    motion[2] = t47;
-    const real t48 = motion_I[3] * t4;
-    const real t49 = motion_I[4] * t10;
-    const real t50 = t48 + t49;
-    const real t51 = motion_I[5] * t16;
-    const real t52 = t50 + t51;
-    const real t53 = u[2] * t41;
-    const real t54 = t52 + t53;
-    motion[3] = t54;
-    const real t55 = motion_I[3] * t7;
-    const real t56 = motion_I[4] * t13;
-    const real t57 = t55 + t56;
-    const real t58 = motion_I[5] * t19;
-    const real t59 = t57 + t58;
-    const real t60 = u[2] * t36;
-    const real t61 = t59 - t60;
-    motion[4] = t61;
-    const real t62 = Rt[2] * motion_I[3];
-    const real t63 = Rt[5] * motion_I[4];
-    const real t64 = t62 + t63;
-    const real t65 = Rt[8] * motion_I[5];
-    const real t66 = t64 + t65;
-    const real t67 = s[2] + t66;
-    motion[5] = t67;
-    const real t68 = motion_I[0] * motion_I[1];
-    const real t69 = t68 - motion_I[5];
-    const real t70 = t27 * t69;
-    const real t71 = motion_I[1] * motion_I[1];
-    const real t72 = motion_I[2] * motion_I[2];
-    const real t73 = t71 + t72;
-    const real t74 = t23 * t73;
-    const real t75 = t70 - t74;
-    const real t76 = motion_I[0] * motion_I[2];
-    const real t77 = motion_I[4] + t76;
-    const real t78 = t31 * t77;
-    const real t79 = t75 + t78;
-    const real t80 = motion_I[6] + t79;
-    const real t81 = t4 * t80;
-    const real t82 = motion_I[5] + t68;
-    const real t83 = t23 * t82;
-    const real t84 = motion_I[0] * motion_I[0];
-    const real t85 = t72 + t84;
-    const real t86 = t27 * t85;
-    const real t87 = t83 - t86;
-    const real t88 = motion_I[1] * motion_I[2];
-    const real t89 = t88 - motion_I[3];
-    const real t90 = t31 * t89;
-    const real t91 = t87 + t90;
-    const real t92 = motion_I[7] + t91;
-    const real t93 = t10 * t92;
-    const real t94 = t81 + t93;
-    const real t95 = t76 - motion_I[4];
-    const real t96 = t23 * t95;
-    const real t97 = motion_I[3] + t88;
-    const real t98 = t27 * t97;
-    const real t99 = t96 + t98;
-    const real t100 = t71 + t84;
-    const real t101 = t31 * t100;
-    const real t102 = t99 - t101;
-    const real t103 = motion_I[8] + t102;
-    const real t104 = t16 * t103;
-    const real t105 = t94 + t104;
-    const real t106 = s[0] * t0;
-    const real t107 = s[1] * t2;
-    const real t108 = t106 + t107;
-    const real t109 = u[1] * t0;
-    const real t110 = u[0] * t2;
-    const real t111 = t109 - t110;
-    const real t112 = t46 * t111;
-    const real t113 = 2.0 * t112;
-    const real t114 = t108 - t113;
-    const real t115 = t105 + t114;
-    motion[6] = t115;
-    const real t116 = t7 * t80;
-    const real t117 = t13 * t92;
-    const real t118 = t116 + t117;
-    const real t119 = t19 * t103;
-    const real t120 = t118 + t119;
-    const real t121 = s[1] * t0;
-    const real t122 = s[0] * t2;
-    const real t123 = t121 - t122;
-    const real t124 = u[1] * t2;
-    const real t125 = u[0] * t0;
-    const real t126 = t124 + t125;
-    const real t127 = t46 * t126;
-    const real t128 = 2.0 * t127;
-    const real t129 = t123 + t128;
-    const real t130 = t120 + t129;
-    motion[7] = t130;
-    const real t131 = Rt[2] * t80;
-    const real t132 = Rt[5] * t92;
-    const real t133 = t131 + t132;
-    const real t134 = Rt[8] * t103;
-    const real t135 = t133 + t134;
-    const real t136 = t36 * t111;
-    const real t137 = 2.0 * t136;
-    const real t138 = t41 * t126;
-    const real t139 = 2.0 * t138;
-    const real t140 = t137 - t139;
-    const real t141 = t135 + t140;
-    motion[8] = t141;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    qdot[2] = u[2];
-    return 0;
+  (void)p;
+  real t0 = cos(q[2]);
+  real t2 = sin(q[2]);
+  real t4 = Rt[0] * t0 + Rt[1] * t2;
+  Rc[0] = t4;
+  real t7 = Rt[1] * t0 - Rt[0] * t2;
+  Rc[1] = t7;
+  Rc[2] = Rt[2];
+  real t10 = Rt[3] * t0 + Rt[4] * t2;
+  Rc[3] = t10;
+  real t13 = Rt[4] * t0 - Rt[3] * t2;
+  Rc[4] = t13;
+  Rc[5] = Rt[5];
+  real t16 = Rt[6] * t0 + Rt[7] * t2;
+  Rc[6] = t16;
+  real t19 = Rt[7] * t0 - Rt[6] * t2;
+  Rc[7] = t19;
+  Rc[8] = Rt[8];
+  real t23 = ro[0] + (Rt[0] * q[0] + Rt[1] * q[1]);
+  r[0] = t23;
+  real t27 = ro[1] + (Rt[3] * q[0] + Rt[4] * q[1]);
+  r[1] = t27;
+  real t31 = ro[2] + (Rt[6] * q[0] + Rt[7] * q[1]);
+  r[2] = t31;
+  real t36 = motion_I[0] * t4 + motion_I[1] * t10 + motion_I[2] * t16;
+  motion[0] = t36;
+  real t41 = motion_I[0] * t7 + motion_I[1] * t13 + motion_I[2] * t19;
+  motion[1] = t41;
+  real t46 = Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2];
+  motion[2] = u[2] + t46;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t10 + motion_I[5] * t16 + u[2] * t41;
+  motion[4] = motion_I[3] * t7 + motion_I[4] * t13 + motion_I[5] * t19 - u[2] * t36;
+  motion[5] = s[2] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t68 = motion_I[0] * motion_I[1];
+  real t71 = motion_I[1] * motion_I[1];
+  real t72 = motion_I[2] * motion_I[2];
+  real t76 = motion_I[0] * motion_I[2];
+  real t80 = motion_I[6] + (t27 * (t68 - motion_I[5]) - t23 * (t71 + t72) + t31 * (motion_I[4] +
+    t76));
+  real t84 = motion_I[0] * motion_I[0];
+  real t88 = motion_I[1] * motion_I[2];
+  real t92 = motion_I[7] + (t23 * (motion_I[5] + t68) - t27 * (t72 + t84) + t31 * (t88 -
+    motion_I[3]));
+  real t103 = motion_I[8] + (t23 * (t76 - motion_I[4]) + t27 * (motion_I[3] + t88) - t31 * (t71 +
+    t84));
+  real t111 = u[1] * t0 - u[0] * t2;
+  motion[6] = t4 * t80 + t10 * t92 + t16 * t103 + (s[0] * t0 + s[1] * t2 - 2.0 * (t46 * t111));
+  real t126 = u[1] * t2 + u[0] * t0;
+  motion[7] = t7 * t80 + t13 * t92 + t19 * t103 + (s[1] * t0 - s[0] * t2 + 2.0 * (t46 * t126));
+  motion[8] = Rt[2] * t80 + Rt[5] * t92 + Rt[8] * t103 + (2.0 * (t36 * t111) - 2.0 * (t41 * t126));
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  qdot[2] = u[2];
+  return 0;
 }
 
-static int mstmm_hinge_planar_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_planar_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -367,738 +151,203 @@ static const mstmm_port mstmm_hinge_planar_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_planar_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_planar_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = cos(q[2]);
-    const real t1 = S[0] * t0;
-    const real t2 = sin(q[2]);
-    const real t3 = S[1] * t2;
-    const real t4 = t1 - t3;
-    const real t5 = t0 * t4;
-    const real t6 = S[1] * t0;
-    const real t7 = S[6] * t2;
-    const real t8 = t6 - t7;
-    const real t9 = t2 * t8;
-    const real t10 = t5 - t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t12 = S[0] * t2;
-    const real t13 = t12 + t6;
-    const real t14 = t2 * t13;
-    const real t15 = S[6] * t0;
-    const real t16 = t3 + t15;
-    const real t17 = t0 * t16;
-    const real t18 = t14 + t17;
-    const real t19 = t18 * ((real)1 / (real)10000000000000);
-    const real t20 = t0 * t13;
-    const real t21 = t2 * t16;
-    const real t22 = t20 - t21;
-    const real t23 = 1.0 / t10;
-    const real t24 = t22 * t23;
-    const real t25 = t22 * t24;
-    const real t26 = t18 - t25;
-    const real t27 = t19 < t26;
-    if (!(t27 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t28 = S[20] * ((real)1 / (real)10000000000000);
-    const real t29 = S[5] * t0;
-    const real t30 = S[10] * t2;
-    const real t31 = t29 - t30;
-    const real t32 = t31 * t23;
-    const real t33 = t31 * t32;
-    const real t34 = S[20] - t33;
-    const real t35 = S[5] * t2;
-    const real t36 = S[10] * t0;
-    const real t37 = t35 + t36;
-    const real t38 = t31 * t24;
-    const real t39 = t37 - t38;
-    const real t40 = 1.0 / t26;
-    const real t41 = t40 * t39;
-    const real t42 = t39 * t41;
-    const real t43 = t34 - t42;
-    const real t44 = t28 < t43;
-    if (!(t44 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t27 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t44 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t45 = t2 * t2;
-    const real t46 = t0 * t0;
-    const real t47 = t45 + t46;
-    const real t48 = 0.0 < floor_[0];
-    const real t49 = S[0] + S[6];
-    const real t50 = S[11] + t49;
-    const real t51 = ((real)1 / (real)300000000000000) * t50;
-    const real t52 = t48 != 0 ? floor_[0] : t51;
-    const real t53 = t47 * t52;
-    const real t54 = t53 < t10;
-    if (!(t54 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t55 = t53 < t18;
-    if (!(t55 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t56 = 0.0 < floor_[1];
-    const real t57 = S[15] + S[18];
-    const real t58 = S[20] + t57;
-    const real t59 = ((real)1 / (real)300000000000000) * t58;
-    const real t60 = t56 != 0 ? floor_[1] : t59;
-    const real t61 = t60 < S[20];
-    if (!(t61 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    const real t62 = t4 * t23;
-    const real t63 = t4 * t24;
-    const real t64 = t13 - t63;
-    const real t65 = t40 * t64;
-    const real t66 = 1.0 / t43;
-    const real t67 = t4 * t32;
-    const real t68 = S[5] - t67;
-    const real t69 = t41 * t64;
-    const real t70 = t68 - t69;
-    const real t71 = t66 * t70;
-    const real t72 = t41 * t71;
-    const real t73 = t65 - t72;
-    const real t74 = t24 * t73;
-    const real t75 = t62 - t74;
-    const real t76 = t32 * t71;
-    const real t77 = t75 - t76;
-    G[0] = t77;
-    const real t78 = t8 * t23;
-    const real t79 = t8 * t24;
-    const real t80 = t16 - t79;
-    const real t81 = t40 * t80;
-    const real t82 = t8 * t32;
-    const real t83 = S[10] - t82;
-    const real t84 = t41 * t80;
-    const real t85 = t83 - t84;
-    const real t86 = t66 * t85;
-    const real t87 = t41 * t86;
-    const real t88 = t81 - t87;
-    const real t89 = t24 * t88;
-    const real t90 = t78 - t89;
-    const real t91 = t32 * t86;
-    const real t92 = t90 - t91;
-    G[1] = t92;
-    const real t93 = S[2] * t0;
-    const real t94 = S[7] * t2;
-    const real t95 = t93 - t94;
-    const real t96 = t95 * t23;
-    const real t97 = S[2] * t2;
-    const real t98 = S[7] * t0;
-    const real t99 = t97 + t98;
-    const real t100 = t95 * t24;
-    const real t101 = t99 - t100;
-    const real t102 = t40 * t101;
-    const real t103 = t95 * t32;
-    const real t104 = S[14] - t103;
-    const real t105 = t41 * t101;
-    const real t106 = t104 - t105;
-    const real t107 = t66 * t106;
-    const real t108 = t41 * t107;
-    const real t109 = t102 - t108;
-    const real t110 = t24 * t109;
-    const real t111 = t96 - t110;
-    const real t112 = t32 * t107;
-    const real t113 = t111 - t112;
-    G[2] = t113;
-    const real t114 = S[3] * t0;
-    const real t115 = S[8] * t2;
-    const real t116 = t114 - t115;
-    const real t117 = t116 * t23;
-    const real t118 = S[3] * t2;
-    const real t119 = S[8] * t0;
-    const real t120 = t118 + t119;
-    const real t121 = t116 * t24;
-    const real t122 = t120 - t121;
-    const real t123 = t40 * t122;
-    const real t124 = t116 * t32;
-    const real t125 = S[17] - t124;
-    const real t126 = t41 * t122;
-    const real t127 = t125 - t126;
-    const real t128 = t66 * t127;
-    const real t129 = t41 * t128;
-    const real t130 = t123 - t129;
-    const real t131 = t24 * t130;
-    const real t132 = t117 - t131;
-    const real t133 = t32 * t128;
-    const real t134 = t132 - t133;
-    G[3] = t134;
-    const real t135 = S[4] * t0;
-    const real t136 = S[9] * t2;
-    const real t137 = t135 - t136;
-    const real t138 = t137 * t23;
-    const real t139 = S[4] * t2;
-    const real t140 = S[9] * t0;
-    const real t141 = t139 + t140;
-    const real t142 = t137 * t24;
-    const real t143 = t141 - t142;
-    const real t144 = t40 * t143;
-    const real t145 = t137 * t32;
-    const real t146 = S[19] - t145;
-    const real t147 = t41 * t143;
-    const real t148 = t146 - t147;
-    const real t149 = t66 * t148;
-    const real t150 = t41 * t149;
-    const real t151 = t144 - t150;
-    const real t152 = t24 * t151;
-    const real t153 = t138 - t152;
-    const real t154 = t32 * t149;
-    const real t155 = t153 - t154;
-    G[4] = t155;
-    const real t156 = t43 * t66;
-    const real t157 = t41 * t156;
-    const real t158 = t41 - t157;
-    const real t159 = t24 * t158;
-    const real t160 = t32 - t159;
-    const real t161 = t32 * t156;
-    const real t162 = t160 - t161;
-    G[5] = t162;
-    G[6] = t73;
-    G[7] = t88;
-    G[8] = t109;
-    G[9] = t130;
-    G[10] = t151;
-    G[11] = t158;
-    G[12] = t71;
-    G[13] = t86;
-    G[14] = t107;
-    G[15] = t128;
-    G[16] = t149;
-    G[17] = t156;
-    const real t163 = e[1] * t2;
-    const real t164 = e[0] * t0;
-    const real t165 = t163 - t164;
-    const real t166 = tau[0] + t165;
-    const real t167 = t23 * t166;
-    const real t168 = e[0] * t2;
-    const real t169 = e[1] * t0;
-    const real t170 = t168 + t169;
-    const real t171 = tau[1] - t170;
-    const real t172 = t24 * t166;
-    const real t173 = t171 - t172;
-    const real t174 = t40 * t173;
-    const real t175 = tau[2] - e[5];
-    const real t176 = t32 * t166;
-    const real t177 = t175 - t176;
-    const real t178 = t41 * t173;
-    const real t179 = t177 - t178;
-    const real t180 = t66 * t179;
-    const real t181 = t41 * t180;
-    const real t182 = t174 - t181;
-    const real t183 = t24 * t182;
-    const real t184 = t167 - t183;
-    const real t185 = t32 * t180;
-    const real t186 = t184 - t185;
-    g[0] = t186;
-    g[1] = t182;
-    g[2] = t180;
-    const real t187 = t4 * t77;
-    const real t188 = t13 * t73;
-    const real t189 = t187 + t188;
-    const real t190 = S[5] * t71;
-    const real t191 = t189 + t190;
-    const real t192 = S[0] - t191;
-    const real t193 = Rc[0] * t192;
-    const real t194 = t4 * t92;
-    const real t195 = t13 * t88;
-    const real t196 = t194 + t195;
-    const real t197 = S[5] * t86;
-    const real t198 = t196 + t197;
-    const real t199 = S[1] - t198;
-    const real t200 = Rc[1] * t199;
-    const real t201 = t193 + t200;
-    const real t202 = t4 * t113;
-    const real t203 = t13 * t109;
-    const real t204 = t202 + t203;
-    const real t205 = S[5] * t107;
-    const real t206 = t204 + t205;
-    const real t207 = S[2] - t206;
-    const real t208 = Rc[2] * t207;
-    const real t209 = t201 + t208;
-    const real t210 = Rc[0] * t209;
-    const real t211 = Rc[0] * t199;
-    const real t212 = t8 * t92;
-    const real t213 = t16 * t88;
-    const real t214 = t212 + t213;
-    const real t215 = S[10] * t86;
-    const real t216 = t214 + t215;
-    const real t217 = S[6] - t216;
-    const real t218 = Rc[1] * t217;
-    const real t219 = t211 + t218;
-    const real t220 = t8 * t113;
-    const real t221 = t16 * t109;
-    const real t222 = t220 + t221;
-    const real t223 = S[10] * t107;
-    const real t224 = t222 + t223;
-    const real t225 = S[7] - t224;
-    const real t226 = Rc[2] * t225;
-    const real t227 = t219 + t226;
-    const real t228 = Rc[1] * t227;
-    const real t229 = t210 + t228;
-    const real t230 = Rc[0] * t207;
-    const real t231 = Rc[1] * t225;
-    const real t232 = t230 + t231;
-    const real t233 = t95 * t113;
-    const real t234 = t99 * t109;
-    const real t235 = t233 + t234;
-    const real t236 = S[14] * t107;
-    const real t237 = t235 + t236;
-    const real t238 = S[11] - t237;
-    const real t239 = Rc[2] * t238;
-    const real t240 = t232 + t239;
-    const real t241 = Rc[2] * t240;
-    const real t242 = t229 + t241;
-    S_I[0] += t242;
-    const real t243 = Rc[3] * t209;
-    const real t244 = Rc[4] * t227;
-    const real t245 = t243 + t244;
-    const real t246 = Rc[5] * t240;
-    const real t247 = t245 + t246;
-    S_I[1] += t247;
-    const real t248 = Rc[6] * t209;
-    const real t249 = Rc[7] * t227;
-    const real t250 = t248 + t249;
-    const real t251 = Rc[8] * t240;
-    const real t252 = t250 + t251;
-    S_I[2] += t252;
-    const real t253 = t4 * t134;
-    const real t254 = t13 * t130;
-    const real t255 = t253 + t254;
-    const real t256 = S[5] * t128;
-    const real t257 = t255 + t256;
-    const real t258 = S[3] - t257;
-    const real t259 = Rc[0] * t258;
-    const real t260 = t8 * t134;
-    const real t261 = t16 * t130;
-    const real t262 = t260 + t261;
-    const real t263 = S[10] * t128;
-    const real t264 = t262 + t263;
-    const real t265 = S[8] - t264;
-    const real t266 = Rc[1] * t265;
-    const real t267 = t259 + t266;
-    const real t268 = t95 * t134;
-    const real t269 = t99 * t130;
-    const real t270 = t268 + t269;
-    const real t271 = S[14] * t128;
-    const real t272 = t270 + t271;
-    const real t273 = S[12] - t272;
-    const real t274 = Rc[2] * t273;
-    const real t275 = t267 + t274;
-    const real t276 = Rc[0] * t275;
-    const real t277 = t4 * t155;
-    const real t278 = t13 * t151;
-    const real t279 = t277 + t278;
-    const real t280 = S[5] * t149;
-    const real t281 = t279 + t280;
-    const real t282 = S[4] - t281;
-    const real t283 = Rc[0] * t282;
-    const real t284 = t8 * t155;
-    const real t285 = t16 * t151;
-    const real t286 = t284 + t285;
-    const real t287 = S[10] * t149;
-    const real t288 = t286 + t287;
-    const real t289 = S[9] - t288;
-    const real t290 = Rc[1] * t289;
-    const real t291 = t283 + t290;
-    const real t292 = t95 * t155;
-    const real t293 = t99 * t151;
-    const real t294 = t292 + t293;
-    const real t295 = S[14] * t149;
-    const real t296 = t294 + t295;
-    const real t297 = S[13] - t296;
-    const real t298 = Rc[2] * t297;
-    const real t299 = t291 + t298;
-    const real t300 = Rc[1] * t299;
-    const real t301 = t276 + t300;
-    const real t302 = r[1] * t252;
-    const real t303 = r[2] * t247;
-    const real t304 = t302 - t303;
-    const real t305 = t301 + t304;
-    S_I[3] += t305;
-    const real t306 = Rc[3] * t275;
-    const real t307 = Rc[4] * t299;
-    const real t308 = t306 + t307;
-    const real t309 = r[2] * t242;
-    const real t310 = r[0] * t252;
-    const real t311 = t309 - t310;
-    const real t312 = t308 + t311;
-    S_I[4] += t312;
-    const real t313 = Rc[6] * t275;
-    const real t314 = Rc[7] * t299;
-    const real t315 = t313 + t314;
-    const real t316 = r[0] * t247;
-    const real t317 = r[1] * t242;
-    const real t318 = t316 - t317;
-    const real t319 = t315 + t318;
-    S_I[5] += t319;
-    const real t320 = Rc[3] * t192;
-    const real t321 = Rc[4] * t199;
-    const real t322 = t320 + t321;
-    const real t323 = Rc[5] * t207;
-    const real t324 = t322 + t323;
-    const real t325 = Rc[3] * t324;
-    const real t326 = Rc[3] * t199;
-    const real t327 = Rc[4] * t217;
-    const real t328 = t326 + t327;
-    const real t329 = Rc[5] * t225;
-    const real t330 = t328 + t329;
-    const real t331 = Rc[4] * t330;
-    const real t332 = t325 + t331;
-    const real t333 = Rc[3] * t207;
-    const real t334 = Rc[4] * t225;
-    const real t335 = t333 + t334;
-    const real t336 = Rc[5] * t238;
-    const real t337 = t335 + t336;
-    const real t338 = Rc[5] * t337;
-    const real t339 = t332 + t338;
-    S_I[6] += t339;
-    const real t340 = Rc[6] * t324;
-    const real t341 = Rc[7] * t330;
-    const real t342 = t340 + t341;
-    const real t343 = Rc[8] * t337;
-    const real t344 = t342 + t343;
-    S_I[7] += t344;
-    const real t345 = Rc[3] * t258;
-    const real t346 = Rc[4] * t265;
-    const real t347 = t345 + t346;
-    const real t348 = Rc[5] * t273;
-    const real t349 = t347 + t348;
-    const real t350 = Rc[0] * t349;
-    const real t351 = Rc[3] * t282;
-    const real t352 = Rc[4] * t289;
-    const real t353 = t351 + t352;
-    const real t354 = Rc[5] * t297;
-    const real t355 = t353 + t354;
-    const real t356 = Rc[1] * t355;
-    const real t357 = t350 + t356;
-    const real t358 = r[1] * t344;
-    const real t359 = r[2] * t339;
-    const real t360 = t358 - t359;
-    const real t361 = t357 + t360;
-    S_I[8] += t361;
-    const real t362 = Rc[3] * t349;
-    const real t363 = Rc[4] * t355;
-    const real t364 = t362 + t363;
-    const real t365 = r[0] * t344;
-    const real t366 = t303 - t365;
-    const real t367 = t364 + t366;
-    S_I[9] += t367;
-    const real t368 = Rc[6] * t349;
-    const real t369 = Rc[7] * t355;
-    const real t370 = t368 + t369;
-    const real t371 = r[0] * t339;
-    const real t372 = r[1] * t247;
-    const real t373 = t371 - t372;
-    const real t374 = t370 + t373;
-    S_I[10] += t374;
-    const real t375 = Rc[6] * t192;
-    const real t376 = Rc[7] * t199;
-    const real t377 = t375 + t376;
-    const real t378 = Rc[8] * t207;
-    const real t379 = t377 + t378;
-    const real t380 = Rc[6] * t379;
-    const real t381 = Rc[6] * t199;
-    const real t382 = Rc[7] * t217;
-    const real t383 = t381 + t382;
-    const real t384 = Rc[8] * t225;
-    const real t385 = t383 + t384;
-    const real t386 = Rc[7] * t385;
-    const real t387 = t380 + t386;
-    const real t388 = Rc[6] * t207;
-    const real t389 = Rc[7] * t225;
-    const real t390 = t388 + t389;
-    const real t391 = Rc[8] * t238;
-    const real t392 = t390 + t391;
-    const real t393 = Rc[8] * t392;
-    const real t394 = t387 + t393;
-    S_I[11] += t394;
-    const real t395 = Rc[6] * t258;
-    const real t396 = Rc[7] * t265;
-    const real t397 = t395 + t396;
-    const real t398 = Rc[8] * t273;
-    const real t399 = t397 + t398;
-    const real t400 = Rc[0] * t399;
-    const real t401 = Rc[6] * t282;
-    const real t402 = Rc[7] * t289;
-    const real t403 = t401 + t402;
-    const real t404 = Rc[8] * t297;
-    const real t405 = t403 + t404;
-    const real t406 = Rc[1] * t405;
-    const real t407 = t400 + t406;
-    const real t408 = r[1] * t394;
-    const real t409 = r[2] * t344;
-    const real t410 = t408 - t409;
-    const real t411 = t407 + t410;
-    S_I[12] += t411;
-    const real t412 = Rc[3] * t399;
-    const real t413 = Rc[4] * t405;
-    const real t414 = t412 + t413;
-    const real t415 = r[2] * t252;
-    const real t416 = r[0] * t394;
-    const real t417 = t415 - t416;
-    const real t418 = t414 + t417;
-    S_I[13] += t418;
-    const real t419 = Rc[6] * t399;
-    const real t420 = Rc[7] * t405;
-    const real t421 = t419 + t420;
-    const real t422 = t365 - t302;
-    const real t423 = t421 + t422;
-    S_I[14] += t423;
-    const real t424 = t116 * t134;
-    const real t425 = t120 * t130;
-    const real t426 = t424 + t425;
-    const real t427 = S[17] * t128;
-    const real t428 = t426 + t427;
-    const real t429 = S[15] - t428;
-    const real t430 = Rc[0] * t429;
-    const real t431 = t116 * t155;
-    const real t432 = t120 * t151;
-    const real t433 = t431 + t432;
-    const real t434 = S[17] * t149;
-    const real t435 = t433 + t434;
-    const real t436 = S[16] - t435;
-    const real t437 = Rc[1] * t436;
-    const real t438 = t430 + t437;
-    const real t439 = Rc[0] * t438;
-    const real t440 = Rc[0] * t436;
-    const real t441 = t137 * t155;
-    const real t442 = t141 * t151;
-    const real t443 = t441 + t442;
-    const real t444 = S[19] * t149;
-    const real t445 = t443 + t444;
-    const real t446 = S[18] - t445;
-    const real t447 = Rc[1] * t446;
-    const real t448 = t440 + t447;
-    const real t449 = Rc[1] * t448;
-    const real t450 = t439 + t449;
-    const real t451 = r[1] * t411;
-    const real t452 = r[2] * t361;
-    const real t453 = t451 - t452;
-    const real t454 = r[1] * t407;
-    const real t455 = r[2] * t357;
-    const real t456 = t454 - t455;
-    const real t457 = t453 + t456;
-    const real t458 = t450 + t457;
-    S_I[15] += t458;
-    const real t459 = Rc[3] * t438;
-    const real t460 = Rc[4] * t448;
-    const real t461 = t459 + t460;
-    const real t462 = r[1] * t418;
-    const real t463 = r[2] * t367;
-    const real t464 = t462 - t463;
-    const real t465 = r[2] * t301;
-    const real t466 = r[0] * t407;
-    const real t467 = t465 - t466;
-    const real t468 = t464 + t467;
-    const real t469 = t461 + t468;
-    S_I[16] += t469;
-    const real t470 = Rc[6] * t438;
-    const real t471 = Rc[7] * t448;
-    const real t472 = t470 + t471;
-    const real t473 = r[1] * t423;
-    const real t474 = r[2] * t374;
-    const real t475 = t473 - t474;
-    const real t476 = r[0] * t357;
-    const real t477 = r[1] * t301;
-    const real t478 = t476 - t477;
-    const real t479 = t475 + t478;
-    const real t480 = t472 + t479;
-    S_I[17] += t480;
-    const real t481 = Rc[3] * t429;
-    const real t482 = Rc[4] * t436;
-    const real t483 = t481 + t482;
-    const real t484 = Rc[3] * t483;
-    const real t485 = Rc[3] * t436;
-    const real t486 = Rc[4] * t446;
-    const real t487 = t485 + t486;
-    const real t488 = Rc[4] * t487;
-    const real t489 = t484 + t488;
-    const real t490 = r[2] * t312;
-    const real t491 = r[0] * t418;
-    const real t492 = t490 - t491;
-    const real t493 = r[2] * t308;
-    const real t494 = r[0] * t414;
-    const real t495 = t493 - t494;
-    const real t496 = t492 + t495;
-    const real t497 = t489 + t496;
-    S_I[18] += t497;
-    const real t498 = Rc[6] * t483;
-    const real t499 = Rc[7] * t487;
-    const real t500 = t498 + t499;
-    const real t501 = r[2] * t319;
-    const real t502 = r[0] * t423;
-    const real t503 = t501 - t502;
-    const real t504 = r[0] * t364;
-    const real t505 = r[1] * t308;
-    const real t506 = t504 - t505;
-    const real t507 = t503 + t506;
-    const real t508 = t500 + t507;
-    S_I[19] += t508;
-    const real t509 = Rc[6] * t429;
-    const real t510 = Rc[7] * t436;
-    const real t511 = t509 + t510;
-    const real t512 = Rc[6] * t511;
-    const real t513 = Rc[6] * t436;
-    const real t514 = Rc[7] * t446;
-    const real t515 = t513 + t514;
-    const real t516 = Rc[7] * t515;
-    const real t517 = t512 + t516;
-    const real t518 = r[0] * t374;
-    const real t519 = r[1] * t319;
-    const real t520 = t518 - t519;
-    const real t521 = r[0] * t370;
-    const real t522 = r[1] * t315;
-    const real t523 = t521 - t522;
-    const real t524 = t520 + t523;
-    const real t525 = t517 + t524;
-    S_I[20] += t525;
-    const real t526 = t4 * t186;
-    const real t527 = t13 * t182;
-    const real t528 = t526 + t527;
-    const real t529 = S[5] * t180;
-    const real t530 = t528 + t529;
-    const real t531 = e[0] + t530;
-    const real t532 = Rc[0] * t531;
-    const real t533 = t8 * t186;
-    const real t534 = t16 * t182;
-    const real t535 = t533 + t534;
-    const real t536 = S[10] * t180;
-    const real t537 = t535 + t536;
-    const real t538 = e[1] + t537;
-    const real t539 = Rc[1] * t538;
-    const real t540 = t532 + t539;
-    const real t541 = t95 * t186;
-    const real t542 = t99 * t182;
-    const real t543 = t541 + t542;
-    const real t544 = S[14] * t180;
-    const real t545 = t543 + t544;
-    const real t546 = e[2] + t545;
-    const real t547 = Rc[2] * t546;
-    const real t548 = t540 + t547;
-    e_I[0] += t548;
-    const real t549 = Rc[3] * t531;
-    const real t550 = Rc[4] * t538;
-    const real t551 = t549 + t550;
-    const real t552 = Rc[5] * t546;
-    const real t553 = t551 + t552;
-    e_I[1] += t553;
-    const real t554 = Rc[6] * t531;
-    const real t555 = Rc[7] * t538;
-    const real t556 = t554 + t555;
-    const real t557 = Rc[8] * t546;
-    const real t558 = t556 + t557;
-    e_I[2] += t558;
-    const real t559 = t116 * t186;
-    const real t560 = t120 * t182;
-    const real t561 = t559 + t560;
-    const real t562 = S[17] * t180;
-    const real t563 = t561 + t562;
-    const real t564 = e[3] + t563;
-    const real t565 = Rc[0] * t564;
-    const real t566 = t137 * t186;
-    const real t567 = t141 * t182;
-    const real t568 = t566 + t567;
-    const real t569 = S[19] * t180;
-    const real t570 = t568 + t569;
-    const real t571 = e[4] + t570;
-    const real t572 = Rc[1] * t571;
-    const real t573 = t565 + t572;
-    const real t574 = Rc[2] * tau[2];
-    const real t575 = t573 + t574;
-    const real t576 = Rc[6] * r[1];
-    const real t577 = Rc[3] * r[2];
-    const real t578 = t576 - t577;
-    const real t579 = t531 * t578;
-    const real t580 = Rc[7] * r[1];
-    const real t581 = Rc[4] * r[2];
-    const real t582 = t580 - t581;
-    const real t583 = t538 * t582;
-    const real t584 = t579 + t583;
-    const real t585 = Rc[8] * r[1];
-    const real t586 = Rc[5] * r[2];
-    const real t587 = t585 - t586;
-    const real t588 = t546 * t587;
-    const real t589 = t584 + t588;
-    const real t590 = t575 + t589;
-    e_I[3] += t590;
-    const real t591 = Rc[3] * t564;
-    const real t592 = Rc[4] * t571;
-    const real t593 = t591 + t592;
-    const real t594 = Rc[5] * tau[2];
-    const real t595 = t593 + t594;
-    const real t596 = Rc[0] * r[2];
-    const real t597 = Rc[6] * r[0];
-    const real t598 = t596 - t597;
-    const real t599 = t531 * t598;
-    const real t600 = Rc[1] * r[2];
-    const real t601 = Rc[7] * r[0];
-    const real t602 = t600 - t601;
-    const real t603 = t538 * t602;
-    const real t604 = t599 + t603;
-    const real t605 = Rc[2] * r[2];
-    const real t606 = Rc[8] * r[0];
-    const real t607 = t605 - t606;
-    const real t608 = t546 * t607;
-    const real t609 = t604 + t608;
-    const real t610 = t595 + t609;
-    e_I[4] += t610;
-    const real t611 = Rc[6] * t564;
-    const real t612 = Rc[7] * t571;
-    const real t613 = t611 + t612;
-    const real t614 = Rc[8] * tau[2];
-    const real t615 = t613 + t614;
-    const real t616 = Rc[3] * r[0];
-    const real t617 = Rc[0] * r[1];
-    const real t618 = t616 - t617;
-    const real t619 = t531 * t618;
-    const real t620 = Rc[4] * r[0];
-    const real t621 = Rc[1] * r[1];
-    const real t622 = t620 - t621;
-    const real t623 = t538 * t622;
-    const real t624 = t619 + t623;
-    const real t625 = Rc[5] * r[0];
-    const real t626 = Rc[2] * r[1];
-    const real t627 = t625 - t626;
-    const real t628 = t546 * t627;
-    const real t629 = t624 + t628;
-    const real t630 = t615 + t629;
-    e_I[5] += t630;
-    return 0;
+  (void)p;
+  real t0 = cos(q[2]);
+  real t2 = sin(q[2]);
+  real t3 = S[1] * t2;
+  real t4 = S[0] * t0 - t3;
+  real t6 = S[1] * t0;
+  real t8 = t6 - S[6] * t2;
+  real t10 = t0 * t4 - t2 * t8;
+  real t11 = 0.0 < t10;
+  if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t13 = S[0] * t2 + t6;
+  real t16 = t3 + S[6] * t0;
+  real t18 = t2 * t13 + t0 * t16;
+  real t22 = t0 * t13 - t2 * t16;
+  real t23 = 1.0 / t10;
+  real t24 = t22 * t23;
+  real t26 = t18 - t22 * t24;
+  real t27 = t18 * ((real)1 / (real)10000000000000) < t26;
+  if (!(t27 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t31 = S[5] * t0 - S[10] * t2;
+  real t32 = t31 * t23;
+  real t39 = S[5] * t2 + S[10] * t0 - t31 * t24;
+  real t40 = 1.0 / t26;
+  real t41 = t40 * t39;
+  real t43 = S[20] - t31 * t32 - t39 * t41;
+  real t44 = S[20] * ((real)1 / (real)10000000000000) < t43;
+  if (!(t44 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t27 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t44 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t51 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t53 = (t2 * t2 + t0 * t0) * ((0.0 < floor_[0]) ? floor_[0] : t51);
+  if (!((t53 < t10))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t53 < t18))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  real t59 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  if (!((((0.0 < floor_[1]) ? floor_[1] : t59) < S[20]))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  real t64 = t13 - t4 * t24;
+  real t66 = 1.0 / t43;
+  real t71 = t66 * (S[5] - t4 * t32 - t41 * t64);
+  real t73 = t40 * t64 - t41 * t71;
+  real t77 = t4 * t23 - t24 * t73 - t32 * t71;
+  G[0] = t77;
+  real t80 = t16 - t8 * t24;
+  real t86 = t66 * (S[10] - t8 * t32 - t41 * t80);
+  real t88 = t40 * t80 - t41 * t86;
+  real t92 = t8 * t23 - t24 * t88 - t32 * t86;
+  G[1] = t92;
+  real t95 = S[2] * t0 - S[7] * t2;
+  real t99 = S[2] * t2 + S[7] * t0;
+  real t101 = t99 - t95 * t24;
+  real t107 = t66 * (S[14] - t95 * t32 - t41 * t101);
+  real t109 = t40 * t101 - t41 * t107;
+  real t113 = t95 * t23 - t24 * t109 - t32 * t107;
+  G[2] = t113;
+  real t116 = S[3] * t0 - S[8] * t2;
+  real t120 = S[3] * t2 + S[8] * t0;
+  real t122 = t120 - t116 * t24;
+  real t128 = t66 * (S[17] - t116 * t32 - t41 * t122);
+  real t130 = t40 * t122 - t41 * t128;
+  real t134 = t116 * t23 - t24 * t130 - t32 * t128;
+  G[3] = t134;
+  real t137 = S[4] * t0 - S[9] * t2;
+  real t141 = S[4] * t2 + S[9] * t0;
+  real t143 = t141 - t137 * t24;
+  real t149 = t66 * (S[19] - t137 * t32 - t41 * t143);
+  real t151 = t40 * t143 - t41 * t149;
+  real t155 = t137 * t23 - t24 * t151 - t32 * t149;
+  G[4] = t155;
+  real t156 = t43 * t66;
+  real t158 = t41 - t41 * t156;
+  G[5] = t32 - t24 * t158 - t32 * t156;
+  G[6] = t73;
+  G[7] = t88;
+  G[8] = t109;
+  G[9] = t130;
+  G[10] = t151;
+  G[11] = t158;
+  G[12] = t71;
+  G[13] = t86;
+  G[14] = t107;
+  G[15] = t128;
+  G[16] = t149;
+  G[17] = t156;
+  real t166 = tau[0] + (e[1] * t2 - e[0] * t0);
+  real t173 = tau[1] - (e[0] * t2 + e[1] * t0) - t24 * t166;
+  real t180 = t66 * (tau[2] - e[5] - t32 * t166 - t41 * t173);
+  real t182 = t40 * t173 - t41 * t180;
+  real t186 = t23 * t166 - t24 * t182 - t32 * t180;
+  g[0] = t186;
+  g[1] = t182;
+  g[2] = t180;
+  real t192 = S[0] - (t4 * t77 + t13 * t73 + S[5] * t71);
+  real t199 = S[1] - (t4 * t92 + t13 * t88 + S[5] * t86);
+  real t207 = S[2] - (t4 * t113 + t13 * t109 + S[5] * t107);
+  real t209 = Rc[0] * t192 + Rc[1] * t199 + Rc[2] * t207;
+  real t217 = S[6] - (t8 * t92 + t16 * t88 + S[10] * t86);
+  real t225 = S[7] - (t8 * t113 + t16 * t109 + S[10] * t107);
+  real t227 = Rc[0] * t199 + Rc[1] * t217 + Rc[2] * t225;
+  real t238 = S[11] - (t95 * t113 + t99 * t109 + S[14] * t107);
+  real t240 = Rc[0] * t207 + Rc[1] * t225 + Rc[2] * t238;
+  real t242 = Rc[0] * t209 + Rc[1] * t227 + Rc[2] * t240;
+  S_I[0] += t242;
+  real t247 = Rc[3] * t209 + Rc[4] * t227 + Rc[5] * t240;
+  S_I[1] += t247;
+  real t252 = Rc[6] * t209 + Rc[7] * t227 + Rc[8] * t240;
+  S_I[2] += t252;
+  real t258 = S[3] - (t4 * t134 + t13 * t130 + S[5] * t128);
+  real t265 = S[8] - (t8 * t134 + t16 * t130 + S[10] * t128);
+  real t273 = S[12] - (t95 * t134 + t99 * t130 + S[14] * t128);
+  real t275 = Rc[0] * t258 + Rc[1] * t265 + Rc[2] * t273;
+  real t282 = S[4] - (t4 * t155 + t13 * t151 + S[5] * t149);
+  real t289 = S[9] - (t8 * t155 + t16 * t151 + S[10] * t149);
+  real t297 = S[13] - (t95 * t155 + t99 * t151 + S[14] * t149);
+  real t299 = Rc[0] * t282 + Rc[1] * t289 + Rc[2] * t297;
+  real t301 = Rc[0] * t275 + Rc[1] * t299;
+  real t302 = r[1] * t252;
+  real t303 = r[2] * t247;
+  S_I[3] += t301 + (t302 - t303);
+  real t308 = Rc[3] * t275 + Rc[4] * t299;
+  real t312 = t308 + (r[2] * t242 - r[0] * t252);
+  S_I[4] += t312;
+  real t315 = Rc[6] * t275 + Rc[7] * t299;
+  real t319 = t315 + (r[0] * t247 - r[1] * t242);
+  S_I[5] += t319;
+  real t324 = Rc[3] * t192 + Rc[4] * t199 + Rc[5] * t207;
+  real t330 = Rc[3] * t199 + Rc[4] * t217 + Rc[5] * t225;
+  real t337 = Rc[3] * t207 + Rc[4] * t225 + Rc[5] * t238;
+  real t339 = Rc[3] * t324 + Rc[4] * t330 + Rc[5] * t337;
+  S_I[6] += t339;
+  real t344 = Rc[6] * t324 + Rc[7] * t330 + Rc[8] * t337;
+  S_I[7] += t344;
+  real t349 = Rc[3] * t258 + Rc[4] * t265 + Rc[5] * t273;
+  real t355 = Rc[3] * t282 + Rc[4] * t289 + Rc[5] * t297;
+  real t357 = Rc[0] * t349 + Rc[1] * t355;
+  real t361 = t357 + (r[1] * t344 - r[2] * t339);
+  S_I[8] += t361;
+  real t364 = Rc[3] * t349 + Rc[4] * t355;
+  real t365 = r[0] * t344;
+  real t367 = t364 + (t303 - t365);
+  S_I[9] += t367;
+  real t370 = Rc[6] * t349 + Rc[7] * t355;
+  real t374 = t370 + (r[0] * t339 - r[1] * t247);
+  S_I[10] += t374;
+  real t394 = Rc[6] * (Rc[6] * t192 + Rc[7] * t199 + Rc[8] * t207) + Rc[7] * (Rc[6] * t199 + Rc[7] *
+    t217 + Rc[8] * t225) + Rc[8] * (Rc[6] * t207 + Rc[7] * t225 + Rc[8] * t238);
+  S_I[11] += t394;
+  real t399 = Rc[6] * t258 + Rc[7] * t265 + Rc[8] * t273;
+  real t405 = Rc[6] * t282 + Rc[7] * t289 + Rc[8] * t297;
+  real t407 = Rc[0] * t399 + Rc[1] * t405;
+  real t411 = t407 + (r[1] * t394 - r[2] * t344);
+  S_I[12] += t411;
+  real t414 = Rc[3] * t399 + Rc[4] * t405;
+  real t418 = t414 + (r[2] * t252 - r[0] * t394);
+  S_I[13] += t418;
+  real t423 = Rc[6] * t399 + Rc[7] * t405 + (t365 - t302);
+  S_I[14] += t423;
+  real t429 = S[15] - (t116 * t134 + t120 * t130 + S[17] * t128);
+  real t436 = S[16] - (t116 * t155 + t120 * t151 + S[17] * t149);
+  real t438 = Rc[0] * t429 + Rc[1] * t436;
+  real t446 = S[18] - (t137 * t155 + t141 * t151 + S[19] * t149);
+  real t448 = Rc[0] * t436 + Rc[1] * t446;
+  S_I[15] += Rc[0] * t438 + Rc[1] * t448 + (r[1] * t411 - r[2] * t361 + (r[1] * t407 - r[2] *
+    t357));
+  S_I[16] += Rc[3] * t438 + Rc[4] * t448 + (r[1] * t418 - r[2] * t367 + (r[2] * t301 - r[0] *
+    t407));
+  S_I[17] += Rc[6] * t438 + Rc[7] * t448 + (r[1] * t423 - r[2] * t374 + (r[0] * t357 - r[1] *
+    t301));
+  real t483 = Rc[3] * t429 + Rc[4] * t436;
+  real t487 = Rc[3] * t436 + Rc[4] * t446;
+  S_I[18] += Rc[3] * t483 + Rc[4] * t487 + (r[2] * t312 - r[0] * t418 + (r[2] * t308 - r[0] *
+    t414));
+  S_I[19] += Rc[6] * t483 + Rc[7] * t487 + (r[2] * t319 - r[0] * t423 + (r[0] * t364 - r[1] *
+    t308));
+  S_I[20] += Rc[6] * (Rc[6] * t429 + Rc[7] * t436) + Rc[7] * (Rc[6] * t436 + Rc[7] * t446) + (r[0] *
+    t374 - r[1] * t319 + (r[0] * t370 - r[1] * t315));
+  real t531 = e[0] + (t4 * t186 + t13 * t182 + S[5] * t180);
+  real t538 = e[1] + (t8 * t186 + t16 * t182 + S[10] * t180);
+  real t546 = e[2] + (t95 * t186 + t99 * t182 + S[14] * t180);
+  e_I[0] += Rc[0] * t531 + Rc[1] * t538 + Rc[2] * t546;
+  e_I[1] += Rc[3] * t531 + Rc[4] * t538 + Rc[5] * t546;
+  e_I[2] += Rc[6] * t531 + Rc[7] * t538 + Rc[8] * t546;
+  real t564 = e[3] + (t116 * t186 + t120 * t182 + S[17] * t180);
+  real t571 = e[4] + (t137 * t186 + t141 * t182 + S[19] * t180);
+  e_I[3] += Rc[0] * t564 + Rc[1] * t571 + Rc[2] * tau[2] + (t531 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t538 * (Rc[7] * r[1] - Rc[4] * r[2]) + t546 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t564 + Rc[4] * t571 + Rc[5] * tau[2] + (t531 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t538 * (Rc[1] * r[2] - Rc[7] * r[0]) + t546 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t564 + Rc[7] * t571 + Rc[8] * tau[2] + (t531 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t538 * (Rc[4] * r[0] - Rc[1] * r[1]) + t546 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_planar_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_planar_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_condense_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_planar_condense_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_planar_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 3 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1113,132 +362,39 @@ static const mstmm_guard mstmm_hinge_planar_condense_guards[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_planar_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_planar_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    const real t78 = cos(q[2]);
-    const real t79 = t53 * t78;
-    const real t80 = sin(q[2]);
-    const real t81 = t65 * t80;
-    const real t82 = t79 + t81;
-    const real t83 = t16 + t82;
-    delta[0] = t83;
-    const real t84 = t65 * t78;
-    const real t85 = t53 * t80;
-    const real t86 = t84 - t85;
-    const real t87 = t22 + t86;
-    delta[1] = t87;
-    delta[2] = t29;
-    delta[3] = t36;
-    delta[4] = t43;
-    const real t88 = t50 + t77;
-    delta[5] = t88;
-    return 0;
+  (void)p;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  real t78 = cos(q[2]);
+  real t80 = sin(q[2]);
+  delta[0] = t16 + (t53 * t78 + t65 * t80);
+  delta[1] = t22 + (t65 * t78 - t53 * t80);
+  delta[2] = t29;
+  delta[3] = t36;
+  delta[4] = t43;
+  delta[5] = t50 + t77;
+  return 0;
 }
 
-static int mstmm_hinge_planar_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_planar_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_recover_outputs[] = {
-    {"udot", 3, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[0] parameters
@@ -1254,103 +410,45 @@ static const mstmm_port mstmm_hinge_planar_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[3] derivative of qdot
  */
-int mstmm_hinge_planar_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_planar_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    const real t0 = sin(q[2]);
-    const real t1 = t0 * d_q[2];
-    const real t2 = -t1;
-    d_R[0] = t2;
-    const real t3 = cos(q[2]);
-    const real t4 = t3 * d_q[2];
-    const real t5 = -t4;
-    d_R[1] = t5;
-    d_R[2] = 0.0;
-    d_R[3] = t4;
-    d_R[4] = t2;
-    d_R[5] = 0.0;
-    d_R[6] = 0.0;
-    d_R[7] = 0.0;
-    d_R[8] = 0.0;
-    d_d[0] = d_q[0];
-    d_d[1] = d_q[1];
-    d_d[2] = 0.0;
-    d_H[0] = t2;
-    d_H[1] = t4;
-    d_H[2] = 0.0;
-    d_H[3] = t5;
-    d_H[4] = t2;
-    d_H[5] = 0.0;
-    d_H[6] = 0.0;
-    d_H[7] = 0.0;
-    d_H[8] = 0.0;
-    d_H[9] = 0.0;
-    d_H[10] = 0.0;
-    d_H[11] = 0.0;
-    d_H[12] = 0.0;
-    d_H[13] = 0.0;
-    d_H[14] = 0.0;
-    d_H[15] = 0.0;
-    d_H[16] = 0.0;
-    d_H[17] = 0.0;
-    const real t6 = t3 * d_u[0];
-    const real t7 = u[0] * t1;
-    const real t8 = t6 - t7;
-    const real t9 = u[1] * t4;
-    const real t10 = t0 * d_u[1];
-    const real t11 = t9 + t10;
-    const real t12 = t8 + t11;
-    d_v[0] = t12;
-    const real t13 = t3 * d_u[1];
-    const real t14 = u[1] * t1;
-    const real t15 = t13 - t14;
-    const real t16 = u[0] * t4;
-    const real t17 = t0 * d_u[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 - t18;
-    d_v[1] = t19;
-    d_v[2] = 0.0;
-    d_w[0] = 0.0;
-    d_w[1] = 0.0;
-    d_w[2] = d_u[2];
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    d_qdot[0] = d_u[0];
-    d_qdot[1] = d_u[1];
-    d_qdot[2] = d_u[2];
-    return 0;
+  (void)p;
+  real t0 = sin(q[2]);
+  real t1 = t0 * d_q[2];
+  real t2 = -t1;
+  d_R[0] = t2;
+  real t3 = cos(q[2]);
+  real t4 = t3 * d_q[2];
+  real t5 = -t4;
+  d_R[1] = t5;
+  d_R[2] = 0.0;
+  d_R[3] = t4;
+  d_R[4] = t2;
+  d_R[5] = d_R[6] = d_R[7] = d_R[8] = 0.0;
+  d_d[0] = d_q[0];
+  d_d[1] = d_q[1];
+  d_d[2] = 0.0;
+  d_H[0] = t2;
+  d_H[1] = t4;
+  d_H[2] = 0.0;
+  d_H[3] = t5;
+  d_H[4] = t2;
+  d_H[5] = d_H[6] = d_H[7] = d_H[8] = d_H[9] = d_H[10] = d_H[11] = d_H[12] = d_H[13] = d_H[14] =
+    d_H[15] = d_H[16] = d_H[17] = 0.0;
+  d_v[0] = t3 * d_u[0] - u[0] * t1 + (u[1] * t4 + t0 * d_u[1]);
+  d_v[1] = t3 * d_u[1] - u[1] * t1 - (u[0] * t4 + t0 * d_u[0]);
+  d_v[2] = d_w[0] = d_w[1] = 0.0;
+  d_w[2] = d_u[2];
+  d_c[0] = d_c[1] = d_c[2] = d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = d_u[0];
+  d_qdot[1] = d_u[1];
+  d_qdot[2] = d_u[2];
+  return 0;
 }
 
-static int mstmm_hinge_planar_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_planar_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"d_q", 3, "", 0, 0},
-    {"d_u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 18, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[0] parameters
@@ -1358,39 +456,16 @@ static const mstmm_port mstmm_hinge_planar_hinge_slope_outputs[] = {
  * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
  * out J[3][3] qdot by q, transposed
  */
-int mstmm_hinge_planar_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_planar_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    J[4] = 0.0;
-    J[5] = 0.0;
-    J[6] = 0.0;
-    J[7] = 0.0;
-    J[8] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = J[1] = J[2] = J[3] = J[4] = J[5] = J[6] = J[7] = J[8] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_planar_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_planar_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_rates_by_coordinates_outputs[] = {
-    {"J", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[0] parameters
@@ -1398,39 +473,20 @@ static const mstmm_port mstmm_hinge_planar_rates_by_coordinates_outputs[] = {
  * in  u[3] speeds: x_rate [m/s], y_rate [m/s], angle_rate [rad/s]
  * out J[3][3] qdot by u, transposed
  */
-int mstmm_hinge_planar_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_planar_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    J[4] = 1.0;
-    J[5] = 0.0;
-    J[6] = 0.0;
-    J[7] = 0.0;
-    J[8] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  J[1] = J[2] = J[3] = 0.0;
+  J[4] = 1.0;
+  J[5] = J[6] = J[7] = 0.0;
+  J[8] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_planar_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_planar_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_rates_by_speeds_outputs[] = {
-    {"J", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[0] parameters
@@ -1451,253 +507,91 @@ static const mstmm_port mstmm_hinge_planar_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_planar_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_planar_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    (void)p;
-    const real t0 = cos(q[2]);
-    R[0] = t0;
-    const real t1 = sin(q[2]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = q[0];
-    d[1] = q[1];
-    d[2] = 0.0;
-    H[0] = t0;
-    H[1] = t1;
-    H[2] = 0.0;
-    H[3] = t2;
-    H[4] = t0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 0.0;
-    H[14] = 0.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 1.0;
-    const real t3 = u[1] * t1;
-    const real t4 = u[0] * t0;
-    const real t5 = t3 + t4;
-    v[0] = t5;
-    const real t6 = u[1] * t0;
-    const real t7 = u[0] * t1;
-    const real t8 = t6 - t7;
-    v[1] = t8;
-    v[2] = 0.0;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[2];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    qdot[2] = u[2];
-    const real t9 = t0 * Rt[0];
-    const real t10 = t1 * Rt[1];
-    const real t11 = t9 + t10;
-    Rc[0] = t11;
-    const real t12 = t0 * Rt[1];
-    const real t13 = t1 * Rt[0];
-    const real t14 = t12 - t13;
-    Rc[1] = t14;
-    Rc[2] = Rt[2];
-    const real t15 = t0 * Rt[3];
-    const real t16 = t1 * Rt[4];
-    const real t17 = t15 + t16;
-    Rc[3] = t17;
-    const real t18 = t0 * Rt[4];
-    const real t19 = t1 * Rt[3];
-    const real t20 = t18 - t19;
-    Rc[4] = t20;
-    Rc[5] = Rt[5];
-    const real t21 = t0 * Rt[6];
-    const real t22 = t1 * Rt[7];
-    const real t23 = t21 + t22;
-    Rc[6] = t23;
-    const real t24 = t0 * Rt[7];
-    const real t25 = t1 * Rt[6];
-    const real t26 = t24 - t25;
-    Rc[7] = t26;
-    Rc[8] = Rt[8];
-    const real t27 = q[0] * Rt[0];
-    const real t28 = q[1] * Rt[1];
-    const real t29 = t27 + t28;
-    const real t30 = ro[0] + t29;
-    r[0] = t30;
-    const real t31 = q[0] * Rt[3];
-    const real t32 = q[1] * Rt[4];
-    const real t33 = t31 + t32;
-    const real t34 = ro[1] + t33;
-    r[1] = t34;
-    const real t35 = q[0] * Rt[6];
-    const real t36 = q[1] * Rt[7];
-    const real t37 = t35 + t36;
-    const real t38 = ro[2] + t37;
-    r[2] = t38;
-    const real t39 = motion_I[0] * t11;
-    const real t40 = motion_I[1] * t17;
-    const real t41 = t39 + t40;
-    const real t42 = motion_I[2] * t23;
-    const real t43 = t41 + t42;
-    motion[0] = t43;
-    const real t44 = motion_I[0] * t14;
-    const real t45 = motion_I[1] * t20;
-    const real t46 = t44 + t45;
-    const real t47 = motion_I[2] * t26;
-    const real t48 = t46 + t47;
-    motion[1] = t48;
-    const real t49 = Rt[2] * motion_I[0];
-    const real t50 = Rt[5] * motion_I[1];
-    const real t51 = t49 + t50;
-    const real t52 = Rt[8] * motion_I[2];
-    const real t53 = t51 + t52;
-    const real t54 = u[2] + t53;
-    motion[2] = t54;
-    const real t55 = motion_I[3] * t11;
-    const real t56 = motion_I[4] * t17;
-    const real t57 = t55 + t56;
-    const real t58 = motion_I[5] * t23;
-    const real t59 = t57 + t58;
-    const real t60 = u[2] * t48;
-    const real t61 = t59 + t60;
-    motion[3] = t61;
-    const real t62 = motion_I[3] * t14;
-    const real t63 = motion_I[4] * t20;
-    const real t64 = t62 + t63;
-    const real t65 = motion_I[5] * t26;
-    const real t66 = t64 + t65;
-    const real t67 = u[2] * t43;
-    const real t68 = t66 - t67;
-    motion[4] = t68;
-    const real t69 = Rt[2] * motion_I[3];
-    const real t70 = Rt[5] * motion_I[4];
-    const real t71 = t69 + t70;
-    const real t72 = Rt[8] * motion_I[5];
-    const real t73 = t71 + t72;
-    const real t74 = s[2] + t73;
-    motion[5] = t74;
-    const real t75 = motion_I[0] * motion_I[1];
-    const real t76 = t75 - motion_I[5];
-    const real t77 = t34 * t76;
-    const real t78 = motion_I[1] * motion_I[1];
-    const real t79 = motion_I[2] * motion_I[2];
-    const real t80 = t78 + t79;
-    const real t81 = t30 * t80;
-    const real t82 = t77 - t81;
-    const real t83 = motion_I[0] * motion_I[2];
-    const real t84 = motion_I[4] + t83;
-    const real t85 = t38 * t84;
-    const real t86 = t82 + t85;
-    const real t87 = motion_I[6] + t86;
-    const real t88 = t11 * t87;
-    const real t89 = motion_I[5] + t75;
-    const real t90 = t30 * t89;
-    const real t91 = motion_I[0] * motion_I[0];
-    const real t92 = t79 + t91;
-    const real t93 = t34 * t92;
-    const real t94 = t90 - t93;
-    const real t95 = motion_I[1] * motion_I[2];
-    const real t96 = t95 - motion_I[3];
-    const real t97 = t38 * t96;
-    const real t98 = t94 + t97;
-    const real t99 = motion_I[7] + t98;
-    const real t100 = t17 * t99;
-    const real t101 = t88 + t100;
-    const real t102 = t83 - motion_I[4];
-    const real t103 = t30 * t102;
-    const real t104 = motion_I[3] + t95;
-    const real t105 = t34 * t104;
-    const real t106 = t103 + t105;
-    const real t107 = t78 + t91;
-    const real t108 = t38 * t107;
-    const real t109 = t106 - t108;
-    const real t110 = motion_I[8] + t109;
-    const real t111 = t23 * t110;
-    const real t112 = t101 + t111;
-    const real t113 = t0 * s[0];
-    const real t114 = t1 * s[1];
-    const real t115 = t113 + t114;
-    const real t116 = t8 * t53;
-    const real t117 = 2.0 * t116;
-    const real t118 = t115 - t117;
-    const real t119 = t112 + t118;
-    motion[6] = t119;
-    const real t120 = t14 * t87;
-    const real t121 = t20 * t99;
-    const real t122 = t120 + t121;
-    const real t123 = t26 * t110;
-    const real t124 = t122 + t123;
-    const real t125 = t0 * s[1];
-    const real t126 = t1 * s[0];
-    const real t127 = t125 - t126;
-    const real t128 = t5 * t53;
-    const real t129 = 2.0 * t128;
-    const real t130 = t127 + t129;
-    const real t131 = t124 + t130;
-    motion[7] = t131;
-    const real t132 = Rt[2] * t87;
-    const real t133 = Rt[5] * t99;
-    const real t134 = t132 + t133;
-    const real t135 = Rt[8] * t110;
-    const real t136 = t134 + t135;
-    const real t137 = t8 * t43;
-    const real t138 = 2.0 * t137;
-    const real t139 = t5 * t48;
-    const real t140 = 2.0 * t139;
-    const real t141 = t138 - t140;
-    const real t142 = t136 + t141;
-    motion[8] = t142;
-    return 0;
+  (void)p;
+  real t0 = cos(q[2]);
+  R[0] = t0;
+  real t1 = sin(q[2]);
+  real t2 = -t1;
+  R[1] = t2;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = q[0];
+  d[1] = q[1];
+  d[2] = 0.0;
+  H[0] = t0;
+  H[1] = t1;
+  H[2] = 0.0;
+  H[3] = t2;
+  H[4] = t0;
+  H[5] = H[6] = H[7] = H[8] = H[9] = H[10] = H[11] = H[12] = H[13] = H[14] = H[15] = H[16] = 0.0;
+  H[17] = 1.0;
+  real t5 = u[1] * t1 + u[0] * t0;
+  v[0] = t5;
+  real t8 = u[1] * t0 - u[0] * t1;
+  v[1] = t8;
+  v[2] = w[0] = w[1] = 0.0;
+  w[2] = u[2];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  qdot[2] = u[2];
+  real t11 = t0 * Rt[0] + t1 * Rt[1];
+  Rc[0] = t11;
+  real t14 = t0 * Rt[1] - t1 * Rt[0];
+  Rc[1] = t14;
+  Rc[2] = Rt[2];
+  real t17 = t0 * Rt[3] + t1 * Rt[4];
+  Rc[3] = t17;
+  real t20 = t0 * Rt[4] - t1 * Rt[3];
+  Rc[4] = t20;
+  Rc[5] = Rt[5];
+  real t23 = t0 * Rt[6] + t1 * Rt[7];
+  Rc[6] = t23;
+  real t26 = t0 * Rt[7] - t1 * Rt[6];
+  Rc[7] = t26;
+  Rc[8] = Rt[8];
+  real t30 = ro[0] + (q[0] * Rt[0] + q[1] * Rt[1]);
+  r[0] = t30;
+  real t34 = ro[1] + (q[0] * Rt[3] + q[1] * Rt[4]);
+  r[1] = t34;
+  real t38 = ro[2] + (q[0] * Rt[6] + q[1] * Rt[7]);
+  r[2] = t38;
+  real t43 = motion_I[0] * t11 + motion_I[1] * t17 + motion_I[2] * t23;
+  motion[0] = t43;
+  real t48 = motion_I[0] * t14 + motion_I[1] * t20 + motion_I[2] * t26;
+  motion[1] = t48;
+  real t53 = Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2];
+  motion[2] = u[2] + t53;
+  motion[3] = motion_I[3] * t11 + motion_I[4] * t17 + motion_I[5] * t23 + u[2] * t48;
+  motion[4] = motion_I[3] * t14 + motion_I[4] * t20 + motion_I[5] * t26 - u[2] * t43;
+  motion[5] = s[2] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t75 = motion_I[0] * motion_I[1];
+  real t78 = motion_I[1] * motion_I[1];
+  real t79 = motion_I[2] * motion_I[2];
+  real t83 = motion_I[0] * motion_I[2];
+  real t87 = motion_I[6] + (t34 * (t75 - motion_I[5]) - t30 * (t78 + t79) + t38 * (motion_I[4] +
+    t83));
+  real t91 = motion_I[0] * motion_I[0];
+  real t95 = motion_I[1] * motion_I[2];
+  real t99 = motion_I[7] + (t30 * (motion_I[5] + t75) - t34 * (t79 + t91) + t38 * (t95 -
+    motion_I[3]));
+  real t110 = motion_I[8] + (t30 * (t83 - motion_I[4]) + t34 * (motion_I[3] + t95) - t38 * (t78 +
+    t91));
+  motion[6] = t11 * t87 + t17 * t99 + t23 * t110 + (t0 * s[0] + t1 * s[1] - 2.0 * (t8 * t53));
+  motion[7] = t14 * t87 + t20 * t99 + t26 * t110 + (t0 * s[1] - t1 * s[0] + 2.0 * (t5 * t53));
+  motion[8] = Rt[2] * t87 + Rt[5] * t99 + Rt[8] * t110 + (2.0 * (t8 * t43) - 2.0 * (t5 * t48));
+  return 0;
 }
 
-static int mstmm_hinge_planar_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_planar_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 3, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1719,291 +613,101 @@ static const mstmm_port mstmm_hinge_planar_body_motion_outputs[] = {
  * out W[3][3] slopes of the rows by load, rotors and laws
  * out H[6][3] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_planar_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_planar_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)along;
-    B[0] = 0.0;
-    B[1] = 0.0;
-    B[2] = 0.0;
-    B[3] = 0.0;
-    B[4] = 0.0;
-    B[5] = 0.0;
-    const real t0 = cos(q[2]);
-    const real t1 = t0 * scale[0];
-    const real t2 = sin(q[2]);
-    const real t3 = t2 * rate[0];
-    const real t4 = motion[2] - u[2];
-    const real t5 = t3 * t4;
-    const real t6 = 2.0 * t5;
-    const real t7 = 1.0 / sq[0];
-    const real t8 = t2 * t7;
-    const real t9 = motion[0] * t8;
-    const real t10 = t0 * t7;
-    const real t11 = motion[1] * t10;
-    const real t12 = t9 + t11;
-    const real t13 = motion[1] * t12;
-    const real t14 = t10 * t4;
-    const real t15 = t4 * t14;
-    const real t16 = t13 + t15;
-    const real t17 = t6 - t16;
-    const real t18 = motion[5] - s[2];
-    const real t19 = t8 * t18;
-    const real t20 = t17 + t19;
-    const real t21 = t1 + t20;
-    B[6] = t21;
-    const real t22 = t10 * t18;
-    const real t23 = t0 * rate[0];
-    const real t24 = t23 * t4;
-    const real t25 = 2.0 * t24;
-    const real t26 = t8 * t4;
-    const real t27 = t4 * t26;
-    const real t28 = motion[0] * t12;
-    const real t29 = t27 + t28;
-    const real t30 = t25 + t29;
-    const real t31 = t22 + t30;
-    const real t32 = t2 * scale[0];
-    const real t33 = t31 - t32;
-    B[7] = t33;
-    const real t34 = motion[0] * t14;
-    const real t35 = motion[1] * t26;
-    const real t36 = t34 - t35;
-    const real t37 = motion[0] * t3;
-    const real t38 = 2.0 * t37;
-    const real t39 = t36 - t38;
-    const real t40 = motion[1] * t23;
-    const real t41 = 2.0 * t40;
-    const real t42 = t39 - t41;
-    const real t43 = u[2] * motion[1];
-    const real t44 = motion[3] - t43;
-    const real t45 = t8 * t44;
-    const real t46 = t42 - t45;
-    const real t47 = u[2] * motion[0];
-    const real t48 = motion[4] + t47;
-    const real t49 = t10 * t48;
-    const real t50 = t46 - t49;
-    B[8] = t50;
-    B[9] = 0.0;
-    B[10] = 0.0;
-    B[11] = 0.0;
-    B[12] = 0.0;
-    B[13] = 0.0;
-    B[14] = 0.0;
-    const real t51 = motion[0] * t10;
-    const real t52 = motion[1] * t8;
-    const real t53 = t51 - t52;
-    const real t54 = motion[1] * t53;
-    const real t55 = t54 - t27;
-    const real t56 = t55 - t25;
-    const real t57 = t56 - t22;
-    const real t58 = t32 + t57;
-    B[15] = t58;
-    const real t59 = motion[0] * t53;
-    const real t60 = t15 + t59;
-    const real t61 = t6 - t60;
-    const real t62 = t19 + t61;
-    const real t63 = t1 + t62;
-    B[16] = t63;
-    const real t64 = t10 * t44;
-    const real t65 = motion[0] * t23;
-    const real t66 = 2.0 * t65;
-    const real t67 = motion[0] * t26;
-    const real t68 = motion[1] * t14;
-    const real t69 = t67 + t68;
-    const real t70 = t66 + t69;
-    const real t71 = motion[1] * t3;
-    const real t72 = 2.0 * t71;
-    const real t73 = t70 - t72;
-    const real t74 = t64 + t73;
-    const real t75 = t8 * t48;
-    const real t76 = t74 - t75;
-    B[17] = t76;
-    const real t77 = motion[1] * t7;
-    B[18] = t77;
-    const real t78 = motion[0] * t7;
-    const real t79 = -t78;
-    B[19] = t79;
-    B[20] = rate[0];
-    const real t80 = t7 * t48;
-    const real t81 = motion[1] * rate[0];
-    const real t82 = t80 + t81;
-    const real t83 = u[2] * t78;
-    const real t84 = t82 - t83;
-    B[21] = t84;
-    const real t85 = u[2] * t77;
-    const real t86 = motion[0] * rate[0];
-    const real t87 = t7 * t44;
-    const real t88 = t86 + t87;
-    const real t89 = t85 + t88;
-    const real t90 = -t89;
-    B[22] = t90;
-    B[23] = scale[0];
-    const real t91 = s[1] * t10;
-    const real t92 = s[0] * t8;
-    const real t93 = t91 - t92;
-    const real t94 = u[1] * t2;
-    const real t95 = u[0] * t0;
-    const real t96 = t94 + t95;
-    const real t97 = t96 * t4;
-    const real t98 = 2.0 * t97;
-    const real t99 = t0 * s[1];
-    const real t100 = t2 * s[0];
-    const real t101 = t99 - t100;
-    const real t102 = t98 + t101;
-    const real t103 = motion[7] - t102;
-    const real t104 = t7 * t103;
-    const real t105 = u[0] * t10;
-    const real t106 = u[1] * t8;
-    const real t107 = t105 + t106;
-    const real t108 = t4 * t107;
-    const real t109 = 2.0 * t108;
-    const real t110 = t104 + t109;
-    const real t111 = t93 + t110;
-    B[24] = t111;
-    const real t112 = u[1] * t10;
-    const real t113 = u[0] * t8;
-    const real t114 = t112 - t113;
-    const real t115 = t4 * t114;
-    const real t116 = 2.0 * t115;
-    const real t117 = u[1] * t0;
-    const real t118 = u[0] * t2;
-    const real t119 = t117 - t118;
-    const real t120 = t119 * t4;
-    const real t121 = t120 * 2.0;
-    const real t122 = t0 * s[0];
-    const real t123 = t2 * s[1];
-    const real t124 = t122 + t123;
-    const real t125 = t121 - t124;
-    const real t126 = motion[6] + t125;
-    const real t127 = t7 * t126;
-    const real t128 = t116 - t127;
-    const real t129 = s[0] * t10;
-    const real t130 = s[1] * t8;
-    const real t131 = t129 + t130;
-    const real t132 = t128 - t131;
-    B[25] = t132;
-    const real t133 = t119 * 2.0;
-    const real t134 = t133 * t77;
-    const real t135 = t96 * 2.0;
-    const real t136 = t135 * t78;
-    const real t137 = t134 + t136;
-    const real t138 = motion[0] * t107;
-    const real t139 = 2.0 * t138;
-    const real t140 = motion[1] * t114;
-    const real t141 = 2.0 * t140;
-    const real t142 = t139 + t141;
-    const real t143 = t137 - t142;
-    B[26] = t143;
-    G[0] = 0.0;
-    G[1] = 0.0;
-    G[2] = 0.0;
-    const real t144 = f[2] * t8;
-    const real t145 = -t144;
-    G[3] = t145;
-    const real t146 = f[2] * t10;
-    const real t147 = -t146;
-    G[4] = t147;
-    const real t148 = f[1] * t10;
-    const real t149 = f[0] * t8;
-    const real t150 = t148 + t149;
-    G[5] = t150;
-    G[6] = 0.0;
-    G[7] = 0.0;
-    G[8] = 0.0;
-    G[9] = t146;
-    G[10] = t145;
-    const real t151 = f[1] * t8;
-    const real t152 = f[0] * t10;
-    const real t153 = t151 - t152;
-    G[11] = t153;
-    const real t154 = f[1] * t7;
-    const real t155 = -t154;
-    G[12] = t155;
-    const real t156 = f[0] * t7;
-    G[13] = t156;
-    G[14] = 0.0;
-    const real t157 = f[4] * t7;
-    const real t158 = -t157;
-    G[15] = t158;
-    const real t159 = f[3] * t7;
-    G[16] = t159;
-    G[17] = 0.0;
-    const real t160 = J[0] * scale[0];
-    const real t161 = t160 - laws[0];
-    W[0] = t161;
-    const real t162 = -laws[1];
-    W[1] = t162;
-    const real t163 = -laws[2];
-    W[2] = t163;
-    const real t164 = -laws[3];
-    W[3] = t164;
-    const real t165 = J[1] * scale[0];
-    const real t166 = t165 - laws[4];
-    W[4] = t166;
-    const real t167 = -laws[5];
-    W[5] = t167;
-    const real t168 = laws[6] + t150;
-    const real t169 = -t168;
-    W[6] = t169;
-    const real t170 = laws[7] + t153;
-    const real t171 = -t170;
-    W[7] = t171;
-    const real t172 = J[2] * scale[0];
-    const real t173 = t172 - laws[8];
-    W[8] = t173;
-    H[0] = t0;
-    H[1] = t2;
-    H[2] = 0.0;
-    const real t174 = -t2;
-    H[3] = t174;
-    H[4] = t0;
-    H[5] = 0.0;
-    H[6] = 0.0;
-    H[7] = 0.0;
-    H[8] = 0.0;
-    H[9] = 0.0;
-    H[10] = 0.0;
-    H[11] = 0.0;
-    H[12] = 0.0;
-    H[13] = 0.0;
-    H[14] = 0.0;
-    H[15] = 0.0;
-    H[16] = 0.0;
-    H[17] = 1.0;
-    return 0;
+  (void)p;
+  (void)along;
+  B[0] = B[1] = B[2] = B[3] = B[4] = B[5] = 0.0;
+  real t0 = cos(q[2]);
+  real t1 = t0 * scale[0];
+  real t2 = sin(q[2]);
+  real t3 = t2 * rate[0];
+  real t4 = motion[2] - u[2];
+  real t6 = 2.0 * (t3 * t4);
+  real t7 = 1.0 / sq[0];
+  real t8 = t2 * t7;
+  real t10 = t0 * t7;
+  real t12 = motion[0] * t8 + motion[1] * t10;
+  real t14 = t10 * t4;
+  real t15 = t4 * t14;
+  real t18 = motion[5] - s[2];
+  real t19 = t8 * t18;
+  B[6] = t1 + (t6 - (motion[1] * t12 + t15) + t19);
+  real t22 = t10 * t18;
+  real t23 = t0 * rate[0];
+  real t25 = 2.0 * (t23 * t4);
+  real t26 = t8 * t4;
+  real t27 = t4 * t26;
+  real t32 = t2 * scale[0];
+  B[7] = t22 + (t25 + (t27 + motion[0] * t12)) - t32;
+  real t44 = motion[3] - u[2] * motion[1];
+  real t48 = motion[4] + u[2] * motion[0];
+  B[8] = motion[0] * t14 - motion[1] * t26 - 2.0 * (motion[0] * t3) - 2.0 * (motion[1] * t23) - t8 *
+    t44 - t10 * t48;
+  B[9] = B[10] = B[11] = B[12] = B[13] = B[14] = 0.0;
+  real t53 = motion[0] * t10 - motion[1] * t8;
+  B[15] = t32 + (motion[1] * t53 - t27 - t25 - t22);
+  B[16] = t1 + (t19 + (t6 - (t15 + motion[0] * t53)));
+  B[17] = t10 * t44 + (2.0 * (motion[0] * t23) + (motion[0] * t26 + motion[1] * t14) - 2.0 *
+    (motion[1] * t3)) - t8 * t48;
+  real t77 = motion[1] * t7;
+  B[18] = t77;
+  real t78 = motion[0] * t7;
+  B[19] = -t78;
+  B[20] = rate[0];
+  B[21] = t7 * t48 + motion[1] * rate[0] - u[2] * t78;
+  B[22] = -(u[2] * t77 + (motion[0] * rate[0] + t7 * t44));
+  B[23] = scale[0];
+  real t96 = u[1] * t2 + u[0] * t0;
+  real t107 = u[0] * t10 + u[1] * t8;
+  B[24] = s[1] * t10 - s[0] * t8 + (t7 * (motion[7] - (2.0 * (t96 * t4) + (t0 * s[1] - t2 * s[0])))
+    + 2.0 * (t4 * t107));
+  real t114 = u[1] * t10 - u[0] * t8;
+  real t119 = u[1] * t0 - u[0] * t2;
+  B[25] = 2.0 * (t4 * t114) - t7 * (motion[6] + (t119 * t4 * 2.0 - (t0 * s[0] + t2 * s[1]))) - (s[0]
+    * t10 + s[1] * t8);
+  B[26] = t119 * 2.0 * t77 + t96 * 2.0 * t78 - (2.0 * (motion[0] * t107) + 2.0 * (motion[1] *
+    t114));
+  G[0] = G[1] = G[2] = 0.0;
+  real t145 = -(f[2] * t8);
+  G[3] = t145;
+  real t146 = f[2] * t10;
+  G[4] = -t146;
+  real t150 = f[1] * t10 + f[0] * t8;
+  G[5] = t150;
+  G[6] = G[7] = G[8] = 0.0;
+  G[9] = t146;
+  G[10] = t145;
+  real t153 = f[1] * t8 - f[0] * t10;
+  G[11] = t153;
+  G[12] = -(f[1] * t7);
+  G[13] = f[0] * t7;
+  G[14] = 0.0;
+  G[15] = -(f[4] * t7);
+  G[16] = f[3] * t7;
+  G[17] = 0.0;
+  W[0] = J[0] * scale[0] - laws[0];
+  W[1] = -laws[1];
+  W[2] = -laws[2];
+  W[3] = -laws[3];
+  W[4] = J[1] * scale[0] - laws[4];
+  W[5] = -laws[5];
+  W[6] = -(laws[6] + t150);
+  W[7] = -(laws[7] + t153);
+  W[8] = J[2] * scale[0] - laws[8];
+  H[0] = t0;
+  H[1] = t2;
+  H[2] = 0.0;
+  H[3] = -t2;
+  H[4] = t0;
+  H[5] = H[6] = H[7] = H[8] = H[9] = H[10] = H[11] = H[12] = H[13] = H[14] = H[15] = H[16] = 0.0;
+  H[17] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_planar_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_planar_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_planar_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 3, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"laws", 9, "", 0, 0},
-    {"along", 9, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_planar_directions_outputs[] = {
-    {"B", 27, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"W", 9, "", 0, 0},
-    {"H", 18, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_planar_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_planar_q_names[] = {
     "x", "y", "angle",
@@ -2022,121 +726,67 @@ static const char *const mstmm_hinge_planar_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_planar_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_planar_hinge,
-        .call = mstmm_hinge_planar_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_planar_hinge_inputs,
-        .outputs = mstmm_hinge_planar_hinge_outputs,
-        .ir_hash = "363276a9aa527332b06a431ba677eef0b585df9dcd2615fd5b37b4fb90e02fa7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_planar_forward,
-        .call = mstmm_hinge_planar_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_planar_forward_inputs,
-        .outputs = mstmm_hinge_planar_forward_outputs,
-        .ir_hash = "d08bb20372d6560a2d64020079ac80f566aae6806fb705dc8af89e2e65bd7eab",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_planar_condense,
-        .call = mstmm_hinge_planar_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_planar_condense_inputs,
-        .outputs = mstmm_hinge_planar_condense_outputs,
-        .ir_hash = "3bb058e129c1b90d4380a6f90e3fe1380749a8239d2e44a5b90aad6772142fc5",
-        .n_guards = 9,
-        .guards = mstmm_hinge_planar_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_planar_recover,
-        .call = mstmm_hinge_planar_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_planar_recover_inputs,
-        .outputs = mstmm_hinge_planar_recover_outputs,
-        .ir_hash = "39b525c12493098521f00ba39eef73c0cb06ab82e6abeb70f1310322c4a31452",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_planar_hinge_slope,
-        .call = mstmm_hinge_planar_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_planar_hinge_slope_inputs,
-        .outputs = mstmm_hinge_planar_hinge_slope_outputs,
-        .ir_hash = "0d25ffe1d69d18767b2158eb8ec5c8ff19d125b4f93dec0038c4a375387d6565",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_planar_rates_by_coordinates,
-        .call = mstmm_hinge_planar_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_planar_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_planar_rates_by_coordinates_outputs,
-        .ir_hash = "7449a05bbd055a1239076cecba94b58384da63e18e53549d401801fffed54fe8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_planar_rates_by_speeds,
-        .call = mstmm_hinge_planar_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_planar_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_planar_rates_by_speeds_outputs,
-        .ir_hash = "f4195009112ec65c89fb5f90d2df6c0b90e6cedb6c34f9029ebe0ff7a11eaec3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_planar_body_motion,
-        .call = mstmm_hinge_planar_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_planar_body_motion_inputs,
-        .outputs = mstmm_hinge_planar_body_motion_outputs,
-        .ir_hash = "ca15ef4c7c1c297dcf77ca36169dbeb8cfb86029e37d4cbc3b471b54ebc91d4a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_planar_directions,
-        .call = mstmm_hinge_planar_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_planar_directions_inputs,
-        .outputs = mstmm_hinge_planar_directions_outputs,
-        .ir_hash = "f9fecd7dfc481767e445474be215b7fc1e1b6809a6cc2b946d26f10adee03faa",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_planar_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0,
+    0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3,
+    "m", 0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 3, "", 0, 0}},
+    "1956b212ddb5b5f1e2d557d6cc40b0d20230a825572c786fa5b5bb2bd697efa8", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_planar_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "",
+    0, 0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"s",
+    3, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3,
+    "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 3, "", 0, 0}},
+    "beaca1a1b3ff2cbce4ee1b72828c7611563451ec94a49cfd8a513314a3e7c0ce", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_planar_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 18, "", 0, 0}, {"g", 3, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "7043efbc8b906a13c7c628dddec814a71f4046b1547b7153cfbfb294d9736f18", 9, (const
+    mstmm_guard[]){{1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_planar_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"G", 18, "", 0, 0}, {"g",
+    3, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 3, "", 0, 0}, {"delta",
+    6, "", 0, 0}}, "84bac4ec5231537a57e67d7b1638585d2281aefd145fb9be1742de55265128cc", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_planar_hinge_slope), 5, 7, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"d_q", 3, "", 0, 0}, {"d_u", 3, "", 0,
+    0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 18, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot",
+    3, "", 0, 0}}, "44b18e6c7d7dc94acc0e9184e042ac406ef219ef5cd0a7c1c102ad8e02517720", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_planar_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 9, "", 0, 0}},
+    "98603fcb881e3d94a37dfd83b521797d62b8ca56461d1651514bcbf56390ad69", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_planar_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 9, "", 0, 0}},
+    "089e199c23c203c48f015167c7028c20fcd98af84ad9bb17993e8201805afcd9", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_planar_body_motion), 7, 10, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 3, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 3, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "e14215f2625bb600488d97c1f0fae3c2c595ac66dcae0a89f8b486fe4ff9b67a", 0,
+    NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_planar_directions), 12, 4, (const mstmm_port[]){{"p",
+    0, "", 0, 0}, {"q", 3, "", 0, 0}, {"u", 3, "", 0, 0}, {"s", 3, "", 0, 0}, {"motion", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"laws", 9, "", 0, 0}, {"along", 9,
+    "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1, "1/s", 0, 0}}, (const
+    mstmm_port[]){{"B", 27, "", 0, 0}, {"G", 18, "", 0, 0}, {"W", 9, "", 0, 0}, {"H", 18, "", 0,
+    0}}, "4be604c6126f97a6bf3027ba5f2bcfda72e19935b614d88a01da30214e25d231", 0, NULL},
 };
 
 const mstmm_element mstmm_hinge_planar = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "planar",
-    .hash = "0b8367484cc1eb4f87f0492cd4308dc79494dddcc4887689892f142c0c3b7aa8",
+    .hash = "0730b7a3206d7be6e69fee43edfcb31f0bb7a1545bb9e98f94104496aa8abcc1",
     .nq = 3,
     .nu = 3,
     .np = 0,

@@ -8,40 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_prismatic;
-int mstmm_hinge_prismatic_hinge(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict R, real *restrict d, real *restrict H, real *restrict v,
-    real *restrict w, real *restrict c, real *restrict qdot);
-int mstmm_hinge_prismatic_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_prismatic_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_prismatic_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_prismatic_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the prismatic hinge
  * in  p[0] parameters
  * in  q[1] coordinates: displacement [m]
@@ -54,66 +20,28 @@ int mstmm_hinge_prismatic_directions(const real *restrict p, const real *restric
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[1] coordinate rates
  */
-int mstmm_hinge_prismatic_hinge(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict R, real *restrict d, real *restrict H, real *restrict v,
-    real *restrict w, real *restrict c, real *restrict qdot)
+int mstmm_hinge_prismatic_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    (void)p;
-    R[0] = 1.0;
-    R[1] = 0.0;
-    R[2] = 0.0;
-    R[3] = 0.0;
-    R[4] = 1.0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = q[0];
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 1.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = u[0];
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = 0.0;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  R[0] = 1.0;
+  R[1] = R[2] = R[3] = 0.0;
+  R[4] = 1.0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = 0.0;
+  d[2] = q[0];
+  H[0] = H[1] = 0.0;
+  H[2] = 1.0;
+  H[3] = H[4] = H[5] = v[0] = v[1] = 0.0;
+  v[2] = u[0];
+  w[0] = w[1] = w[2] = c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_hinge_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3],
+  out[4], out[5], out[6]))
 
 /* bias motion outboard of the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -130,150 +58,51 @@ static const mstmm_port mstmm_hinge_prismatic_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[1] coordinate rates
  */
-int mstmm_hinge_prismatic_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_prismatic_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    (void)p;
-    Rc[0] = Rt[0];
-    Rc[1] = Rt[1];
-    Rc[2] = Rt[2];
-    Rc[3] = Rt[3];
-    Rc[4] = Rt[4];
-    Rc[5] = Rt[5];
-    Rc[6] = Rt[6];
-    Rc[7] = Rt[7];
-    Rc[8] = Rt[8];
-    const real t0 = Rt[2] * q[0];
-    const real t1 = ro[0] + t0;
-    r[0] = t1;
-    const real t2 = Rt[5] * q[0];
-    const real t3 = ro[1] + t2;
-    r[1] = t3;
-    const real t4 = Rt[8] * q[0];
-    const real t5 = ro[2] + t4;
-    r[2] = t5;
-    const real t6 = Rt[0] * motion_I[0];
-    const real t7 = Rt[3] * motion_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rt[6] * motion_I[2];
-    const real t10 = t8 + t9;
-    motion[0] = t10;
-    const real t11 = Rt[1] * motion_I[0];
-    const real t12 = Rt[4] * motion_I[1];
-    const real t13 = t11 + t12;
-    const real t14 = Rt[7] * motion_I[2];
-    const real t15 = t13 + t14;
-    motion[1] = t15;
-    const real t16 = Rt[2] * motion_I[0];
-    const real t17 = Rt[5] * motion_I[1];
-    const real t18 = t16 + t17;
-    const real t19 = Rt[8] * motion_I[2];
-    const real t20 = t18 + t19;
-    motion[2] = t20;
-    const real t21 = Rt[0] * motion_I[3];
-    const real t22 = Rt[3] * motion_I[4];
-    const real t23 = t21 + t22;
-    const real t24 = Rt[6] * motion_I[5];
-    const real t25 = t23 + t24;
-    motion[3] = t25;
-    const real t26 = Rt[1] * motion_I[3];
-    const real t27 = Rt[4] * motion_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rt[7] * motion_I[5];
-    const real t30 = t28 + t29;
-    motion[4] = t30;
-    const real t31 = Rt[2] * motion_I[3];
-    const real t32 = Rt[5] * motion_I[4];
-    const real t33 = t31 + t32;
-    const real t34 = Rt[8] * motion_I[5];
-    const real t35 = t33 + t34;
-    motion[5] = t35;
-    const real t36 = motion_I[0] * motion_I[1];
-    const real t37 = t36 - motion_I[5];
-    const real t38 = t3 * t37;
-    const real t39 = motion_I[1] * motion_I[1];
-    const real t40 = motion_I[2] * motion_I[2];
-    const real t41 = t39 + t40;
-    const real t42 = t1 * t41;
-    const real t43 = t38 - t42;
-    const real t44 = motion_I[0] * motion_I[2];
-    const real t45 = motion_I[4] + t44;
-    const real t46 = t5 * t45;
-    const real t47 = t43 + t46;
-    const real t48 = motion_I[6] + t47;
-    const real t49 = Rt[0] * t48;
-    const real t50 = motion_I[5] + t36;
-    const real t51 = t1 * t50;
-    const real t52 = motion_I[0] * motion_I[0];
-    const real t53 = t40 + t52;
-    const real t54 = t3 * t53;
-    const real t55 = t51 - t54;
-    const real t56 = motion_I[1] * motion_I[2];
-    const real t57 = t56 - motion_I[3];
-    const real t58 = t5 * t57;
-    const real t59 = t55 + t58;
-    const real t60 = motion_I[7] + t59;
-    const real t61 = Rt[3] * t60;
-    const real t62 = t49 + t61;
-    const real t63 = t44 - motion_I[4];
-    const real t64 = t1 * t63;
-    const real t65 = motion_I[3] + t56;
-    const real t66 = t3 * t65;
-    const real t67 = t64 + t66;
-    const real t68 = t39 + t52;
-    const real t69 = t5 * t68;
-    const real t70 = t67 - t69;
-    const real t71 = motion_I[8] + t70;
-    const real t72 = Rt[6] * t71;
-    const real t73 = t62 + t72;
-    const real t74 = u[0] * t15;
-    const real t75 = 2.0 * t74;
-    const real t76 = t73 + t75;
-    motion[6] = t76;
-    const real t77 = Rt[1] * t48;
-    const real t78 = Rt[4] * t60;
-    const real t79 = t77 + t78;
-    const real t80 = Rt[7] * t71;
-    const real t81 = t79 + t80;
-    const real t82 = u[0] * t10;
-    const real t83 = 2.0 * t82;
-    const real t84 = t81 - t83;
-    motion[7] = t84;
-    const real t85 = Rt[2] * t48;
-    const real t86 = Rt[5] * t60;
-    const real t87 = t85 + t86;
-    const real t88 = Rt[8] * t71;
-    const real t89 = t87 + t88;
-    const real t90 = s[0] + t89;
-    motion[8] = t90;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  Rc[0] = Rt[0];
+  Rc[1] = Rt[1];
+  Rc[2] = Rt[2];
+  Rc[3] = Rt[3];
+  Rc[4] = Rt[4];
+  Rc[5] = Rt[5];
+  Rc[6] = Rt[6];
+  Rc[7] = Rt[7];
+  Rc[8] = Rt[8];
+  real t1 = ro[0] + Rt[2] * q[0];
+  r[0] = t1;
+  real t3 = ro[1] + Rt[5] * q[0];
+  r[1] = t3;
+  real t5 = ro[2] + Rt[8] * q[0];
+  r[2] = t5;
+  real t10 = Rt[0] * motion_I[0] + Rt[3] * motion_I[1] + Rt[6] * motion_I[2];
+  motion[0] = t10;
+  real t15 = Rt[1] * motion_I[0] + Rt[4] * motion_I[1] + Rt[7] * motion_I[2];
+  motion[1] = t15;
+  motion[2] = Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2];
+  motion[3] = Rt[0] * motion_I[3] + Rt[3] * motion_I[4] + Rt[6] * motion_I[5];
+  motion[4] = Rt[1] * motion_I[3] + Rt[4] * motion_I[4] + Rt[7] * motion_I[5];
+  motion[5] = Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5];
+  real t36 = motion_I[0] * motion_I[1];
+  real t39 = motion_I[1] * motion_I[1];
+  real t40 = motion_I[2] * motion_I[2];
+  real t44 = motion_I[0] * motion_I[2];
+  real t48 = motion_I[6] + (t3 * (t36 - motion_I[5]) - t1 * (t39 + t40) + t5 * (motion_I[4] + t44));
+  real t52 = motion_I[0] * motion_I[0];
+  real t56 = motion_I[1] * motion_I[2];
+  real t60 = motion_I[7] + (t1 * (motion_I[5] + t36) - t3 * (t40 + t52) + t5 * (t56 - motion_I[3]));
+  real t71 = motion_I[8] + (t1 * (t44 - motion_I[4]) + t3 * (motion_I[3] + t56) - t5 * (t39 + t52));
+  motion[6] = Rt[0] * t48 + Rt[3] * t60 + Rt[6] * t71 + 2.0 * (u[0] * t15);
+  motion[7] = Rt[1] * t48 + Rt[4] * t60 + Rt[7] * t71 - 2.0 * (u[0] * t10);
+  motion[8] = s[0] + (Rt[2] * t48 + Rt[5] * t60 + Rt[8] * t71);
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -291,477 +120,136 @@ static const mstmm_port mstmm_hinge_prismatic_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_prismatic_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_prismatic_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    (void)q;
-    const real t0 = 0.0 < S[11];
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t1 = 0.0 < floor_[0];
-    const real t2 = S[0] + S[6];
-    const real t3 = S[11] + t2;
-    const real t4 = ((real)1 / (real)300000000000000) * t3;
-    const real t5 = t1 != 0 ? floor_[0] : t4;
-    const real t6 = t5 < S[11];
-    if (!(t6 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t7 = 1.0 / S[11];
-    const real t8 = S[2] * t7;
-    G[0] = t8;
-    const real t9 = S[7] * t7;
-    G[1] = t9;
-    const real t10 = S[11] * t7;
-    G[2] = t10;
-    const real t11 = S[12] * t7;
-    G[3] = t11;
-    const real t12 = S[13] * t7;
-    G[4] = t12;
-    const real t13 = S[14] * t7;
-    G[5] = t13;
-    const real t14 = tau[0] - e[2];
-    const real t15 = t7 * t14;
-    g[0] = t15;
-    const real t16 = S[2] * t8;
-    const real t17 = S[0] - t16;
-    const real t18 = Rc[0] * t17;
-    const real t19 = S[2] * t9;
-    const real t20 = S[1] - t19;
-    const real t21 = Rc[1] * t20;
-    const real t22 = t18 + t21;
-    const real t23 = Rc[0] * t22;
-    const real t24 = Rc[0] * t20;
-    const real t25 = S[7] * t9;
-    const real t26 = S[6] - t25;
-    const real t27 = Rc[1] * t26;
-    const real t28 = t24 + t27;
-    const real t29 = Rc[1] * t28;
-    const real t30 = t23 + t29;
-    S_I[0] += t30;
-    const real t31 = Rc[3] * t22;
-    const real t32 = Rc[4] * t28;
-    const real t33 = t31 + t32;
-    S_I[1] += t33;
-    const real t34 = Rc[6] * t22;
-    const real t35 = Rc[7] * t28;
-    const real t36 = t34 + t35;
-    S_I[2] += t36;
-    const real t37 = S[2] * t11;
-    const real t38 = S[3] - t37;
-    const real t39 = Rc[0] * t38;
-    const real t40 = S[7] * t11;
-    const real t41 = S[8] - t40;
-    const real t42 = Rc[1] * t41;
-    const real t43 = t39 + t42;
-    const real t44 = Rc[0] * t43;
-    const real t45 = S[2] * t12;
-    const real t46 = S[4] - t45;
-    const real t47 = Rc[0] * t46;
-    const real t48 = S[7] * t12;
-    const real t49 = S[9] - t48;
-    const real t50 = Rc[1] * t49;
-    const real t51 = t47 + t50;
-    const real t52 = Rc[1] * t51;
-    const real t53 = t44 + t52;
-    const real t54 = S[2] * t13;
-    const real t55 = S[5] - t54;
-    const real t56 = Rc[0] * t55;
-    const real t57 = S[7] * t13;
-    const real t58 = S[10] - t57;
-    const real t59 = Rc[1] * t58;
-    const real t60 = t56 + t59;
-    const real t61 = Rc[2] * t60;
-    const real t62 = t53 + t61;
-    const real t63 = r[1] * t36;
-    const real t64 = r[2] * t33;
-    const real t65 = t63 - t64;
-    const real t66 = t62 + t65;
-    S_I[3] += t66;
-    const real t67 = Rc[3] * t43;
-    const real t68 = Rc[4] * t51;
-    const real t69 = t67 + t68;
-    const real t70 = Rc[5] * t60;
-    const real t71 = t69 + t70;
-    const real t72 = r[2] * t30;
-    const real t73 = r[0] * t36;
-    const real t74 = t72 - t73;
-    const real t75 = t71 + t74;
-    S_I[4] += t75;
-    const real t76 = Rc[6] * t43;
-    const real t77 = Rc[7] * t51;
-    const real t78 = t76 + t77;
-    const real t79 = Rc[8] * t60;
-    const real t80 = t78 + t79;
-    const real t81 = r[0] * t33;
-    const real t82 = r[1] * t30;
-    const real t83 = t81 - t82;
-    const real t84 = t80 + t83;
-    S_I[5] += t84;
-    const real t85 = Rc[3] * t17;
-    const real t86 = Rc[4] * t20;
-    const real t87 = t85 + t86;
-    const real t88 = Rc[3] * t87;
-    const real t89 = Rc[3] * t20;
-    const real t90 = Rc[4] * t26;
-    const real t91 = t89 + t90;
-    const real t92 = Rc[4] * t91;
-    const real t93 = t88 + t92;
-    S_I[6] += t93;
-    const real t94 = Rc[6] * t87;
-    const real t95 = Rc[7] * t91;
-    const real t96 = t94 + t95;
-    S_I[7] += t96;
-    const real t97 = Rc[3] * t38;
-    const real t98 = Rc[4] * t41;
-    const real t99 = t97 + t98;
-    const real t100 = Rc[0] * t99;
-    const real t101 = Rc[3] * t46;
-    const real t102 = Rc[4] * t49;
-    const real t103 = t101 + t102;
-    const real t104 = Rc[1] * t103;
-    const real t105 = t100 + t104;
-    const real t106 = Rc[3] * t55;
-    const real t107 = Rc[4] * t58;
-    const real t108 = t106 + t107;
-    const real t109 = Rc[2] * t108;
-    const real t110 = t105 + t109;
-    const real t111 = r[1] * t96;
-    const real t112 = r[2] * t93;
-    const real t113 = t111 - t112;
-    const real t114 = t110 + t113;
-    S_I[8] += t114;
-    const real t115 = Rc[3] * t99;
-    const real t116 = Rc[4] * t103;
-    const real t117 = t115 + t116;
-    const real t118 = Rc[5] * t108;
-    const real t119 = t117 + t118;
-    const real t120 = r[0] * t96;
-    const real t121 = t64 - t120;
-    const real t122 = t119 + t121;
-    S_I[9] += t122;
-    const real t123 = Rc[6] * t99;
-    const real t124 = Rc[7] * t103;
-    const real t125 = t123 + t124;
-    const real t126 = Rc[8] * t108;
-    const real t127 = t125 + t126;
-    const real t128 = r[0] * t93;
-    const real t129 = r[1] * t33;
-    const real t130 = t128 - t129;
-    const real t131 = t127 + t130;
-    S_I[10] += t131;
-    const real t132 = Rc[6] * t17;
-    const real t133 = Rc[7] * t20;
-    const real t134 = t132 + t133;
-    const real t135 = Rc[6] * t134;
-    const real t136 = Rc[6] * t20;
-    const real t137 = Rc[7] * t26;
-    const real t138 = t136 + t137;
-    const real t139 = Rc[7] * t138;
-    const real t140 = t135 + t139;
-    S_I[11] += t140;
-    const real t141 = Rc[6] * t38;
-    const real t142 = Rc[7] * t41;
-    const real t143 = t141 + t142;
-    const real t144 = Rc[0] * t143;
-    const real t145 = Rc[6] * t46;
-    const real t146 = Rc[7] * t49;
-    const real t147 = t145 + t146;
-    const real t148 = Rc[1] * t147;
-    const real t149 = t144 + t148;
-    const real t150 = Rc[6] * t55;
-    const real t151 = Rc[7] * t58;
-    const real t152 = t150 + t151;
-    const real t153 = Rc[2] * t152;
-    const real t154 = t149 + t153;
-    const real t155 = r[1] * t140;
-    const real t156 = r[2] * t96;
-    const real t157 = t155 - t156;
-    const real t158 = t154 + t157;
-    S_I[12] += t158;
-    const real t159 = Rc[3] * t143;
-    const real t160 = Rc[4] * t147;
-    const real t161 = t159 + t160;
-    const real t162 = Rc[5] * t152;
-    const real t163 = t161 + t162;
-    const real t164 = r[2] * t36;
-    const real t165 = r[0] * t140;
-    const real t166 = t164 - t165;
-    const real t167 = t163 + t166;
-    S_I[13] += t167;
-    const real t168 = Rc[6] * t143;
-    const real t169 = Rc[7] * t147;
-    const real t170 = t168 + t169;
-    const real t171 = Rc[8] * t152;
-    const real t172 = t170 + t171;
-    const real t173 = t120 - t63;
-    const real t174 = t172 + t173;
-    S_I[14] += t174;
-    const real t175 = S[12] * t11;
-    const real t176 = S[15] - t175;
-    const real t177 = Rc[0] * t176;
-    const real t178 = S[12] * t12;
-    const real t179 = S[16] - t178;
-    const real t180 = Rc[1] * t179;
-    const real t181 = t177 + t180;
-    const real t182 = S[12] * t13;
-    const real t183 = S[17] - t182;
-    const real t184 = Rc[2] * t183;
-    const real t185 = t181 + t184;
-    const real t186 = Rc[0] * t185;
-    const real t187 = Rc[0] * t179;
-    const real t188 = S[13] * t12;
-    const real t189 = S[18] - t188;
-    const real t190 = Rc[1] * t189;
-    const real t191 = t187 + t190;
-    const real t192 = S[13] * t13;
-    const real t193 = S[19] - t192;
-    const real t194 = Rc[2] * t193;
-    const real t195 = t191 + t194;
-    const real t196 = Rc[1] * t195;
-    const real t197 = t186 + t196;
-    const real t198 = Rc[0] * t183;
-    const real t199 = Rc[1] * t193;
-    const real t200 = t198 + t199;
-    const real t201 = S[14] * t13;
-    const real t202 = S[20] - t201;
-    const real t203 = Rc[2] * t202;
-    const real t204 = t200 + t203;
-    const real t205 = Rc[2] * t204;
-    const real t206 = t197 + t205;
-    const real t207 = r[1] * t158;
-    const real t208 = r[2] * t114;
-    const real t209 = t207 - t208;
-    const real t210 = r[1] * t154;
-    const real t211 = r[2] * t110;
-    const real t212 = t210 - t211;
-    const real t213 = t209 + t212;
-    const real t214 = t206 + t213;
-    S_I[15] += t214;
-    const real t215 = Rc[3] * t185;
-    const real t216 = Rc[4] * t195;
-    const real t217 = t215 + t216;
-    const real t218 = Rc[5] * t204;
-    const real t219 = t217 + t218;
-    const real t220 = r[1] * t167;
-    const real t221 = r[2] * t122;
-    const real t222 = t220 - t221;
-    const real t223 = r[2] * t62;
-    const real t224 = r[0] * t154;
-    const real t225 = t223 - t224;
-    const real t226 = t222 + t225;
-    const real t227 = t219 + t226;
-    S_I[16] += t227;
-    const real t228 = Rc[6] * t185;
-    const real t229 = Rc[7] * t195;
-    const real t230 = t228 + t229;
-    const real t231 = Rc[8] * t204;
-    const real t232 = t230 + t231;
-    const real t233 = r[1] * t174;
-    const real t234 = r[2] * t131;
-    const real t235 = t233 - t234;
-    const real t236 = r[0] * t110;
-    const real t237 = r[1] * t62;
-    const real t238 = t236 - t237;
-    const real t239 = t235 + t238;
-    const real t240 = t232 + t239;
-    S_I[17] += t240;
-    const real t241 = Rc[3] * t176;
-    const real t242 = Rc[4] * t179;
-    const real t243 = t241 + t242;
-    const real t244 = Rc[5] * t183;
-    const real t245 = t243 + t244;
-    const real t246 = Rc[3] * t245;
-    const real t247 = Rc[3] * t179;
-    const real t248 = Rc[4] * t189;
-    const real t249 = t247 + t248;
-    const real t250 = Rc[5] * t193;
-    const real t251 = t249 + t250;
-    const real t252 = Rc[4] * t251;
-    const real t253 = t246 + t252;
-    const real t254 = Rc[3] * t183;
-    const real t255 = Rc[4] * t193;
-    const real t256 = t254 + t255;
-    const real t257 = Rc[5] * t202;
-    const real t258 = t256 + t257;
-    const real t259 = Rc[5] * t258;
-    const real t260 = t253 + t259;
-    const real t261 = r[2] * t75;
-    const real t262 = r[0] * t167;
-    const real t263 = t261 - t262;
-    const real t264 = r[2] * t71;
-    const real t265 = r[0] * t163;
-    const real t266 = t264 - t265;
-    const real t267 = t263 + t266;
-    const real t268 = t260 + t267;
-    S_I[18] += t268;
-    const real t269 = Rc[6] * t245;
-    const real t270 = Rc[7] * t251;
-    const real t271 = t269 + t270;
-    const real t272 = Rc[8] * t258;
-    const real t273 = t271 + t272;
-    const real t274 = r[2] * t84;
-    const real t275 = r[0] * t174;
-    const real t276 = t274 - t275;
-    const real t277 = r[0] * t119;
-    const real t278 = r[1] * t71;
-    const real t279 = t277 - t278;
-    const real t280 = t276 + t279;
-    const real t281 = t273 + t280;
-    S_I[19] += t281;
-    const real t282 = Rc[6] * t176;
-    const real t283 = Rc[7] * t179;
-    const real t284 = t282 + t283;
-    const real t285 = Rc[8] * t183;
-    const real t286 = t284 + t285;
-    const real t287 = Rc[6] * t286;
-    const real t288 = Rc[6] * t179;
-    const real t289 = Rc[7] * t189;
-    const real t290 = t288 + t289;
-    const real t291 = Rc[8] * t193;
-    const real t292 = t290 + t291;
-    const real t293 = Rc[7] * t292;
-    const real t294 = t287 + t293;
-    const real t295 = Rc[6] * t183;
-    const real t296 = Rc[7] * t193;
-    const real t297 = t295 + t296;
-    const real t298 = Rc[8] * t202;
-    const real t299 = t297 + t298;
-    const real t300 = Rc[8] * t299;
-    const real t301 = t294 + t300;
-    const real t302 = r[0] * t131;
-    const real t303 = r[1] * t84;
-    const real t304 = t302 - t303;
-    const real t305 = r[0] * t127;
-    const real t306 = r[1] * t80;
-    const real t307 = t305 - t306;
-    const real t308 = t304 + t307;
-    const real t309 = t301 + t308;
-    S_I[20] += t309;
-    const real t310 = S[2] * t15;
-    const real t311 = e[0] + t310;
-    const real t312 = Rc[0] * t311;
-    const real t313 = S[7] * t15;
-    const real t314 = e[1] + t313;
-    const real t315 = Rc[1] * t314;
-    const real t316 = t312 + t315;
-    const real t317 = Rc[2] * tau[0];
-    const real t318 = t316 + t317;
-    e_I[0] += t318;
-    const real t319 = Rc[3] * t311;
-    const real t320 = Rc[4] * t314;
-    const real t321 = t319 + t320;
-    const real t322 = Rc[5] * tau[0];
-    const real t323 = t321 + t322;
-    e_I[1] += t323;
-    const real t324 = Rc[6] * t311;
-    const real t325 = Rc[7] * t314;
-    const real t326 = t324 + t325;
-    const real t327 = Rc[8] * tau[0];
-    const real t328 = t326 + t327;
-    e_I[2] += t328;
-    const real t329 = S[12] * t15;
-    const real t330 = e[3] + t329;
-    const real t331 = Rc[0] * t330;
-    const real t332 = S[13] * t15;
-    const real t333 = e[4] + t332;
-    const real t334 = Rc[1] * t333;
-    const real t335 = t331 + t334;
-    const real t336 = S[14] * t15;
-    const real t337 = e[5] + t336;
-    const real t338 = Rc[2] * t337;
-    const real t339 = t335 + t338;
-    const real t340 = Rc[6] * r[1];
-    const real t341 = Rc[3] * r[2];
-    const real t342 = t340 - t341;
-    const real t343 = t311 * t342;
-    const real t344 = Rc[7] * r[1];
-    const real t345 = Rc[4] * r[2];
-    const real t346 = t344 - t345;
-    const real t347 = t314 * t346;
-    const real t348 = t343 + t347;
-    const real t349 = Rc[8] * r[1];
-    const real t350 = Rc[5] * r[2];
-    const real t351 = t349 - t350;
-    const real t352 = tau[0] * t351;
-    const real t353 = t348 + t352;
-    const real t354 = t339 + t353;
-    e_I[3] += t354;
-    const real t355 = Rc[3] * t330;
-    const real t356 = Rc[4] * t333;
-    const real t357 = t355 + t356;
-    const real t358 = Rc[5] * t337;
-    const real t359 = t357 + t358;
-    const real t360 = Rc[0] * r[2];
-    const real t361 = Rc[6] * r[0];
-    const real t362 = t360 - t361;
-    const real t363 = t311 * t362;
-    const real t364 = Rc[1] * r[2];
-    const real t365 = Rc[7] * r[0];
-    const real t366 = t364 - t365;
-    const real t367 = t314 * t366;
-    const real t368 = t363 + t367;
-    const real t369 = Rc[2] * r[2];
-    const real t370 = Rc[8] * r[0];
-    const real t371 = t369 - t370;
-    const real t372 = tau[0] * t371;
-    const real t373 = t368 + t372;
-    const real t374 = t359 + t373;
-    e_I[4] += t374;
-    const real t375 = Rc[6] * t330;
-    const real t376 = Rc[7] * t333;
-    const real t377 = t375 + t376;
-    const real t378 = Rc[8] * t337;
-    const real t379 = t377 + t378;
-    const real t380 = Rc[3] * r[0];
-    const real t381 = Rc[0] * r[1];
-    const real t382 = t380 - t381;
-    const real t383 = t311 * t382;
-    const real t384 = Rc[4] * r[0];
-    const real t385 = Rc[1] * r[1];
-    const real t386 = t384 - t385;
-    const real t387 = t314 * t386;
-    const real t388 = t383 + t387;
-    const real t389 = Rc[5] * r[0];
-    const real t390 = Rc[2] * r[1];
-    const real t391 = t389 - t390;
-    const real t392 = tau[0] * t391;
-    const real t393 = t388 + t392;
-    const real t394 = t379 + t393;
-    e_I[5] += t394;
-    return 0;
+  (void)p;
+  (void)q;
+  real t0 = 0.0 < S[11];
+  if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t0 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t4 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  if (!((((0.0 < floor_[0]) ? floor_[0] : t4) < S[11]))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t7 = 1.0 / S[11];
+  real t8 = S[2] * t7;
+  G[0] = t8;
+  real t9 = S[7] * t7;
+  G[1] = t9;
+  G[2] = S[11] * t7;
+  real t11 = S[12] * t7;
+  G[3] = t11;
+  real t12 = S[13] * t7;
+  G[4] = t12;
+  real t13 = S[14] * t7;
+  G[5] = t13;
+  real t15 = t7 * (tau[0] - e[2]);
+  g[0] = t15;
+  real t17 = S[0] - S[2] * t8;
+  real t20 = S[1] - S[2] * t9;
+  real t22 = Rc[0] * t17 + Rc[1] * t20;
+  real t26 = S[6] - S[7] * t9;
+  real t28 = Rc[0] * t20 + Rc[1] * t26;
+  real t30 = Rc[0] * t22 + Rc[1] * t28;
+  S_I[0] += t30;
+  real t33 = Rc[3] * t22 + Rc[4] * t28;
+  S_I[1] += t33;
+  real t36 = Rc[6] * t22 + Rc[7] * t28;
+  S_I[2] += t36;
+  real t38 = S[3] - S[2] * t11;
+  real t41 = S[8] - S[7] * t11;
+  real t43 = Rc[0] * t38 + Rc[1] * t41;
+  real t46 = S[4] - S[2] * t12;
+  real t49 = S[9] - S[7] * t12;
+  real t51 = Rc[0] * t46 + Rc[1] * t49;
+  real t55 = S[5] - S[2] * t13;
+  real t58 = S[10] - S[7] * t13;
+  real t60 = Rc[0] * t55 + Rc[1] * t58;
+  real t62 = Rc[0] * t43 + Rc[1] * t51 + Rc[2] * t60;
+  real t63 = r[1] * t36;
+  real t64 = r[2] * t33;
+  S_I[3] += t62 + (t63 - t64);
+  real t71 = Rc[3] * t43 + Rc[4] * t51 + Rc[5] * t60;
+  real t75 = t71 + (r[2] * t30 - r[0] * t36);
+  S_I[4] += t75;
+  real t80 = Rc[6] * t43 + Rc[7] * t51 + Rc[8] * t60;
+  real t84 = t80 + (r[0] * t33 - r[1] * t30);
+  S_I[5] += t84;
+  real t87 = Rc[3] * t17 + Rc[4] * t20;
+  real t91 = Rc[3] * t20 + Rc[4] * t26;
+  real t93 = Rc[3] * t87 + Rc[4] * t91;
+  S_I[6] += t93;
+  real t96 = Rc[6] * t87 + Rc[7] * t91;
+  S_I[7] += t96;
+  real t99 = Rc[3] * t38 + Rc[4] * t41;
+  real t103 = Rc[3] * t46 + Rc[4] * t49;
+  real t108 = Rc[3] * t55 + Rc[4] * t58;
+  real t110 = Rc[0] * t99 + Rc[1] * t103 + Rc[2] * t108;
+  real t114 = t110 + (r[1] * t96 - r[2] * t93);
+  S_I[8] += t114;
+  real t119 = Rc[3] * t99 + Rc[4] * t103 + Rc[5] * t108;
+  real t120 = r[0] * t96;
+  real t122 = t119 + (t64 - t120);
+  S_I[9] += t122;
+  real t127 = Rc[6] * t99 + Rc[7] * t103 + Rc[8] * t108;
+  real t131 = t127 + (r[0] * t93 - r[1] * t33);
+  S_I[10] += t131;
+  real t140 = Rc[6] * (Rc[6] * t17 + Rc[7] * t20) + Rc[7] * (Rc[6] * t20 + Rc[7] * t26);
+  S_I[11] += t140;
+  real t143 = Rc[6] * t38 + Rc[7] * t41;
+  real t147 = Rc[6] * t46 + Rc[7] * t49;
+  real t152 = Rc[6] * t55 + Rc[7] * t58;
+  real t154 = Rc[0] * t143 + Rc[1] * t147 + Rc[2] * t152;
+  real t158 = t154 + (r[1] * t140 - r[2] * t96);
+  S_I[12] += t158;
+  real t163 = Rc[3] * t143 + Rc[4] * t147 + Rc[5] * t152;
+  real t167 = t163 + (r[2] * t36 - r[0] * t140);
+  S_I[13] += t167;
+  real t174 = Rc[6] * t143 + Rc[7] * t147 + Rc[8] * t152 + (t120 - t63);
+  S_I[14] += t174;
+  real t176 = S[15] - S[12] * t11;
+  real t179 = S[16] - S[12] * t12;
+  real t183 = S[17] - S[12] * t13;
+  real t185 = Rc[0] * t176 + Rc[1] * t179 + Rc[2] * t183;
+  real t189 = S[18] - S[13] * t12;
+  real t193 = S[19] - S[13] * t13;
+  real t195 = Rc[0] * t179 + Rc[1] * t189 + Rc[2] * t193;
+  real t202 = S[20] - S[14] * t13;
+  real t204 = Rc[0] * t183 + Rc[1] * t193 + Rc[2] * t202;
+  S_I[15] += Rc[0] * t185 + Rc[1] * t195 + Rc[2] * t204 + (r[1] * t158 - r[2] * t114 + (r[1] * t154
+    - r[2] * t110));
+  S_I[16] += Rc[3] * t185 + Rc[4] * t195 + Rc[5] * t204 + (r[1] * t167 - r[2] * t122 + (r[2] * t62 -
+    r[0] * t154));
+  S_I[17] += Rc[6] * t185 + Rc[7] * t195 + Rc[8] * t204 + (r[1] * t174 - r[2] * t131 + (r[0] * t110
+    - r[1] * t62));
+  real t245 = Rc[3] * t176 + Rc[4] * t179 + Rc[5] * t183;
+  real t251 = Rc[3] * t179 + Rc[4] * t189 + Rc[5] * t193;
+  real t258 = Rc[3] * t183 + Rc[4] * t193 + Rc[5] * t202;
+  S_I[18] += Rc[3] * t245 + Rc[4] * t251 + Rc[5] * t258 + (r[2] * t75 - r[0] * t167 + (r[2] * t71 -
+    r[0] * t163));
+  S_I[19] += Rc[6] * t245 + Rc[7] * t251 + Rc[8] * t258 + (r[2] * t84 - r[0] * t174 + (r[0] * t119 -
+    r[1] * t71));
+  S_I[20] += Rc[6] * (Rc[6] * t176 + Rc[7] * t179 + Rc[8] * t183) + Rc[7] * (Rc[6] * t179 + Rc[7] *
+    t189 + Rc[8] * t193) + Rc[8] * (Rc[6] * t183 + Rc[7] * t193 + Rc[8] * t202) + (r[0] * t131 -
+    r[1] * t84 + (r[0] * t127 - r[1] * t80));
+  real t311 = e[0] + S[2] * t15;
+  real t314 = e[1] + S[7] * t15;
+  e_I[0] += Rc[0] * t311 + Rc[1] * t314 + Rc[2] * tau[0];
+  e_I[1] += Rc[3] * t311 + Rc[4] * t314 + Rc[5] * tau[0];
+  e_I[2] += Rc[6] * t311 + Rc[7] * t314 + Rc[8] * tau[0];
+  real t330 = e[3] + S[12] * t15;
+  real t333 = e[4] + S[13] * t15;
+  real t337 = e[5] + S[14] * t15;
+  e_I[3] += Rc[0] * t330 + Rc[1] * t333 + Rc[2] * t337 + (t311 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t314 * (Rc[7] * r[1] - Rc[4] * r[2]) + tau[0] * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t330 + Rc[4] * t333 + Rc[5] * t337 + (t311 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t314 * (Rc[1] * r[2] - Rc[7] * r[0]) + tau[0] * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t330 + Rc[7] * t333 + Rc[8] * t337 + (t311 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t314 * (Rc[4] * r[0] - Rc[1] * r[1]) + tau[0] * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_prismatic_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -776,97 +264,33 @@ static const mstmm_guard mstmm_hinge_prismatic_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_prismatic_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_prismatic_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    (void)q;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    delta[0] = t16;
-    delta[1] = t22;
-    const real t54 = t29 + t53;
-    delta[2] = t54;
-    delta[3] = t36;
-    delta[4] = t43;
-    delta[5] = t50;
-    return 0;
+  (void)p;
+  (void)q;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29 + t53;
+  delta[3] = t36;
+  delta[4] = t43;
+  delta[5] = t50;
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[0] parameters
@@ -882,71 +306,24 @@ static const mstmm_port mstmm_hinge_prismatic_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[1] derivative of qdot
  */
-int mstmm_hinge_prismatic_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_prismatic_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R,
+    out_t d_d, out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    d_R[0] = 0.0;
-    d_R[1] = 0.0;
-    d_R[2] = 0.0;
-    d_R[3] = 0.0;
-    d_R[4] = 0.0;
-    d_R[5] = 0.0;
-    d_R[6] = 0.0;
-    d_R[7] = 0.0;
-    d_R[8] = 0.0;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = d_q[0];
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = d_u[0];
-    d_w[0] = 0.0;
-    d_w[1] = 0.0;
-    d_w[2] = 0.0;
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    d_qdot[0] = d_u[0];
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  d_R[0] = d_R[1] = d_R[2] = d_R[3] = d_R[4] = d_R[5] = d_R[6] = d_R[7] = d_R[8] = d_d[0] = d_d[1] =
+    0.0;
+  d_d[2] = d_q[0];
+  d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = d_v[0] = d_v[1] = 0.0;
+  d_v[2] = d_u[0];
+  d_w[0] = d_w[1] = d_w[2] = d_c[0] = d_c[1] = d_c[2] = d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = d_u[0];
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_hinge_slope_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"d_q", 1, "", 0, 0},
-    {"d_u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 6, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[0] parameters
@@ -954,31 +331,16 @@ static const mstmm_port mstmm_hinge_prismatic_hinge_slope_outputs[] = {
  * in  u[1] speeds: displacement_rate [m/s]
  * out J[1][1] qdot by q, transposed
  */
-int mstmm_hinge_prismatic_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_prismatic_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_rates_by_coordinates_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_rates_by_coordinates_outputs[] = {
-    {"J", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[0] parameters
@@ -986,31 +348,16 @@ static const mstmm_port mstmm_hinge_prismatic_rates_by_coordinates_outputs[] = {
  * in  u[1] speeds: displacement_rate [m/s]
  * out J[1][1] qdot by u, transposed
  */
-int mstmm_hinge_prismatic_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_prismatic_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_outputs[] = {
-    {"J", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[0] parameters
@@ -1031,187 +378,64 @@ static const mstmm_port mstmm_hinge_prismatic_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_prismatic_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_prismatic_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s,
+    in_t motion_I, out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc,
+    out_t r, out_t motion)
 {
-    (void)p;
-    R[0] = 1.0;
-    R[1] = 0.0;
-    R[2] = 0.0;
-    R[3] = 0.0;
-    R[4] = 1.0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = q[0];
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 1.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = u[0];
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = 0.0;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    Rc[0] = Rt[0];
-    Rc[1] = Rt[1];
-    Rc[2] = Rt[2];
-    Rc[3] = Rt[3];
-    Rc[4] = Rt[4];
-    Rc[5] = Rt[5];
-    Rc[6] = Rt[6];
-    Rc[7] = Rt[7];
-    Rc[8] = Rt[8];
-    const real t0 = q[0] * Rt[2];
-    const real t1 = ro[0] + t0;
-    r[0] = t1;
-    const real t2 = q[0] * Rt[5];
-    const real t3 = ro[1] + t2;
-    r[1] = t3;
-    const real t4 = q[0] * Rt[8];
-    const real t5 = ro[2] + t4;
-    r[2] = t5;
-    const real t6 = Rt[0] * motion_I[0];
-    const real t7 = Rt[3] * motion_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rt[6] * motion_I[2];
-    const real t10 = t8 + t9;
-    motion[0] = t10;
-    const real t11 = Rt[1] * motion_I[0];
-    const real t12 = Rt[4] * motion_I[1];
-    const real t13 = t11 + t12;
-    const real t14 = Rt[7] * motion_I[2];
-    const real t15 = t13 + t14;
-    motion[1] = t15;
-    const real t16 = Rt[2] * motion_I[0];
-    const real t17 = Rt[5] * motion_I[1];
-    const real t18 = t16 + t17;
-    const real t19 = Rt[8] * motion_I[2];
-    const real t20 = t18 + t19;
-    motion[2] = t20;
-    const real t21 = Rt[0] * motion_I[3];
-    const real t22 = Rt[3] * motion_I[4];
-    const real t23 = t21 + t22;
-    const real t24 = Rt[6] * motion_I[5];
-    const real t25 = t23 + t24;
-    motion[3] = t25;
-    const real t26 = Rt[1] * motion_I[3];
-    const real t27 = Rt[4] * motion_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rt[7] * motion_I[5];
-    const real t30 = t28 + t29;
-    motion[4] = t30;
-    const real t31 = Rt[2] * motion_I[3];
-    const real t32 = Rt[5] * motion_I[4];
-    const real t33 = t31 + t32;
-    const real t34 = Rt[8] * motion_I[5];
-    const real t35 = t33 + t34;
-    motion[5] = t35;
-    const real t36 = motion_I[0] * motion_I[1];
-    const real t37 = t36 - motion_I[5];
-    const real t38 = t3 * t37;
-    const real t39 = motion_I[1] * motion_I[1];
-    const real t40 = motion_I[2] * motion_I[2];
-    const real t41 = t39 + t40;
-    const real t42 = t1 * t41;
-    const real t43 = t38 - t42;
-    const real t44 = motion_I[0] * motion_I[2];
-    const real t45 = motion_I[4] + t44;
-    const real t46 = t5 * t45;
-    const real t47 = t43 + t46;
-    const real t48 = motion_I[6] + t47;
-    const real t49 = Rt[0] * t48;
-    const real t50 = motion_I[5] + t36;
-    const real t51 = t1 * t50;
-    const real t52 = motion_I[0] * motion_I[0];
-    const real t53 = t40 + t52;
-    const real t54 = t3 * t53;
-    const real t55 = t51 - t54;
-    const real t56 = motion_I[1] * motion_I[2];
-    const real t57 = t56 - motion_I[3];
-    const real t58 = t5 * t57;
-    const real t59 = t55 + t58;
-    const real t60 = motion_I[7] + t59;
-    const real t61 = Rt[3] * t60;
-    const real t62 = t49 + t61;
-    const real t63 = t44 - motion_I[4];
-    const real t64 = t1 * t63;
-    const real t65 = motion_I[3] + t56;
-    const real t66 = t3 * t65;
-    const real t67 = t64 + t66;
-    const real t68 = t39 + t52;
-    const real t69 = t5 * t68;
-    const real t70 = t67 - t69;
-    const real t71 = motion_I[8] + t70;
-    const real t72 = Rt[6] * t71;
-    const real t73 = t62 + t72;
-    const real t74 = u[0] * t15;
-    const real t75 = t74 * 2.0;
-    const real t76 = t73 + t75;
-    motion[6] = t76;
-    const real t77 = Rt[1] * t48;
-    const real t78 = Rt[4] * t60;
-    const real t79 = t77 + t78;
-    const real t80 = Rt[7] * t71;
-    const real t81 = t79 + t80;
-    const real t82 = u[0] * t10;
-    const real t83 = 2.0 * t82;
-    const real t84 = t81 - t83;
-    motion[7] = t84;
-    const real t85 = Rt[2] * t48;
-    const real t86 = Rt[5] * t60;
-    const real t87 = t85 + t86;
-    const real t88 = Rt[8] * t71;
-    const real t89 = t87 + t88;
-    const real t90 = s[0] + t89;
-    motion[8] = t90;
-    return 0;
+  (void)p;
+  R[0] = 1.0;
+  R[1] = R[2] = R[3] = 0.0;
+  R[4] = 1.0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = 0.0;
+  d[2] = q[0];
+  H[0] = H[1] = 0.0;
+  H[2] = 1.0;
+  H[3] = H[4] = H[5] = v[0] = v[1] = 0.0;
+  v[2] = u[0];
+  w[0] = w[1] = w[2] = c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  Rc[0] = Rt[0];
+  Rc[1] = Rt[1];
+  Rc[2] = Rt[2];
+  Rc[3] = Rt[3];
+  Rc[4] = Rt[4];
+  Rc[5] = Rt[5];
+  Rc[6] = Rt[6];
+  Rc[7] = Rt[7];
+  Rc[8] = Rt[8];
+  real t1 = ro[0] + q[0] * Rt[2];
+  r[0] = t1;
+  real t3 = ro[1] + q[0] * Rt[5];
+  r[1] = t3;
+  real t5 = ro[2] + q[0] * Rt[8];
+  r[2] = t5;
+  real t10 = Rt[0] * motion_I[0] + Rt[3] * motion_I[1] + Rt[6] * motion_I[2];
+  motion[0] = t10;
+  real t15 = Rt[1] * motion_I[0] + Rt[4] * motion_I[1] + Rt[7] * motion_I[2];
+  motion[1] = t15;
+  motion[2] = Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2];
+  motion[3] = Rt[0] * motion_I[3] + Rt[3] * motion_I[4] + Rt[6] * motion_I[5];
+  motion[4] = Rt[1] * motion_I[3] + Rt[4] * motion_I[4] + Rt[7] * motion_I[5];
+  motion[5] = Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5];
+  real t36 = motion_I[0] * motion_I[1];
+  real t39 = motion_I[1] * motion_I[1];
+  real t40 = motion_I[2] * motion_I[2];
+  real t44 = motion_I[0] * motion_I[2];
+  real t48 = motion_I[6] + (t3 * (t36 - motion_I[5]) - t1 * (t39 + t40) + t5 * (motion_I[4] + t44));
+  real t52 = motion_I[0] * motion_I[0];
+  real t56 = motion_I[1] * motion_I[2];
+  real t60 = motion_I[7] + (t1 * (motion_I[5] + t36) - t3 * (t40 + t52) + t5 * (t56 - motion_I[3]));
+  real t71 = motion_I[8] + (t1 * (t44 - motion_I[4]) + t3 * (motion_I[3] + t56) - t5 * (t39 + t52));
+  motion[6] = Rt[0] * t48 + Rt[3] * t60 + Rt[6] * t71 + u[0] * t15 * 2.0;
+  motion[7] = Rt[1] * t48 + Rt[4] * t60 + Rt[7] * t71 - 2.0 * (u[0] * t10);
+  motion[8] = s[0] + (Rt[2] * t48 + Rt[5] * t60 + Rt[8] * t71);
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_body_motion_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 1, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1233,93 +457,34 @@ static const mstmm_port mstmm_hinge_prismatic_body_motion_outputs[] = {
  * out W[1][1] slopes of the rows by load, rotors and laws
  * out H[6] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_prismatic_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_prismatic_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    (void)s;
-    (void)along;
-    B[0] = 0.0;
-    B[1] = 0.0;
-    B[2] = 0.0;
-    B[3] = 0.0;
-    B[4] = 0.0;
-    B[5] = 0.0;
-    const real t0 = 1.0 / sq[0];
-    const real t1 = motion[4] * t0;
-    const real t2 = motion[1] * rate[0];
-    const real t3 = 2.0 * t2;
-    const real t4 = motion[0] * t0;
-    const real t5 = motion[2] * t4;
-    const real t6 = t3 + t5;
-    const real t7 = t1 + t6;
-    B[6] = t7;
-    const real t8 = motion[1] * t0;
-    const real t9 = motion[2] * t8;
-    const real t10 = motion[0] * rate[0];
-    const real t11 = 2.0 * t10;
-    const real t12 = t9 - t11;
-    const real t13 = motion[3] * t0;
-    const real t14 = t12 - t13;
-    B[7] = t14;
-    const real t15 = motion[0] * t4;
-    const real t16 = motion[1] * t8;
-    const real t17 = t15 + t16;
-    const real t18 = scale[0] - t17;
-    B[8] = t18;
-    G[0] = 0.0;
-    G[1] = 0.0;
-    G[2] = 0.0;
-    const real t19 = f[1] * t0;
-    const real t20 = -t19;
-    G[3] = t20;
-    const real t21 = f[0] * t0;
-    G[4] = t21;
-    G[5] = 0.0;
-    const real t22 = J[0] * scale[0];
-    const real t23 = t22 - laws[0];
-    W[0] = t23;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 1.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  (void)s;
+  (void)along;
+  B[0] = B[1] = B[2] = B[3] = B[4] = B[5] = 0.0;
+  real t0 = 1.0 / sq[0];
+  real t4 = motion[0] * t0;
+  B[6] = motion[4] * t0 + (2.0 * (motion[1] * rate[0]) + motion[2] * t4);
+  real t8 = motion[1] * t0;
+  B[7] = motion[2] * t8 - 2.0 * (motion[0] * rate[0]) - motion[3] * t0;
+  B[8] = scale[0] - (motion[0] * t4 + motion[1] * t8);
+  G[0] = G[1] = G[2] = 0.0;
+  G[3] = -(f[1] * t0);
+  G[4] = f[0] * t0;
+  G[5] = 0.0;
+  W[0] = J[0] * scale[0] - laws[0];
+  H[0] = H[1] = 0.0;
+  H[2] = 1.0;
+  H[3] = H[4] = H[5] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_prismatic_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_prismatic_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_prismatic_directions_inputs[] = {
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"laws", 1, "", 0, 0},
-    {"along", 1, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_prismatic_directions_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"W", 1, "", 0, 0},
-    {"H", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_prismatic_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_prismatic_q_names[] = {
     "displacement",
@@ -1338,121 +503,64 @@ static const char *const mstmm_hinge_prismatic_u_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_prismatic_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_prismatic_hinge,
-        .call = mstmm_hinge_prismatic_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_prismatic_hinge_inputs,
-        .outputs = mstmm_hinge_prismatic_hinge_outputs,
-        .ir_hash = "7b78708789a2d53c3d6a6208323e19a5f268609ac24cb7a1512913a448564fc4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_prismatic_forward,
-        .call = mstmm_hinge_prismatic_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_prismatic_forward_inputs,
-        .outputs = mstmm_hinge_prismatic_forward_outputs,
-        .ir_hash = "13c39559fe315f5fa4cfd63c25aadd4b7cad20bde08c60bf538716bef396ad65",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_prismatic_condense,
-        .call = mstmm_hinge_prismatic_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_prismatic_condense_inputs,
-        .outputs = mstmm_hinge_prismatic_condense_outputs,
-        .ir_hash = "de8225df6a6dca3ce51e1e1de06dcc43e9eddcb37fca0e6dd50a1eaa0000312e",
-        .n_guards = 3,
-        .guards = mstmm_hinge_prismatic_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_prismatic_recover,
-        .call = mstmm_hinge_prismatic_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_prismatic_recover_inputs,
-        .outputs = mstmm_hinge_prismatic_recover_outputs,
-        .ir_hash = "066341a34c3a5b9c3c744848aa2b67512ad9347811298faa882399e4cc60a0f8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_prismatic_hinge_slope,
-        .call = mstmm_hinge_prismatic_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_prismatic_hinge_slope_inputs,
-        .outputs = mstmm_hinge_prismatic_hinge_slope_outputs,
-        .ir_hash = "d27afe4d33b3298dab9f8723fac19f4e80e88202374ca09f1e725c5c2888d1e5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_prismatic_rates_by_coordinates,
-        .call = mstmm_hinge_prismatic_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_prismatic_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_prismatic_rates_by_coordinates_outputs,
-        .ir_hash = "ce18baa7937bf84f29664276c7793e94f63c52cddc7e5f3f99a6af35e87ca4a3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_prismatic_rates_by_speeds,
-        .call = mstmm_hinge_prismatic_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_prismatic_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_prismatic_rates_by_speeds_outputs,
-        .ir_hash = "b1b93a183d9410a2f4cecaa535355123e6a7eb2897dc0dc761db0df0384af495",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_prismatic_body_motion,
-        .call = mstmm_hinge_prismatic_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_prismatic_body_motion_inputs,
-        .outputs = mstmm_hinge_prismatic_body_motion_outputs,
-        .ir_hash = "e2014328c94d52145ab26b35363c83af42c7efbb60f52daba93dd75f05e7fac8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_prismatic_directions,
-        .call = mstmm_hinge_prismatic_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_prismatic_directions_inputs,
-        .outputs = mstmm_hinge_prismatic_directions_outputs,
-        .ir_hash = "c0326451ff594aa477078b16869266c82a2c4349dd02121b2a093f35bc449c57",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_hinge), 3, 7, (const mstmm_port[]){{"p", 0, "", 0,
+    0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3,
+    "m", 0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "29bdbea007e38613258db861643862ab101f1826349ff0508e90ea4aa7391122", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_forward), 7, 4, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0},
+    {"s", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r",
+    3, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "877e4adea92ee7d96e32d977ac37862f133d81448b2c937e5d70a827e0328157", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "6dbd3f55f5a045f10de1fe61d11c665938e2a87a0ffef14b50c965e88a6eabbf", 3, (const
+    mstmm_guard[]){{1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_recover), 7, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"G", 6, "", 0, 0},
+    {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0},
+    {"delta", 6, "", 0, 0}}, "705eef42b1b11391912dbb96cc5060e475e2899563af0ce975c929e4802f9410", 0,
+    NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_hinge_slope), 5, 7, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"d_q", 1, "", 0, 0},
+    {"d_u", 1, "", 0, 0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H",
+    6, "", 0, 0}, {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0,
+    0}, {"d_qdot", 1, "", 0, 0}},
+    "a78b6f235595e9616e29d871d5d40c14119914a085d4af884f908b5952390063", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 1, "", 0, 0}},
+    "541afa90250daf8300b38935ccd6727e2c3236c4fe764ea2ae63a913506e9ca3", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 1, "", 0, 0}},
+    "56e666a11b716b7e3d2e0e22b91441bd01f9b9e3db0734cb4c5bef1e253665af", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_body_motion), 7, 10, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0}, {"s", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R",
+    9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s",
+    0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}, {"qdot", 1, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m",
+    0, 0}, {"motion", 9, "", 0, 0}},
+    "42830c412162f478a540599cb5023fd84da0b70c6b510c8b0fedf779a7e23cb0", 0, NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_prismatic_directions), 12, 4, (const
+    mstmm_port[]){{"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"s", 1, "", 0, 0},
+    {"motion", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"laws", 1,
+    "", 0, 0}, {"along", 1, "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1,
+    "1/s", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"W", 1, "", 0, 0},
+    {"H", 6, "", 0, 0}}, "a636fcab05e51d8f6933360e35ae156d766b3819761f41070471e69a6fc66016", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_hinge_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "prismatic",
-    .hash = "8d034033ea0037a023fc15a492c8286bf114bc6e3f600da916b59f84f04fec17",
+    .hash = "dd837e402abf2679472850da80b1923360e957720d53abce53f87e54515d408e",
     .nq = 1,
     .nu = 1,
     .np = 0,

@@ -8,40 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_screw;
-int mstmm_hinge_screw_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot);
-int mstmm_hinge_screw_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_screw_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_screw_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_screw_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the screw hinge
  * in  p[1] parameters: lead [m]
  * in  q[1] coordinates: angle [rad]
@@ -54,75 +20,36 @@ int mstmm_hinge_screw_directions(const real *restrict p, const real *restrict q,
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[1] coordinate rates
  */
-int mstmm_hinge_screw_hinge(const real *restrict p, const real *restrict q, const real *restrict u,
-    real *restrict R, real *restrict d, real *restrict H, real *restrict v, real *restrict w,
-    real *restrict c, real *restrict qdot)
+int mstmm_hinge_screw_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    const real t0 = cos(q[0]);
-    R[0] = t0;
-    const real t1 = sin(q[0]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    const real t3 = p[0] * q[0];
-    const real t4 = MSTMM_PI * 2.0;
-    const real t5 = 1.0 / t4;
-    const real t6 = t3 * t5;
-    d[2] = t6;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    const real t7 = p[0] * t5;
-    H[2] = t7;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    const real t8 = p[0] * u[0];
-    const real t9 = t5 * t8;
-    v[2] = t9;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[0];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    return 0;
+  real t0 = cos(q[0]);
+  R[0] = t0;
+  real t1 = sin(q[0]);
+  R[1] = -t1;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = 0.0;
+  real t5 = 1.0 / (MSTMM_PI * 2.0);
+  d[2] = p[0] * q[0] * t5;
+  H[0] = H[1] = 0.0;
+  H[2] = p[0] * t5;
+  H[3] = H[4] = 0.0;
+  H[5] = 1.0;
+  v[0] = v[1] = 0.0;
+  v[2] = t5 * (p[0] * u[0]);
+  w[0] = w[1] = 0.0;
+  w[2] = u[0];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_hinge_screw_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_screw_hinge_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* bias motion outboard of the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -139,183 +66,65 @@ static const mstmm_port mstmm_hinge_screw_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[1] coordinate rates
  */
-int mstmm_hinge_screw_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_screw_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    const real t0 = cos(q[0]);
-    const real t1 = Rt[0] * t0;
-    const real t2 = sin(q[0]);
-    const real t3 = Rt[1] * t2;
-    const real t4 = t1 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[1] * t0;
-    const real t6 = Rt[0] * t2;
-    const real t7 = t5 - t6;
-    Rc[1] = t7;
-    Rc[2] = Rt[2];
-    const real t8 = Rt[3] * t0;
-    const real t9 = Rt[4] * t2;
-    const real t10 = t8 + t9;
-    Rc[3] = t10;
-    const real t11 = Rt[4] * t0;
-    const real t12 = Rt[3] * t2;
-    const real t13 = t11 - t12;
-    Rc[4] = t13;
-    Rc[5] = Rt[5];
-    const real t14 = Rt[6] * t0;
-    const real t15 = Rt[7] * t2;
-    const real t16 = t14 + t15;
-    Rc[6] = t16;
-    const real t17 = Rt[7] * t0;
-    const real t18 = Rt[6] * t2;
-    const real t19 = t17 - t18;
-    Rc[7] = t19;
-    Rc[8] = Rt[8];
-    const real t20 = p[0] * q[0];
-    const real t21 = MSTMM_PI * 2.0;
-    const real t22 = 1.0 / t21;
-    const real t23 = t20 * t22;
-    const real t24 = Rt[2] * t23;
-    const real t25 = ro[0] + t24;
-    r[0] = t25;
-    const real t26 = Rt[5] * t23;
-    const real t27 = ro[1] + t26;
-    r[1] = t27;
-    const real t28 = Rt[8] * t23;
-    const real t29 = ro[2] + t28;
-    r[2] = t29;
-    const real t30 = motion_I[0] * t4;
-    const real t31 = motion_I[1] * t10;
-    const real t32 = t30 + t31;
-    const real t33 = motion_I[2] * t16;
-    const real t34 = t32 + t33;
-    motion[0] = t34;
-    const real t35 = motion_I[0] * t7;
-    const real t36 = motion_I[1] * t13;
-    const real t37 = t35 + t36;
-    const real t38 = motion_I[2] * t19;
-    const real t39 = t37 + t38;
-    motion[1] = t39;
-    const real t40 = Rt[2] * motion_I[0];
-    const real t41 = Rt[5] * motion_I[1];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * motion_I[2];
-    const real t44 = t42 + t43;
-    const real t45 = u[0] + t44;
-    motion[2] = t45;
-    const real t46 = motion_I[3] * t4;
-    const real t47 = motion_I[4] * t10;
-    const real t48 = t46 + t47;
-    const real t49 = motion_I[5] * t16;
-    const real t50 = t48 + t49;
-    const real t51 = u[0] * t39;
-    const real t52 = t50 + t51;
-    motion[3] = t52;
-    const real t53 = motion_I[3] * t7;
-    const real t54 = motion_I[4] * t13;
-    const real t55 = t53 + t54;
-    const real t56 = motion_I[5] * t19;
-    const real t57 = t55 + t56;
-    const real t58 = u[0] * t34;
-    const real t59 = t57 - t58;
-    motion[4] = t59;
-    const real t60 = Rt[2] * motion_I[3];
-    const real t61 = Rt[5] * motion_I[4];
-    const real t62 = t60 + t61;
-    const real t63 = Rt[8] * motion_I[5];
-    const real t64 = t62 + t63;
-    const real t65 = s[0] + t64;
-    motion[5] = t65;
-    const real t66 = motion_I[0] * motion_I[1];
-    const real t67 = t66 - motion_I[5];
-    const real t68 = t27 * t67;
-    const real t69 = motion_I[1] * motion_I[1];
-    const real t70 = motion_I[2] * motion_I[2];
-    const real t71 = t69 + t70;
-    const real t72 = t25 * t71;
-    const real t73 = t68 - t72;
-    const real t74 = motion_I[0] * motion_I[2];
-    const real t75 = motion_I[4] + t74;
-    const real t76 = t29 * t75;
-    const real t77 = t73 + t76;
-    const real t78 = motion_I[6] + t77;
-    const real t79 = t4 * t78;
-    const real t80 = motion_I[5] + t66;
-    const real t81 = t25 * t80;
-    const real t82 = motion_I[0] * motion_I[0];
-    const real t83 = t70 + t82;
-    const real t84 = t27 * t83;
-    const real t85 = t81 - t84;
-    const real t86 = motion_I[1] * motion_I[2];
-    const real t87 = t86 - motion_I[3];
-    const real t88 = t29 * t87;
-    const real t89 = t85 + t88;
-    const real t90 = motion_I[7] + t89;
-    const real t91 = t10 * t90;
-    const real t92 = t79 + t91;
-    const real t93 = t74 - motion_I[4];
-    const real t94 = t25 * t93;
-    const real t95 = motion_I[3] + t86;
-    const real t96 = t27 * t95;
-    const real t97 = t94 + t96;
-    const real t98 = t69 + t82;
-    const real t99 = t29 * t98;
-    const real t100 = t97 - t99;
-    const real t101 = motion_I[8] + t100;
-    const real t102 = t16 * t101;
-    const real t103 = t92 + t102;
-    const real t104 = p[0] * u[0];
-    const real t105 = t39 * t104;
-    const real t106 = 1.0 / MSTMM_PI;
-    const real t107 = t105 * t106;
-    const real t108 = t103 + t107;
-    motion[6] = t108;
-    const real t109 = t7 * t78;
-    const real t110 = t13 * t90;
-    const real t111 = t109 + t110;
-    const real t112 = t19 * t101;
-    const real t113 = t111 + t112;
-    const real t114 = t34 * t104;
-    const real t115 = t106 * t114;
-    const real t116 = t113 - t115;
-    motion[7] = t116;
-    const real t117 = p[0] * t22;
-    const real t118 = s[0] * t117;
-    const real t119 = Rt[2] * t78;
-    const real t120 = Rt[5] * t90;
-    const real t121 = t119 + t120;
-    const real t122 = Rt[8] * t101;
-    const real t123 = t121 + t122;
-    const real t124 = t118 + t123;
-    motion[8] = t124;
-    qdot[0] = u[0];
-    return 0;
+  real t0 = cos(q[0]);
+  real t2 = sin(q[0]);
+  real t4 = Rt[0] * t0 + Rt[1] * t2;
+  Rc[0] = t4;
+  real t7 = Rt[1] * t0 - Rt[0] * t2;
+  Rc[1] = t7;
+  Rc[2] = Rt[2];
+  real t10 = Rt[3] * t0 + Rt[4] * t2;
+  Rc[3] = t10;
+  real t13 = Rt[4] * t0 - Rt[3] * t2;
+  Rc[4] = t13;
+  Rc[5] = Rt[5];
+  real t16 = Rt[6] * t0 + Rt[7] * t2;
+  Rc[6] = t16;
+  real t19 = Rt[7] * t0 - Rt[6] * t2;
+  Rc[7] = t19;
+  Rc[8] = Rt[8];
+  real t22 = 1.0 / (MSTMM_PI * 2.0);
+  real t23 = p[0] * q[0] * t22;
+  real t25 = ro[0] + Rt[2] * t23;
+  r[0] = t25;
+  real t27 = ro[1] + Rt[5] * t23;
+  r[1] = t27;
+  real t29 = ro[2] + Rt[8] * t23;
+  r[2] = t29;
+  real t34 = motion_I[0] * t4 + motion_I[1] * t10 + motion_I[2] * t16;
+  motion[0] = t34;
+  real t39 = motion_I[0] * t7 + motion_I[1] * t13 + motion_I[2] * t19;
+  motion[1] = t39;
+  motion[2] = u[0] + (Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2]);
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t10 + motion_I[5] * t16 + u[0] * t39;
+  motion[4] = motion_I[3] * t7 + motion_I[4] * t13 + motion_I[5] * t19 - u[0] * t34;
+  motion[5] = s[0] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t66 = motion_I[0] * motion_I[1];
+  real t69 = motion_I[1] * motion_I[1];
+  real t70 = motion_I[2] * motion_I[2];
+  real t74 = motion_I[0] * motion_I[2];
+  real t78 = motion_I[6] + (t27 * (t66 - motion_I[5]) - t25 * (t69 + t70) + t29 * (motion_I[4] +
+    t74));
+  real t82 = motion_I[0] * motion_I[0];
+  real t86 = motion_I[1] * motion_I[2];
+  real t90 = motion_I[7] + (t25 * (motion_I[5] + t66) - t27 * (t70 + t82) + t29 * (t86 -
+    motion_I[3]));
+  real t101 = motion_I[8] + (t25 * (t74 - motion_I[4]) + t27 * (motion_I[3] + t86) - t29 * (t69 +
+    t82));
+  real t104 = p[0] * u[0];
+  real t106 = 1.0 / MSTMM_PI;
+  motion[6] = t4 * t78 + t10 * t90 + t16 * t101 + t39 * t104 * t106;
+  motion[7] = t7 * t78 + t13 * t90 + t19 * t101 - t106 * (t34 * t104);
+  motion[8] = s[0] * (p[0] * t22) + (Rt[2] * t78 + Rt[5] * t90 + Rt[8] * t101);
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_hinge_screw_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_screw_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -333,578 +142,155 @@ static const mstmm_port mstmm_hinge_screw_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_screw_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_screw_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)q;
-    const real t0 = MSTMM_PI * 2.0;
-    const real t1 = 1.0 / t0;
-    const real t2 = p[0] * t1;
-    const real t3 = S[14] * t2;
-    const real t4 = S[20] + t3;
-    const real t5 = S[11] * t2;
-    const real t6 = S[14] + t5;
-    const real t7 = t2 * t6;
-    const real t8 = t4 + t7;
-    const real t9 = 0.0 < t8;
-    if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t10 = 0.0 < floor_[0];
-    const real t11 = S[0] + S[6];
-    const real t12 = S[11] + t11;
-    const real t13 = ((real)1 / (real)300000000000000) * t12;
-    const real t14 = t10 != 0 ? floor_[0] : t13;
-    const real t15 = p[0] * p[0];
-    const real t16 = t14 * t15;
-    const real t17 = MSTMM_PI * MSTMM_PI;
-    const real t18 = t17 * 4.0;
-    const real t19 = 1.0 / t18;
-    const real t20 = t16 * t19;
-    const real t21 = 0.0 < floor_[1];
-    const real t22 = S[15] + S[18];
-    const real t23 = S[20] + t22;
-    const real t24 = ((real)1 / (real)300000000000000) * t23;
-    const real t25 = t21 != 0 ? floor_[1] : t24;
-    const real t26 = t20 + t25;
-    const real t27 = t26 < t8;
-    if (!(t27 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t28 = S[2] * t2;
-    const real t29 = S[5] + t28;
-    const real t30 = 1.0 / t8;
-    const real t31 = t29 * t30;
-    G[0] = t31;
-    const real t32 = S[7] * t2;
-    const real t33 = S[10] + t32;
-    const real t34 = t33 * t30;
-    G[1] = t34;
-    const real t35 = t6 * t30;
-    G[2] = t35;
-    const real t36 = S[12] * t2;
-    const real t37 = S[17] + t36;
-    const real t38 = t37 * t30;
-    G[3] = t38;
-    const real t39 = S[13] * t2;
-    const real t40 = S[19] + t39;
-    const real t41 = t40 * t30;
-    G[4] = t41;
-    const real t42 = t4 * t30;
-    G[5] = t42;
-    const real t43 = e[2] * t2;
-    const real t44 = e[5] + t43;
-    const real t45 = tau[0] - t44;
-    const real t46 = t30 * t45;
-    g[0] = t46;
-    const real t47 = t29 * t31;
-    const real t48 = S[0] - t47;
-    const real t49 = Rc[0] * t48;
-    const real t50 = t29 * t34;
-    const real t51 = S[1] - t50;
-    const real t52 = Rc[1] * t51;
-    const real t53 = t49 + t52;
-    const real t54 = t29 * t35;
-    const real t55 = S[2] - t54;
-    const real t56 = Rc[2] * t55;
-    const real t57 = t53 + t56;
-    const real t58 = Rc[0] * t57;
-    const real t59 = Rc[0] * t51;
-    const real t60 = t33 * t34;
-    const real t61 = S[6] - t60;
-    const real t62 = Rc[1] * t61;
-    const real t63 = t59 + t62;
-    const real t64 = t33 * t35;
-    const real t65 = S[7] - t64;
-    const real t66 = Rc[2] * t65;
-    const real t67 = t63 + t66;
-    const real t68 = Rc[1] * t67;
-    const real t69 = t58 + t68;
-    const real t70 = Rc[0] * t55;
-    const real t71 = Rc[1] * t65;
-    const real t72 = t70 + t71;
-    const real t73 = t6 * t35;
-    const real t74 = S[11] - t73;
-    const real t75 = Rc[2] * t74;
-    const real t76 = t72 + t75;
-    const real t77 = Rc[2] * t76;
-    const real t78 = t69 + t77;
-    S_I[0] += t78;
-    const real t79 = Rc[3] * t57;
-    const real t80 = Rc[4] * t67;
-    const real t81 = t79 + t80;
-    const real t82 = Rc[5] * t76;
-    const real t83 = t81 + t82;
-    S_I[1] += t83;
-    const real t84 = Rc[6] * t57;
-    const real t85 = Rc[7] * t67;
-    const real t86 = t84 + t85;
-    const real t87 = Rc[8] * t76;
-    const real t88 = t86 + t87;
-    S_I[2] += t88;
-    const real t89 = t29 * t38;
-    const real t90 = S[3] - t89;
-    const real t91 = Rc[0] * t90;
-    const real t92 = t33 * t38;
-    const real t93 = S[8] - t92;
-    const real t94 = Rc[1] * t93;
-    const real t95 = t91 + t94;
-    const real t96 = t6 * t38;
-    const real t97 = S[12] - t96;
-    const real t98 = Rc[2] * t97;
-    const real t99 = t95 + t98;
-    const real t100 = Rc[0] * t99;
-    const real t101 = t29 * t41;
-    const real t102 = S[4] - t101;
-    const real t103 = Rc[0] * t102;
-    const real t104 = t33 * t41;
-    const real t105 = S[9] - t104;
-    const real t106 = Rc[1] * t105;
-    const real t107 = t103 + t106;
-    const real t108 = t6 * t41;
-    const real t109 = S[13] - t108;
-    const real t110 = Rc[2] * t109;
-    const real t111 = t107 + t110;
-    const real t112 = Rc[1] * t111;
-    const real t113 = t100 + t112;
-    const real t114 = t29 * t42;
-    const real t115 = S[5] - t114;
-    const real t116 = Rc[0] * t115;
-    const real t117 = t33 * t42;
-    const real t118 = S[10] - t117;
-    const real t119 = Rc[1] * t118;
-    const real t120 = t116 + t119;
-    const real t121 = t6 * t42;
-    const real t122 = S[14] - t121;
-    const real t123 = Rc[2] * t122;
-    const real t124 = t120 + t123;
-    const real t125 = Rc[2] * t124;
-    const real t126 = t113 + t125;
-    const real t127 = r[1] * t88;
-    const real t128 = r[2] * t83;
-    const real t129 = t127 - t128;
-    const real t130 = t126 + t129;
-    S_I[3] += t130;
-    const real t131 = Rc[3] * t99;
-    const real t132 = Rc[4] * t111;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[5] * t124;
-    const real t135 = t133 + t134;
-    const real t136 = r[2] * t78;
-    const real t137 = r[0] * t88;
-    const real t138 = t136 - t137;
-    const real t139 = t135 + t138;
-    S_I[4] += t139;
-    const real t140 = Rc[6] * t99;
-    const real t141 = Rc[7] * t111;
-    const real t142 = t140 + t141;
-    const real t143 = Rc[8] * t124;
-    const real t144 = t142 + t143;
-    const real t145 = r[0] * t83;
-    const real t146 = r[1] * t78;
-    const real t147 = t145 - t146;
-    const real t148 = t144 + t147;
-    S_I[5] += t148;
-    const real t149 = Rc[3] * t48;
-    const real t150 = Rc[4] * t51;
-    const real t151 = t149 + t150;
-    const real t152 = Rc[5] * t55;
-    const real t153 = t151 + t152;
-    const real t154 = Rc[3] * t153;
-    const real t155 = Rc[3] * t51;
-    const real t156 = Rc[4] * t61;
-    const real t157 = t155 + t156;
-    const real t158 = Rc[5] * t65;
-    const real t159 = t157 + t158;
-    const real t160 = Rc[4] * t159;
-    const real t161 = t154 + t160;
-    const real t162 = Rc[3] * t55;
-    const real t163 = Rc[4] * t65;
-    const real t164 = t162 + t163;
-    const real t165 = Rc[5] * t74;
-    const real t166 = t164 + t165;
-    const real t167 = Rc[5] * t166;
-    const real t168 = t161 + t167;
-    S_I[6] += t168;
-    const real t169 = Rc[6] * t153;
-    const real t170 = Rc[7] * t159;
-    const real t171 = t169 + t170;
-    const real t172 = Rc[8] * t166;
-    const real t173 = t171 + t172;
-    S_I[7] += t173;
-    const real t174 = Rc[3] * t90;
-    const real t175 = Rc[4] * t93;
-    const real t176 = t174 + t175;
-    const real t177 = Rc[5] * t97;
-    const real t178 = t176 + t177;
-    const real t179 = Rc[0] * t178;
-    const real t180 = Rc[3] * t102;
-    const real t181 = Rc[4] * t105;
-    const real t182 = t180 + t181;
-    const real t183 = Rc[5] * t109;
-    const real t184 = t182 + t183;
-    const real t185 = Rc[1] * t184;
-    const real t186 = t179 + t185;
-    const real t187 = Rc[3] * t115;
-    const real t188 = Rc[4] * t118;
-    const real t189 = t187 + t188;
-    const real t190 = Rc[5] * t122;
-    const real t191 = t189 + t190;
-    const real t192 = Rc[2] * t191;
-    const real t193 = t186 + t192;
-    const real t194 = r[1] * t173;
-    const real t195 = r[2] * t168;
-    const real t196 = t194 - t195;
-    const real t197 = t193 + t196;
-    S_I[8] += t197;
-    const real t198 = Rc[3] * t178;
-    const real t199 = Rc[4] * t184;
-    const real t200 = t198 + t199;
-    const real t201 = Rc[5] * t191;
-    const real t202 = t200 + t201;
-    const real t203 = r[0] * t173;
-    const real t204 = t128 - t203;
-    const real t205 = t202 + t204;
-    S_I[9] += t205;
-    const real t206 = Rc[6] * t178;
-    const real t207 = Rc[7] * t184;
-    const real t208 = t206 + t207;
-    const real t209 = Rc[8] * t191;
-    const real t210 = t208 + t209;
-    const real t211 = r[0] * t168;
-    const real t212 = r[1] * t83;
-    const real t213 = t211 - t212;
-    const real t214 = t210 + t213;
-    S_I[10] += t214;
-    const real t215 = Rc[6] * t48;
-    const real t216 = Rc[7] * t51;
-    const real t217 = t215 + t216;
-    const real t218 = Rc[8] * t55;
-    const real t219 = t217 + t218;
-    const real t220 = Rc[6] * t219;
-    const real t221 = Rc[6] * t51;
-    const real t222 = Rc[7] * t61;
-    const real t223 = t221 + t222;
-    const real t224 = Rc[8] * t65;
-    const real t225 = t223 + t224;
-    const real t226 = Rc[7] * t225;
-    const real t227 = t220 + t226;
-    const real t228 = Rc[6] * t55;
-    const real t229 = Rc[7] * t65;
-    const real t230 = t228 + t229;
-    const real t231 = Rc[8] * t74;
-    const real t232 = t230 + t231;
-    const real t233 = Rc[8] * t232;
-    const real t234 = t227 + t233;
-    S_I[11] += t234;
-    const real t235 = Rc[6] * t90;
-    const real t236 = Rc[7] * t93;
-    const real t237 = t235 + t236;
-    const real t238 = Rc[8] * t97;
-    const real t239 = t237 + t238;
-    const real t240 = Rc[0] * t239;
-    const real t241 = Rc[6] * t102;
-    const real t242 = Rc[7] * t105;
-    const real t243 = t241 + t242;
-    const real t244 = Rc[8] * t109;
-    const real t245 = t243 + t244;
-    const real t246 = Rc[1] * t245;
-    const real t247 = t240 + t246;
-    const real t248 = Rc[6] * t115;
-    const real t249 = Rc[7] * t118;
-    const real t250 = t248 + t249;
-    const real t251 = Rc[8] * t122;
-    const real t252 = t250 + t251;
-    const real t253 = Rc[2] * t252;
-    const real t254 = t247 + t253;
-    const real t255 = r[1] * t234;
-    const real t256 = r[2] * t173;
-    const real t257 = t255 - t256;
-    const real t258 = t254 + t257;
-    S_I[12] += t258;
-    const real t259 = Rc[3] * t239;
-    const real t260 = Rc[4] * t245;
-    const real t261 = t259 + t260;
-    const real t262 = Rc[5] * t252;
-    const real t263 = t261 + t262;
-    const real t264 = r[2] * t88;
-    const real t265 = r[0] * t234;
-    const real t266 = t264 - t265;
-    const real t267 = t263 + t266;
-    S_I[13] += t267;
-    const real t268 = Rc[6] * t239;
-    const real t269 = Rc[7] * t245;
-    const real t270 = t268 + t269;
-    const real t271 = Rc[8] * t252;
-    const real t272 = t270 + t271;
-    const real t273 = t203 - t127;
-    const real t274 = t272 + t273;
-    S_I[14] += t274;
-    const real t275 = t37 * t38;
-    const real t276 = S[15] - t275;
-    const real t277 = Rc[0] * t276;
-    const real t278 = t37 * t41;
-    const real t279 = S[16] - t278;
-    const real t280 = Rc[1] * t279;
-    const real t281 = t277 + t280;
-    const real t282 = t37 * t42;
-    const real t283 = S[17] - t282;
-    const real t284 = Rc[2] * t283;
-    const real t285 = t281 + t284;
-    const real t286 = Rc[0] * t285;
-    const real t287 = Rc[0] * t279;
-    const real t288 = t40 * t41;
-    const real t289 = S[18] - t288;
-    const real t290 = Rc[1] * t289;
-    const real t291 = t287 + t290;
-    const real t292 = t40 * t42;
-    const real t293 = S[19] - t292;
-    const real t294 = Rc[2] * t293;
-    const real t295 = t291 + t294;
-    const real t296 = Rc[1] * t295;
-    const real t297 = t286 + t296;
-    const real t298 = Rc[0] * t283;
-    const real t299 = Rc[1] * t293;
-    const real t300 = t298 + t299;
-    const real t301 = t4 * t42;
-    const real t302 = S[20] - t301;
-    const real t303 = Rc[2] * t302;
-    const real t304 = t300 + t303;
-    const real t305 = Rc[2] * t304;
-    const real t306 = t297 + t305;
-    const real t307 = r[1] * t258;
-    const real t308 = r[2] * t197;
-    const real t309 = t307 - t308;
-    const real t310 = r[1] * t254;
-    const real t311 = r[2] * t193;
-    const real t312 = t310 - t311;
-    const real t313 = t309 + t312;
-    const real t314 = t306 + t313;
-    S_I[15] += t314;
-    const real t315 = Rc[3] * t285;
-    const real t316 = Rc[4] * t295;
-    const real t317 = t315 + t316;
-    const real t318 = Rc[5] * t304;
-    const real t319 = t317 + t318;
-    const real t320 = r[1] * t267;
-    const real t321 = r[2] * t205;
-    const real t322 = t320 - t321;
-    const real t323 = r[2] * t126;
-    const real t324 = r[0] * t254;
-    const real t325 = t323 - t324;
-    const real t326 = t322 + t325;
-    const real t327 = t319 + t326;
-    S_I[16] += t327;
-    const real t328 = Rc[6] * t285;
-    const real t329 = Rc[7] * t295;
-    const real t330 = t328 + t329;
-    const real t331 = Rc[8] * t304;
-    const real t332 = t330 + t331;
-    const real t333 = r[1] * t274;
-    const real t334 = r[2] * t214;
-    const real t335 = t333 - t334;
-    const real t336 = r[0] * t193;
-    const real t337 = r[1] * t126;
-    const real t338 = t336 - t337;
-    const real t339 = t335 + t338;
-    const real t340 = t332 + t339;
-    S_I[17] += t340;
-    const real t341 = Rc[3] * t276;
-    const real t342 = Rc[4] * t279;
-    const real t343 = t341 + t342;
-    const real t344 = Rc[5] * t283;
-    const real t345 = t343 + t344;
-    const real t346 = Rc[3] * t345;
-    const real t347 = Rc[3] * t279;
-    const real t348 = Rc[4] * t289;
-    const real t349 = t347 + t348;
-    const real t350 = Rc[5] * t293;
-    const real t351 = t349 + t350;
-    const real t352 = Rc[4] * t351;
-    const real t353 = t346 + t352;
-    const real t354 = Rc[3] * t283;
-    const real t355 = Rc[4] * t293;
-    const real t356 = t354 + t355;
-    const real t357 = Rc[5] * t302;
-    const real t358 = t356 + t357;
-    const real t359 = Rc[5] * t358;
-    const real t360 = t353 + t359;
-    const real t361 = r[2] * t139;
-    const real t362 = r[0] * t267;
-    const real t363 = t361 - t362;
-    const real t364 = r[2] * t135;
-    const real t365 = r[0] * t263;
-    const real t366 = t364 - t365;
-    const real t367 = t363 + t366;
-    const real t368 = t360 + t367;
-    S_I[18] += t368;
-    const real t369 = Rc[6] * t345;
-    const real t370 = Rc[7] * t351;
-    const real t371 = t369 + t370;
-    const real t372 = Rc[8] * t358;
-    const real t373 = t371 + t372;
-    const real t374 = r[2] * t148;
-    const real t375 = r[0] * t274;
-    const real t376 = t374 - t375;
-    const real t377 = r[0] * t202;
-    const real t378 = r[1] * t135;
-    const real t379 = t377 - t378;
-    const real t380 = t376 + t379;
-    const real t381 = t373 + t380;
-    S_I[19] += t381;
-    const real t382 = Rc[6] * t276;
-    const real t383 = Rc[7] * t279;
-    const real t384 = t382 + t383;
-    const real t385 = Rc[8] * t283;
-    const real t386 = t384 + t385;
-    const real t387 = Rc[6] * t386;
-    const real t388 = Rc[6] * t279;
-    const real t389 = Rc[7] * t289;
-    const real t390 = t388 + t389;
-    const real t391 = Rc[8] * t293;
-    const real t392 = t390 + t391;
-    const real t393 = Rc[7] * t392;
-    const real t394 = t387 + t393;
-    const real t395 = Rc[6] * t283;
-    const real t396 = Rc[7] * t293;
-    const real t397 = t395 + t396;
-    const real t398 = Rc[8] * t302;
-    const real t399 = t397 + t398;
-    const real t400 = Rc[8] * t399;
-    const real t401 = t394 + t400;
-    const real t402 = r[0] * t214;
-    const real t403 = r[1] * t148;
-    const real t404 = t402 - t403;
-    const real t405 = r[0] * t210;
-    const real t406 = r[1] * t144;
-    const real t407 = t405 - t406;
-    const real t408 = t404 + t407;
-    const real t409 = t401 + t408;
-    S_I[20] += t409;
-    const real t410 = t29 * t46;
-    const real t411 = e[0] + t410;
-    const real t412 = Rc[0] * t411;
-    const real t413 = t33 * t46;
-    const real t414 = e[1] + t413;
-    const real t415 = Rc[1] * t414;
-    const real t416 = t412 + t415;
-    const real t417 = t6 * t46;
-    const real t418 = e[2] + t417;
-    const real t419 = Rc[2] * t418;
-    const real t420 = t416 + t419;
-    e_I[0] += t420;
-    const real t421 = Rc[3] * t411;
-    const real t422 = Rc[4] * t414;
-    const real t423 = t421 + t422;
-    const real t424 = Rc[5] * t418;
-    const real t425 = t423 + t424;
-    e_I[1] += t425;
-    const real t426 = Rc[6] * t411;
-    const real t427 = Rc[7] * t414;
-    const real t428 = t426 + t427;
-    const real t429 = Rc[8] * t418;
-    const real t430 = t428 + t429;
-    e_I[2] += t430;
-    const real t431 = t37 * t46;
-    const real t432 = e[3] + t431;
-    const real t433 = Rc[0] * t432;
-    const real t434 = t40 * t46;
-    const real t435 = e[4] + t434;
-    const real t436 = Rc[1] * t435;
-    const real t437 = t433 + t436;
-    const real t438 = t4 * t46;
-    const real t439 = e[5] + t438;
-    const real t440 = Rc[2] * t439;
-    const real t441 = t437 + t440;
-    const real t442 = Rc[6] * r[1];
-    const real t443 = Rc[3] * r[2];
-    const real t444 = t442 - t443;
-    const real t445 = t411 * t444;
-    const real t446 = Rc[7] * r[1];
-    const real t447 = Rc[4] * r[2];
-    const real t448 = t446 - t447;
-    const real t449 = t414 * t448;
-    const real t450 = t445 + t449;
-    const real t451 = Rc[8] * r[1];
-    const real t452 = Rc[5] * r[2];
-    const real t453 = t451 - t452;
-    const real t454 = t418 * t453;
-    const real t455 = t450 + t454;
-    const real t456 = t441 + t455;
-    e_I[3] += t456;
-    const real t457 = Rc[3] * t432;
-    const real t458 = Rc[4] * t435;
-    const real t459 = t457 + t458;
-    const real t460 = Rc[5] * t439;
-    const real t461 = t459 + t460;
-    const real t462 = Rc[0] * r[2];
-    const real t463 = Rc[6] * r[0];
-    const real t464 = t462 - t463;
-    const real t465 = t411 * t464;
-    const real t466 = Rc[1] * r[2];
-    const real t467 = Rc[7] * r[0];
-    const real t468 = t466 - t467;
-    const real t469 = t414 * t468;
-    const real t470 = t465 + t469;
-    const real t471 = Rc[2] * r[2];
-    const real t472 = Rc[8] * r[0];
-    const real t473 = t471 - t472;
-    const real t474 = t418 * t473;
-    const real t475 = t470 + t474;
-    const real t476 = t461 + t475;
-    e_I[4] += t476;
-    const real t477 = Rc[6] * t432;
-    const real t478 = Rc[7] * t435;
-    const real t479 = t477 + t478;
-    const real t480 = Rc[8] * t439;
-    const real t481 = t479 + t480;
-    const real t482 = Rc[3] * r[0];
-    const real t483 = Rc[0] * r[1];
-    const real t484 = t482 - t483;
-    const real t485 = t411 * t484;
-    const real t486 = Rc[4] * r[0];
-    const real t487 = Rc[1] * r[1];
-    const real t488 = t486 - t487;
-    const real t489 = t414 * t488;
-    const real t490 = t485 + t489;
-    const real t491 = Rc[5] * r[0];
-    const real t492 = Rc[2] * r[1];
-    const real t493 = t491 - t492;
-    const real t494 = t418 * t493;
-    const real t495 = t490 + t494;
-    const real t496 = t481 + t495;
-    e_I[5] += t496;
-    return 0;
+  (void)q;
+  real t2 = p[0] * (1.0 / (MSTMM_PI * 2.0));
+  real t4 = S[20] + S[14] * t2;
+  real t6 = S[14] + S[11] * t2;
+  real t8 = t4 + t2 * t6;
+  real t9 = 0.0 < t8;
+  if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t9 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t13 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t24 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  if (!((((0.0 < floor_[0]) ? floor_[0] : t13) * (p[0] * p[0]) * (1.0 / (MSTMM_PI * MSTMM_PI * 4.0)) + ((0.0 < floor_[1]) ? floor_[1] : t24) < t8))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t29 = S[5] + S[2] * t2;
+  real t30 = 1.0 / t8;
+  real t31 = t29 * t30;
+  G[0] = t31;
+  real t33 = S[10] + S[7] * t2;
+  real t34 = t33 * t30;
+  G[1] = t34;
+  real t35 = t6 * t30;
+  G[2] = t35;
+  real t37 = S[17] + S[12] * t2;
+  real t38 = t37 * t30;
+  G[3] = t38;
+  real t40 = S[19] + S[13] * t2;
+  real t41 = t40 * t30;
+  G[4] = t41;
+  real t42 = t4 * t30;
+  G[5] = t42;
+  real t46 = t30 * (tau[0] - (e[5] + e[2] * t2));
+  g[0] = t46;
+  real t48 = S[0] - t29 * t31;
+  real t51 = S[1] - t29 * t34;
+  real t55 = S[2] - t29 * t35;
+  real t57 = Rc[0] * t48 + Rc[1] * t51 + Rc[2] * t55;
+  real t61 = S[6] - t33 * t34;
+  real t65 = S[7] - t33 * t35;
+  real t67 = Rc[0] * t51 + Rc[1] * t61 + Rc[2] * t65;
+  real t74 = S[11] - t6 * t35;
+  real t76 = Rc[0] * t55 + Rc[1] * t65 + Rc[2] * t74;
+  real t78 = Rc[0] * t57 + Rc[1] * t67 + Rc[2] * t76;
+  S_I[0] += t78;
+  real t83 = Rc[3] * t57 + Rc[4] * t67 + Rc[5] * t76;
+  S_I[1] += t83;
+  real t88 = Rc[6] * t57 + Rc[7] * t67 + Rc[8] * t76;
+  S_I[2] += t88;
+  real t90 = S[3] - t29 * t38;
+  real t93 = S[8] - t33 * t38;
+  real t97 = S[12] - t6 * t38;
+  real t99 = Rc[0] * t90 + Rc[1] * t93 + Rc[2] * t97;
+  real t102 = S[4] - t29 * t41;
+  real t105 = S[9] - t33 * t41;
+  real t109 = S[13] - t6 * t41;
+  real t111 = Rc[0] * t102 + Rc[1] * t105 + Rc[2] * t109;
+  real t115 = S[5] - t29 * t42;
+  real t118 = S[10] - t33 * t42;
+  real t122 = S[14] - t6 * t42;
+  real t124 = Rc[0] * t115 + Rc[1] * t118 + Rc[2] * t122;
+  real t126 = Rc[0] * t99 + Rc[1] * t111 + Rc[2] * t124;
+  real t127 = r[1] * t88;
+  real t128 = r[2] * t83;
+  S_I[3] += t126 + (t127 - t128);
+  real t135 = Rc[3] * t99 + Rc[4] * t111 + Rc[5] * t124;
+  real t139 = t135 + (r[2] * t78 - r[0] * t88);
+  S_I[4] += t139;
+  real t144 = Rc[6] * t99 + Rc[7] * t111 + Rc[8] * t124;
+  real t148 = t144 + (r[0] * t83 - r[1] * t78);
+  S_I[5] += t148;
+  real t153 = Rc[3] * t48 + Rc[4] * t51 + Rc[5] * t55;
+  real t159 = Rc[3] * t51 + Rc[4] * t61 + Rc[5] * t65;
+  real t166 = Rc[3] * t55 + Rc[4] * t65 + Rc[5] * t74;
+  real t168 = Rc[3] * t153 + Rc[4] * t159 + Rc[5] * t166;
+  S_I[6] += t168;
+  real t173 = Rc[6] * t153 + Rc[7] * t159 + Rc[8] * t166;
+  S_I[7] += t173;
+  real t178 = Rc[3] * t90 + Rc[4] * t93 + Rc[5] * t97;
+  real t184 = Rc[3] * t102 + Rc[4] * t105 + Rc[5] * t109;
+  real t191 = Rc[3] * t115 + Rc[4] * t118 + Rc[5] * t122;
+  real t193 = Rc[0] * t178 + Rc[1] * t184 + Rc[2] * t191;
+  real t197 = t193 + (r[1] * t173 - r[2] * t168);
+  S_I[8] += t197;
+  real t202 = Rc[3] * t178 + Rc[4] * t184 + Rc[5] * t191;
+  real t203 = r[0] * t173;
+  real t205 = t202 + (t128 - t203);
+  S_I[9] += t205;
+  real t210 = Rc[6] * t178 + Rc[7] * t184 + Rc[8] * t191;
+  real t214 = t210 + (r[0] * t168 - r[1] * t83);
+  S_I[10] += t214;
+  real t234 = Rc[6] * (Rc[6] * t48 + Rc[7] * t51 + Rc[8] * t55) + Rc[7] * (Rc[6] * t51 + Rc[7] * t61
+    + Rc[8] * t65) + Rc[8] * (Rc[6] * t55 + Rc[7] * t65 + Rc[8] * t74);
+  S_I[11] += t234;
+  real t239 = Rc[6] * t90 + Rc[7] * t93 + Rc[8] * t97;
+  real t245 = Rc[6] * t102 + Rc[7] * t105 + Rc[8] * t109;
+  real t252 = Rc[6] * t115 + Rc[7] * t118 + Rc[8] * t122;
+  real t254 = Rc[0] * t239 + Rc[1] * t245 + Rc[2] * t252;
+  real t258 = t254 + (r[1] * t234 - r[2] * t173);
+  S_I[12] += t258;
+  real t263 = Rc[3] * t239 + Rc[4] * t245 + Rc[5] * t252;
+  real t267 = t263 + (r[2] * t88 - r[0] * t234);
+  S_I[13] += t267;
+  real t274 = Rc[6] * t239 + Rc[7] * t245 + Rc[8] * t252 + (t203 - t127);
+  S_I[14] += t274;
+  real t276 = S[15] - t37 * t38;
+  real t279 = S[16] - t37 * t41;
+  real t283 = S[17] - t37 * t42;
+  real t285 = Rc[0] * t276 + Rc[1] * t279 + Rc[2] * t283;
+  real t289 = S[18] - t40 * t41;
+  real t293 = S[19] - t40 * t42;
+  real t295 = Rc[0] * t279 + Rc[1] * t289 + Rc[2] * t293;
+  real t302 = S[20] - t4 * t42;
+  real t304 = Rc[0] * t283 + Rc[1] * t293 + Rc[2] * t302;
+  S_I[15] += Rc[0] * t285 + Rc[1] * t295 + Rc[2] * t304 + (r[1] * t258 - r[2] * t197 + (r[1] * t254
+    - r[2] * t193));
+  S_I[16] += Rc[3] * t285 + Rc[4] * t295 + Rc[5] * t304 + (r[1] * t267 - r[2] * t205 + (r[2] * t126
+    - r[0] * t254));
+  S_I[17] += Rc[6] * t285 + Rc[7] * t295 + Rc[8] * t304 + (r[1] * t274 - r[2] * t214 + (r[0] * t193
+    - r[1] * t126));
+  real t345 = Rc[3] * t276 + Rc[4] * t279 + Rc[5] * t283;
+  real t351 = Rc[3] * t279 + Rc[4] * t289 + Rc[5] * t293;
+  real t358 = Rc[3] * t283 + Rc[4] * t293 + Rc[5] * t302;
+  S_I[18] += Rc[3] * t345 + Rc[4] * t351 + Rc[5] * t358 + (r[2] * t139 - r[0] * t267 + (r[2] * t135
+    - r[0] * t263));
+  S_I[19] += Rc[6] * t345 + Rc[7] * t351 + Rc[8] * t358 + (r[2] * t148 - r[0] * t274 + (r[0] * t202
+    - r[1] * t135));
+  S_I[20] += Rc[6] * (Rc[6] * t276 + Rc[7] * t279 + Rc[8] * t283) + Rc[7] * (Rc[6] * t279 + Rc[7] *
+    t289 + Rc[8] * t293) + Rc[8] * (Rc[6] * t283 + Rc[7] * t293 + Rc[8] * t302) + (r[0] * t214 -
+    r[1] * t148 + (r[0] * t210 - r[1] * t144));
+  real t411 = e[0] + t29 * t46;
+  real t414 = e[1] + t33 * t46;
+  real t418 = e[2] + t6 * t46;
+  e_I[0] += Rc[0] * t411 + Rc[1] * t414 + Rc[2] * t418;
+  e_I[1] += Rc[3] * t411 + Rc[4] * t414 + Rc[5] * t418;
+  e_I[2] += Rc[6] * t411 + Rc[7] * t414 + Rc[8] * t418;
+  real t432 = e[3] + t37 * t46;
+  real t435 = e[4] + t40 * t46;
+  real t439 = e[5] + t4 * t46;
+  e_I[3] += Rc[0] * t432 + Rc[1] * t435 + Rc[2] * t439 + (t411 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t414 * (Rc[7] * r[1] - Rc[4] * r[2]) + t418 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t432 + Rc[4] * t435 + Rc[5] * t439 + (t411 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t414 * (Rc[1] * r[2] - Rc[7] * r[0]) + t418 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t432 + Rc[7] * t435 + Rc[8] * t439 + (t411 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t414 * (Rc[4] * r[0] - Rc[1] * r[1]) + t418 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_screw_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_screw_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_screw_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_screw_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 1 free speed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -919,101 +305,32 @@ static const mstmm_guard mstmm_hinge_screw_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_screw_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_screw_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)q;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    delta[0] = t16;
-    delta[1] = t22;
-    const real t54 = MSTMM_PI * 2.0;
-    const real t55 = 1.0 / t54;
-    const real t56 = p[0] * t55;
-    const real t57 = t53 * t56;
-    const real t58 = t29 + t57;
-    delta[2] = t58;
-    delta[3] = t36;
-    delta[4] = t43;
-    const real t59 = t50 + t53;
-    delta[5] = t59;
-    return 0;
+  (void)q;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29 + t53 * (p[0] * (1.0 / (MSTMM_PI * 2.0)));
+  delta[3] = t36;
+  delta[4] = t43;
+  delta[5] = t50 + t53;
+  return 0;
 }
 
-static int mstmm_hinge_screw_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_screw_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[1] parameters: lead [m]
@@ -1029,81 +346,31 @@ static const mstmm_port mstmm_hinge_screw_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[1] derivative of qdot
  */
-int mstmm_hinge_screw_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_screw_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+    out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    (void)u;
-    const real t0 = sin(q[0]);
-    const real t1 = t0 * d_q[0];
-    const real t2 = -t1;
-    d_R[0] = t2;
-    const real t3 = cos(q[0]);
-    const real t4 = t3 * d_q[0];
-    const real t5 = -t4;
-    d_R[1] = t5;
-    d_R[2] = 0.0;
-    d_R[3] = t4;
-    d_R[4] = t2;
-    d_R[5] = 0.0;
-    d_R[6] = 0.0;
-    d_R[7] = 0.0;
-    d_R[8] = 0.0;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    const real t6 = MSTMM_PI * 2.0;
-    const real t7 = 1.0 / t6;
-    const real t8 = p[0] * d_q[0];
-    const real t9 = t7 * t8;
-    d_d[2] = t9;
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    const real t10 = p[0] * d_u[0];
-    const real t11 = t7 * t10;
-    d_v[2] = t11;
-    d_w[0] = 0.0;
-    d_w[1] = 0.0;
-    d_w[2] = d_u[0];
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    d_c[3] = 0.0;
-    d_c[4] = 0.0;
-    d_c[5] = 0.0;
-    d_qdot[0] = d_u[0];
-    return 0;
+  (void)u;
+  real t2 = -(sin(q[0]) * d_q[0]);
+  d_R[0] = t2;
+  real t4 = cos(q[0]) * d_q[0];
+  d_R[1] = -t4;
+  d_R[2] = 0.0;
+  d_R[3] = t4;
+  d_R[4] = t2;
+  d_R[5] = d_R[6] = d_R[7] = d_R[8] = d_d[0] = d_d[1] = 0.0;
+  real t7 = 1.0 / (MSTMM_PI * 2.0);
+  d_d[2] = t7 * (p[0] * d_q[0]);
+  d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = d_v[0] = d_v[1] = 0.0;
+  d_v[2] = t7 * (p[0] * d_u[0]);
+  d_w[0] = d_w[1] = 0.0;
+  d_w[2] = d_u[0];
+  d_c[0] = d_c[1] = d_c[2] = d_c[3] = d_c[4] = d_c[5] = 0.0;
+  d_qdot[0] = d_u[0];
+  return 0;
 }
 
-static int mstmm_hinge_screw_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_screw_hinge_slope_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"d_q", 1, "", 0, 0},
-    {"d_u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 6, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[1] parameters: lead [m]
@@ -1111,31 +378,16 @@ static const mstmm_port mstmm_hinge_screw_hinge_slope_outputs[] = {
  * in  u[1] speeds: angle_rate [rad/s]
  * out J[1][1] qdot by q, transposed
  */
-int mstmm_hinge_screw_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_screw_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_screw_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_screw_rates_by_coordinates_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_rates_by_coordinates_outputs[] = {
-    {"J", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[1] parameters: lead [m]
@@ -1143,31 +395,16 @@ static const mstmm_port mstmm_hinge_screw_rates_by_coordinates_outputs[] = {
  * in  u[1] speeds: angle_rate [rad/s]
  * out J[1][1] qdot by u, transposed
  */
-int mstmm_hinge_screw_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_screw_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_screw_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_screw_rates_by_speeds_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_rates_by_speeds_outputs[] = {
-    {"J", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[1] parameters: lead [m]
@@ -1188,221 +425,84 @@ static const mstmm_port mstmm_hinge_screw_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_screw_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_screw_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+    out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
+    out_t motion)
 {
-    const real t0 = cos(q[0]);
-    R[0] = t0;
-    const real t1 = sin(q[0]);
-    const real t2 = -t1;
-    R[1] = t2;
-    R[2] = 0.0;
-    R[3] = t1;
-    R[4] = t0;
-    R[5] = 0.0;
-    R[6] = 0.0;
-    R[7] = 0.0;
-    R[8] = 1.0;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    const real t3 = p[0] * q[0];
-    const real t4 = MSTMM_PI * 2.0;
-    const real t5 = 1.0 / t4;
-    const real t6 = t3 * t5;
-    d[2] = t6;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    const real t7 = p[0] * t5;
-    H[2] = t7;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    const real t8 = p[0] * u[0];
-    const real t9 = t5 * t8;
-    v[2] = t9;
-    w[0] = 0.0;
-    w[1] = 0.0;
-    w[2] = u[0];
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    c[3] = 0.0;
-    c[4] = 0.0;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    const real t10 = t0 * Rt[0];
-    const real t11 = t1 * Rt[1];
-    const real t12 = t10 + t11;
-    Rc[0] = t12;
-    const real t13 = t0 * Rt[1];
-    const real t14 = t1 * Rt[0];
-    const real t15 = t13 - t14;
-    Rc[1] = t15;
-    Rc[2] = Rt[2];
-    const real t16 = t0 * Rt[3];
-    const real t17 = t1 * Rt[4];
-    const real t18 = t16 + t17;
-    Rc[3] = t18;
-    const real t19 = t0 * Rt[4];
-    const real t20 = t1 * Rt[3];
-    const real t21 = t19 - t20;
-    Rc[4] = t21;
-    Rc[5] = Rt[5];
-    const real t22 = t0 * Rt[6];
-    const real t23 = t1 * Rt[7];
-    const real t24 = t22 + t23;
-    Rc[6] = t24;
-    const real t25 = t0 * Rt[7];
-    const real t26 = t1 * Rt[6];
-    const real t27 = t25 - t26;
-    Rc[7] = t27;
-    Rc[8] = Rt[8];
-    const real t28 = t6 * Rt[2];
-    const real t29 = ro[0] + t28;
-    r[0] = t29;
-    const real t30 = t6 * Rt[5];
-    const real t31 = ro[1] + t30;
-    r[1] = t31;
-    const real t32 = t6 * Rt[8];
-    const real t33 = ro[2] + t32;
-    r[2] = t33;
-    const real t34 = motion_I[0] * t12;
-    const real t35 = motion_I[1] * t18;
-    const real t36 = t34 + t35;
-    const real t37 = motion_I[2] * t24;
-    const real t38 = t36 + t37;
-    motion[0] = t38;
-    const real t39 = motion_I[0] * t15;
-    const real t40 = motion_I[1] * t21;
-    const real t41 = t39 + t40;
-    const real t42 = motion_I[2] * t27;
-    const real t43 = t41 + t42;
-    motion[1] = t43;
-    const real t44 = Rt[2] * motion_I[0];
-    const real t45 = Rt[5] * motion_I[1];
-    const real t46 = t44 + t45;
-    const real t47 = Rt[8] * motion_I[2];
-    const real t48 = t46 + t47;
-    const real t49 = u[0] + t48;
-    motion[2] = t49;
-    const real t50 = motion_I[3] * t12;
-    const real t51 = motion_I[4] * t18;
-    const real t52 = t50 + t51;
-    const real t53 = motion_I[5] * t24;
-    const real t54 = t52 + t53;
-    const real t55 = u[0] * t43;
-    const real t56 = t54 + t55;
-    motion[3] = t56;
-    const real t57 = motion_I[3] * t15;
-    const real t58 = motion_I[4] * t21;
-    const real t59 = t57 + t58;
-    const real t60 = motion_I[5] * t27;
-    const real t61 = t59 + t60;
-    const real t62 = u[0] * t38;
-    const real t63 = t61 - t62;
-    motion[4] = t63;
-    const real t64 = Rt[2] * motion_I[3];
-    const real t65 = Rt[5] * motion_I[4];
-    const real t66 = t64 + t65;
-    const real t67 = Rt[8] * motion_I[5];
-    const real t68 = t66 + t67;
-    const real t69 = s[0] + t68;
-    motion[5] = t69;
-    const real t70 = motion_I[0] * motion_I[1];
-    const real t71 = t70 - motion_I[5];
-    const real t72 = t31 * t71;
-    const real t73 = motion_I[1] * motion_I[1];
-    const real t74 = motion_I[2] * motion_I[2];
-    const real t75 = t73 + t74;
-    const real t76 = t29 * t75;
-    const real t77 = t72 - t76;
-    const real t78 = motion_I[0] * motion_I[2];
-    const real t79 = motion_I[4] + t78;
-    const real t80 = t33 * t79;
-    const real t81 = t77 + t80;
-    const real t82 = motion_I[6] + t81;
-    const real t83 = t12 * t82;
-    const real t84 = motion_I[5] + t70;
-    const real t85 = t29 * t84;
-    const real t86 = motion_I[0] * motion_I[0];
-    const real t87 = t74 + t86;
-    const real t88 = t31 * t87;
-    const real t89 = t85 - t88;
-    const real t90 = motion_I[1] * motion_I[2];
-    const real t91 = t90 - motion_I[3];
-    const real t92 = t33 * t91;
-    const real t93 = t89 + t92;
-    const real t94 = motion_I[7] + t93;
-    const real t95 = t18 * t94;
-    const real t96 = t83 + t95;
-    const real t97 = t78 - motion_I[4];
-    const real t98 = t29 * t97;
-    const real t99 = motion_I[3] + t90;
-    const real t100 = t31 * t99;
-    const real t101 = t98 + t100;
-    const real t102 = t73 + t86;
-    const real t103 = t33 * t102;
-    const real t104 = t101 - t103;
-    const real t105 = motion_I[8] + t104;
-    const real t106 = t24 * t105;
-    const real t107 = t96 + t106;
-    const real t108 = t9 * t43;
-    const real t109 = 2.0 * t108;
-    const real t110 = t107 + t109;
-    motion[6] = t110;
-    const real t111 = t15 * t82;
-    const real t112 = t21 * t94;
-    const real t113 = t111 + t112;
-    const real t114 = t27 * t105;
-    const real t115 = t113 + t114;
-    const real t116 = t9 * t38;
-    const real t117 = 2.0 * t116;
-    const real t118 = t115 - t117;
-    motion[7] = t118;
-    const real t119 = Rt[2] * t82;
-    const real t120 = Rt[5] * t94;
-    const real t121 = t119 + t120;
-    const real t122 = Rt[8] * t105;
-    const real t123 = t121 + t122;
-    const real t124 = t7 * s[0];
-    const real t125 = t123 + t124;
-    motion[8] = t125;
-    return 0;
+  real t0 = cos(q[0]);
+  R[0] = t0;
+  real t1 = sin(q[0]);
+  R[1] = -t1;
+  R[2] = 0.0;
+  R[3] = t1;
+  R[4] = t0;
+  R[5] = R[6] = R[7] = 0.0;
+  R[8] = 1.0;
+  d[0] = d[1] = 0.0;
+  real t5 = 1.0 / (MSTMM_PI * 2.0);
+  real t6 = p[0] * q[0] * t5;
+  d[2] = t6;
+  H[0] = H[1] = 0.0;
+  real t7 = p[0] * t5;
+  H[2] = t7;
+  H[3] = H[4] = 0.0;
+  H[5] = 1.0;
+  v[0] = v[1] = 0.0;
+  real t9 = t5 * (p[0] * u[0]);
+  v[2] = t9;
+  w[0] = w[1] = 0.0;
+  w[2] = u[0];
+  c[0] = c[1] = c[2] = c[3] = c[4] = c[5] = 0.0;
+  qdot[0] = u[0];
+  real t12 = t0 * Rt[0] + t1 * Rt[1];
+  Rc[0] = t12;
+  real t15 = t0 * Rt[1] - t1 * Rt[0];
+  Rc[1] = t15;
+  Rc[2] = Rt[2];
+  real t18 = t0 * Rt[3] + t1 * Rt[4];
+  Rc[3] = t18;
+  real t21 = t0 * Rt[4] - t1 * Rt[3];
+  Rc[4] = t21;
+  Rc[5] = Rt[5];
+  real t24 = t0 * Rt[6] + t1 * Rt[7];
+  Rc[6] = t24;
+  real t27 = t0 * Rt[7] - t1 * Rt[6];
+  Rc[7] = t27;
+  Rc[8] = Rt[8];
+  real t29 = ro[0] + t6 * Rt[2];
+  r[0] = t29;
+  real t31 = ro[1] + t6 * Rt[5];
+  r[1] = t31;
+  real t33 = ro[2] + t6 * Rt[8];
+  r[2] = t33;
+  real t38 = motion_I[0] * t12 + motion_I[1] * t18 + motion_I[2] * t24;
+  motion[0] = t38;
+  real t43 = motion_I[0] * t15 + motion_I[1] * t21 + motion_I[2] * t27;
+  motion[1] = t43;
+  motion[2] = u[0] + (Rt[2] * motion_I[0] + Rt[5] * motion_I[1] + Rt[8] * motion_I[2]);
+  motion[3] = motion_I[3] * t12 + motion_I[4] * t18 + motion_I[5] * t24 + u[0] * t43;
+  motion[4] = motion_I[3] * t15 + motion_I[4] * t21 + motion_I[5] * t27 - u[0] * t38;
+  motion[5] = s[0] + (Rt[2] * motion_I[3] + Rt[5] * motion_I[4] + Rt[8] * motion_I[5]);
+  real t70 = motion_I[0] * motion_I[1];
+  real t73 = motion_I[1] * motion_I[1];
+  real t74 = motion_I[2] * motion_I[2];
+  real t78 = motion_I[0] * motion_I[2];
+  real t82 = motion_I[6] + (t31 * (t70 - motion_I[5]) - t29 * (t73 + t74) + t33 * (motion_I[4] +
+    t78));
+  real t86 = motion_I[0] * motion_I[0];
+  real t90 = motion_I[1] * motion_I[2];
+  real t94 = motion_I[7] + (t29 * (motion_I[5] + t70) - t31 * (t74 + t86) + t33 * (t90 -
+    motion_I[3]));
+  real t105 = motion_I[8] + (t29 * (t78 - motion_I[4]) + t31 * (motion_I[3] + t90) - t33 * (t73 +
+    t86));
+  motion[6] = t12 * t82 + t18 * t94 + t24 * t105 + 2.0 * (t9 * t43);
+  motion[7] = t15 * t82 + t21 * t94 + t27 * t105 - 2.0 * (t9 * t38);
+  motion[8] = Rt[2] * t82 + Rt[5] * t94 + Rt[8] * t105 + t7 * s[0];
+  return 0;
 }
 
-static int mstmm_hinge_screw_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_screw_body_motion_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 1, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1424,141 +524,53 @@ static const mstmm_port mstmm_hinge_screw_body_motion_outputs[] = {
  * out W[1][1] slopes of the rows by load, rotors and laws
  * out H[6] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_screw_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_screw_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)q;
-    (void)s;
-    (void)along;
-    const real t0 = 1.0 / sq[0];
-    const real t1 = motion[1] * t0;
-    B[0] = t1;
-    const real t2 = motion[0] * t0;
-    const real t3 = -t2;
-    B[1] = t3;
-    B[2] = rate[0];
-    const real t4 = u[0] * motion[0];
-    const real t5 = motion[4] + t4;
-    const real t6 = t0 * t5;
-    const real t7 = motion[1] * rate[0];
-    const real t8 = t6 + t7;
-    const real t9 = u[0] * t2;
-    const real t10 = t8 - t9;
-    B[3] = t10;
-    const real t11 = u[0] * t1;
-    const real t12 = motion[0] * rate[0];
-    const real t13 = u[0] * motion[1];
-    const real t14 = motion[3] - t13;
-    const real t15 = t0 * t14;
-    const real t16 = t12 + t15;
-    const real t17 = t11 + t16;
-    const real t18 = -t17;
-    B[4] = t18;
-    B[5] = scale[0];
-    const real t19 = MSTMM_PI * 2.0;
-    const real t20 = 1.0 / t19;
-    const real t21 = p[0] * u[0];
-    const real t22 = t20 * t21;
-    const real t23 = t22 * motion[0];
-    const real t24 = 2.0 * t23;
-    const real t25 = motion[7] + t24;
-    const real t26 = t0 * t25;
-    const real t27 = p[0] * t20;
-    const real t28 = t27 * t0;
-    const real t29 = t28 * t5;
-    const real t30 = p[0] * rate[0];
-    const real t31 = t20 * t30;
-    const real t32 = motion[1] * t31;
-    const real t33 = 2.0 * t32;
-    const real t34 = motion[2] - u[0];
-    const real t35 = motion[0] * t28;
-    const real t36 = t34 * t35;
-    const real t37 = t33 + t36;
-    const real t38 = t29 + t37;
-    const real t39 = t26 + t38;
-    const real t40 = 2.0 * t22;
-    const real t41 = t2 * t40;
-    const real t42 = t39 - t41;
-    B[6] = t42;
-    const real t43 = motion[1] * t28;
-    const real t44 = t34 * t43;
-    const real t45 = motion[0] * t31;
-    const real t46 = 2.0 * t45;
-    const real t47 = t44 - t46;
-    const real t48 = t28 * t14;
-    const real t49 = t47 - t48;
-    const real t50 = t22 * motion[1];
-    const real t51 = 2.0 * t50;
-    const real t52 = motion[6] - t51;
-    const real t53 = t0 * t52;
-    const real t54 = t49 - t53;
-    const real t55 = t1 * t40;
-    const real t56 = t54 - t55;
-    B[7] = t56;
-    const real t57 = t27 * scale[0];
-    const real t58 = motion[0] * t35;
-    const real t59 = motion[1] * t43;
-    const real t60 = t58 + t59;
-    const real t61 = t57 - t60;
-    B[8] = t61;
-    const real t62 = f[1] * t0;
-    const real t63 = -t62;
-    G[0] = t63;
-    const real t64 = f[0] * t0;
-    G[1] = t64;
-    G[2] = 0.0;
-    const real t65 = f[1] * t28;
-    const real t66 = f[4] * t0;
-    const real t67 = t65 + t66;
-    const real t68 = -t67;
-    G[3] = t68;
-    const real t69 = f[3] * t0;
-    const real t70 = f[0] * t28;
-    const real t71 = t69 + t70;
-    G[4] = t71;
-    G[5] = 0.0;
-    const real t72 = J[0] * scale[0];
-    const real t73 = t72 - laws[0];
-    W[0] = t73;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = t27;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 1.0;
-    return 0;
+  (void)q;
+  (void)s;
+  (void)along;
+  real t0 = 1.0 / sq[0];
+  real t1 = motion[1] * t0;
+  B[0] = t1;
+  real t2 = motion[0] * t0;
+  B[1] = -t2;
+  B[2] = rate[0];
+  real t5 = motion[4] + u[0] * motion[0];
+  B[3] = t0 * t5 + motion[1] * rate[0] - u[0] * t2;
+  real t14 = motion[3] - u[0] * motion[1];
+  B[4] = -(u[0] * t1 + (motion[0] * rate[0] + t0 * t14));
+  B[5] = scale[0];
+  real t20 = 1.0 / (MSTMM_PI * 2.0);
+  real t22 = t20 * (p[0] * u[0]);
+  real t27 = p[0] * t20;
+  real t28 = t27 * t0;
+  real t31 = t20 * (p[0] * rate[0]);
+  real t34 = motion[2] - u[0];
+  real t35 = motion[0] * t28;
+  real t40 = 2.0 * t22;
+  B[6] = t0 * (motion[7] + 2.0 * (t22 * motion[0])) + (t28 * t5 + (2.0 * (motion[1] * t31) + t34 *
+    t35)) - t2 * t40;
+  real t43 = motion[1] * t28;
+  B[7] = t34 * t43 - 2.0 * (motion[0] * t31) - t28 * t14 - t0 * (motion[6] - 2.0 * (t22 *
+    motion[1])) - t1 * t40;
+  B[8] = t27 * scale[0] - (motion[0] * t35 + motion[1] * t43);
+  G[0] = -(f[1] * t0);
+  G[1] = f[0] * t0;
+  G[2] = 0.0;
+  G[3] = -(f[1] * t28 + f[4] * t0);
+  G[4] = f[3] * t0 + f[0] * t28;
+  G[5] = 0.0;
+  W[0] = J[0] * scale[0] - laws[0];
+  H[0] = H[1] = 0.0;
+  H[2] = t27;
+  H[3] = H[4] = 0.0;
+  H[5] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_screw_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_screw_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_screw_directions_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"laws", 1, "", 0, 0},
-    {"along", 1, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_screw_directions_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"W", 1, "", 0, 0},
-    {"H", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_screw_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_screw_q_names[] = {
     "angle",
@@ -1585,121 +597,61 @@ static const char *const mstmm_hinge_screw_p_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_screw_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_screw_hinge,
-        .call = mstmm_hinge_screw_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_screw_hinge_inputs,
-        .outputs = mstmm_hinge_screw_hinge_outputs,
-        .ir_hash = "49cb3aa6c238e633fdd7a0f4e7aa0be1be30a7249b23a57405ec4c058c431646",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_screw_forward,
-        .call = mstmm_hinge_screw_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_screw_forward_inputs,
-        .outputs = mstmm_hinge_screw_forward_outputs,
-        .ir_hash = "79bff12dcc1e43e1326590288e252f776b7a74e55769275d7fe525c6c4cf75bf",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_screw_condense,
-        .call = mstmm_hinge_screw_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_screw_condense_inputs,
-        .outputs = mstmm_hinge_screw_condense_outputs,
-        .ir_hash = "b6c2facf0332defb1d8d982772ce5acec143a86668876ced36d4662f14d5e749",
-        .n_guards = 3,
-        .guards = mstmm_hinge_screw_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_screw_recover,
-        .call = mstmm_hinge_screw_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_screw_recover_inputs,
-        .outputs = mstmm_hinge_screw_recover_outputs,
-        .ir_hash = "17d54885a9e37d3b920a4c22ba340e65c42bfbe1345192ef388411b48dff8a51",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_screw_hinge_slope,
-        .call = mstmm_hinge_screw_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_screw_hinge_slope_inputs,
-        .outputs = mstmm_hinge_screw_hinge_slope_outputs,
-        .ir_hash = "25cc807eede96b8c4cdd1de4aa05d83f915640f64f689e64dcc0eb96e4435873",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_screw_rates_by_coordinates,
-        .call = mstmm_hinge_screw_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_screw_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_screw_rates_by_coordinates_outputs,
-        .ir_hash = "8abfa9fc9f775c8491a2d7f69cc819ffee2cf11632cf4b605e40159bbf1fbe50",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_screw_rates_by_speeds,
-        .call = mstmm_hinge_screw_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_screw_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_screw_rates_by_speeds_outputs,
-        .ir_hash = "6edf6909c9f26d9525378b3b4b7590225c25d943365c312c613c83045b6d9fb4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_screw_body_motion,
-        .call = mstmm_hinge_screw_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_screw_body_motion_inputs,
-        .outputs = mstmm_hinge_screw_body_motion_outputs,
-        .ir_hash = "a0eada5e3f9034d9acbb4c5bed073737317b30342bdcaf2dabfe3773621396cf",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_screw_directions,
-        .call = mstmm_hinge_screw_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_screw_directions_inputs,
-        .outputs = mstmm_hinge_screw_directions_outputs,
-        .ir_hash = "b11edcc28076407580c7c5c2aba8fe8dfa542567e70b046d7a10d748a6c30549",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_screw_hinge), 3, 7, (const mstmm_port[]){{"p", 1, "", 0, 0},
+    {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m",
+    0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "6a3daa813bf6655b810bc85f7c96ddc073c147dfa92b7ff66532c91d42405cb3", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_screw_forward), 7, 4, (const mstmm_port[]){{"Rt", 9, "",
+    0, 0}, {"ro", 3, "m", 0, 0}, {"p", 1, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"s",
+    1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3,
+    "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "3ce193ac29c4ce09ba76e88ad3c38e8334776d9554eb8caedae4fc5d74a6c3d1", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_screw_condense), 8, 4, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 1, "", 0, 0}, {"q", 1, "", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "30605fbb9a4dea666744cd790fd4b77264357dce0d19f4aefc14ef3ea880320f", 3, (const
+    mstmm_guard[]){{1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_screw_recover), 7, 2, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"p", 1, "", 0, 0}, {"q", 1, "", 0, 0}, {"G", 6, "", 0, 0}, {"g", 1,
+    "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6,
+    "", 0, 0}}, "ac302ccd101ecbc4661ddb0ab26fe71f603ec1981e2bc6ae08a3fdafee342960", 0, NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_screw_hinge_slope), 5, 7, (const mstmm_port[]){{"p",
+    1, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"d_q", 1, "", 0, 0}, {"d_u", 1, "", 0,
+    0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H", 6, "", 0, 0},
+    {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}, {"d_qdot",
+    1, "", 0, 0}}, "a45547e99d0b85f6332372089a47b939ad1d92ed7e2e6ccc3e92b432007f961e", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_screw_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 1, "", 0, 0}},
+    "1567fbfb520e2505c07430f14cedb1614f0c5f083e8211fe6af23b6d50475bdf", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_screw_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 1, "", 0, 0}},
+    "819bd2d048cb599da0e7c3cf8003af9c92276ae7fd9d60750ec860d456a72973", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_screw_body_motion), 7, 10, (const mstmm_port[]){{"p",
+    1, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0},
+    {"s", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d",
+    3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 1, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0},
+    {"motion", 9, "", 0, 0}}, "0a1328aa5e521ff5791bb15c7eadf7a5208bec56b8a27db130a7aeb934840d1e", 0,
+    NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_screw_directions), 12, 4, (const mstmm_port[]){{"p", 1,
+    "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"s", 1, "", 0, 0}, {"motion", 9, "", 0, 0},
+    {"f", 6, "N, N*m", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"laws", 1, "", 0, 0}, {"along", 1, "",
+    0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1, "1/s", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"W", 1, "", 0, 0}, {"H", 6, "", 0, 0}},
+    "650aeba0ef75482471d2878e174c41ac3163ad7fe73329a44f4743a6026f5717", 0, NULL},
 };
 
 const mstmm_element mstmm_hinge_screw = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "screw",
-    .hash = "257eae93524446c2a969dcdf0950e431424e25ca6c9d4b101083c6188236a82c",
+    .hash = "96b4447141b2c2714ee04d650ab027fa9eecf78c39485066dfbd5dbebb861a55",
     .nq = 1,
     .nu = 1,
     .np = 1,

@@ -8,40 +8,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_hinge_universal;
-int mstmm_hinge_universal_hinge(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict R, real *restrict d, real *restrict H, real *restrict v,
-    real *restrict w, real *restrict c, real *restrict qdot);
-int mstmm_hinge_universal_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot);
-int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_hinge_universal_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot);
-int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J);
-int mstmm_hinge_universal_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_hinge_universal_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H);
-
 /* relative motion of the universal hinge
  * in  p[1] parameters: alpha [rad]
  * in  q[2] coordinates: angle1 [rad], angle2 [rad]
@@ -54,106 +20,51 @@ int mstmm_hinge_universal_directions(const real *restrict p, const real *restric
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[2] coordinate rates
  */
-int mstmm_hinge_universal_hinge(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict R, real *restrict d, real *restrict H, real *restrict v,
-    real *restrict w, real *restrict c, real *restrict qdot)
+int mstmm_hinge_universal_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+    out_t c, out_t qdot)
 {
-    const real t0 = cos(q[0]);
-    const real t1 = cos(q[1]);
-    const real t2 = t0 * t1;
-    const real t3 = sin(q[0]);
-    const real t4 = sin(q[1]);
-    const real t5 = t3 * t4;
-    const real t6 = cos(p[0]);
-    const real t7 = t5 * t6;
-    const real t8 = t2 - t7;
-    R[0] = t8;
-    const real t9 = t0 * t4;
-    const real t10 = t3 * t6;
-    const real t11 = t1 * t10;
-    const real t12 = t9 + t11;
-    const real t13 = -t12;
-    R[1] = t13;
-    const real t14 = sin(p[0]);
-    const real t15 = t3 * t14;
-    R[2] = t15;
-    const real t16 = t1 * t3;
-    const real t17 = t4 * t6;
-    const real t18 = t0 * t17;
-    const real t19 = t16 + t18;
-    R[3] = t19;
-    const real t20 = t0 * t6;
-    const real t21 = t1 * t20;
-    const real t22 = t21 - t5;
-    R[4] = t22;
-    const real t23 = t0 * t14;
-    const real t24 = -t23;
-    R[5] = t24;
-    const real t25 = t4 * t14;
-    R[6] = t25;
-    const real t26 = t1 * t14;
-    R[7] = t26;
-    R[8] = t6;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = t25;
-    H[7] = 0.0;
-    H[8] = t26;
-    H[9] = 0.0;
-    H[10] = t6;
-    H[11] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    const real t27 = u[0] * t25;
-    w[0] = t27;
-    const real t28 = u[0] * t26;
-    w[1] = t28;
-    const real t29 = u[0] * t6;
-    const real t30 = u[1] + t29;
-    w[2] = t30;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    const real t31 = u[1] * t28;
-    c[3] = t31;
-    const real t32 = u[1] * t27;
-    const real t33 = -t32;
-    c[4] = t33;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    return 0;
+  real t0 = cos(q[0]);
+  real t1 = cos(q[1]);
+  real t3 = sin(q[0]);
+  real t4 = sin(q[1]);
+  real t5 = t3 * t4;
+  real t6 = cos(p[0]);
+  R[0] = t0 * t1 - t5 * t6;
+  R[1] = -(t0 * t4 + t1 * (t3 * t6));
+  real t14 = sin(p[0]);
+  R[2] = t3 * t14;
+  R[3] = t1 * t3 + t0 * (t4 * t6);
+  R[4] = t1 * (t0 * t6) - t5;
+  R[5] = -(t0 * t14);
+  real t25 = t4 * t14;
+  R[6] = t25;
+  real t26 = t1 * t14;
+  R[7] = t26;
+  R[8] = t6;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = 0.0;
+  H[6] = t25;
+  H[7] = 0.0;
+  H[8] = t26;
+  H[9] = 0.0;
+  H[10] = t6;
+  H[11] = 1.0;
+  v[0] = v[1] = v[2] = 0.0;
+  real t27 = u[0] * t25;
+  w[0] = t27;
+  real t28 = u[0] * t26;
+  w[1] = t28;
+  w[2] = u[1] + u[0] * t6;
+  c[0] = c[1] = c[2] = 0.0;
+  c[3] = u[1] * t28;
+  c[4] = -(u[1] * t27);
+  c[5] = 0.0;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  return 0;
 }
 
-static int mstmm_hinge_universal_hinge_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_hinge(in[0], in[1], in[2], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_universal_hinge_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_hinge_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_hinge, (in[0], in[1], in[2], out[0], out[1], out[2], out[3],
+  out[4], out[5], out[6]))
 
 /* bias motion outboard of the universal hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -170,237 +81,82 @@ static const mstmm_port mstmm_hinge_universal_hinge_outputs[] = {
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[2] coordinate rates
  */
-int mstmm_hinge_universal_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion,
-    real *restrict qdot)
+int mstmm_hinge_universal_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+    out_t Rc, out_t r, out_t motion, out_t qdot)
 {
-    const real t0 = cos(q[0]);
-    const real t1 = cos(q[1]);
-    const real t2 = t0 * t1;
-    const real t3 = sin(q[0]);
-    const real t4 = sin(q[1]);
-    const real t5 = t3 * t4;
-    const real t6 = cos(p[0]);
-    const real t7 = t5 * t6;
-    const real t8 = t2 - t7;
-    const real t9 = Rt[0] * t8;
-    const real t10 = t1 * t3;
-    const real t11 = t4 * t6;
-    const real t12 = t0 * t11;
-    const real t13 = t10 + t12;
-    const real t14 = Rt[1] * t13;
-    const real t15 = t9 + t14;
-    const real t16 = sin(p[0]);
-    const real t17 = t4 * t16;
-    const real t18 = Rt[2] * t17;
-    const real t19 = t15 + t18;
-    Rc[0] = t19;
-    const real t20 = t0 * t6;
-    const real t21 = t1 * t20;
-    const real t22 = t21 - t5;
-    const real t23 = Rt[1] * t22;
-    const real t24 = t0 * t4;
-    const real t25 = t3 * t6;
-    const real t26 = t1 * t25;
-    const real t27 = t24 + t26;
-    const real t28 = Rt[0] * t27;
-    const real t29 = t23 - t28;
-    const real t30 = t1 * t16;
-    const real t31 = Rt[2] * t30;
-    const real t32 = t29 + t31;
-    Rc[1] = t32;
-    const real t33 = t3 * t16;
-    const real t34 = Rt[0] * t33;
-    const real t35 = t0 * t16;
-    const real t36 = Rt[1] * t35;
-    const real t37 = t34 - t36;
-    const real t38 = Rt[2] * t6;
-    const real t39 = t37 + t38;
-    Rc[2] = t39;
-    const real t40 = Rt[3] * t8;
-    const real t41 = Rt[4] * t13;
-    const real t42 = t40 + t41;
-    const real t43 = Rt[5] * t17;
-    const real t44 = t42 + t43;
-    Rc[3] = t44;
-    const real t45 = Rt[4] * t22;
-    const real t46 = Rt[3] * t27;
-    const real t47 = t45 - t46;
-    const real t48 = Rt[5] * t30;
-    const real t49 = t47 + t48;
-    Rc[4] = t49;
-    const real t50 = Rt[3] * t33;
-    const real t51 = Rt[4] * t35;
-    const real t52 = t50 - t51;
-    const real t53 = Rt[5] * t6;
-    const real t54 = t52 + t53;
-    Rc[5] = t54;
-    const real t55 = Rt[6] * t8;
-    const real t56 = Rt[7] * t13;
-    const real t57 = t55 + t56;
-    const real t58 = Rt[8] * t17;
-    const real t59 = t57 + t58;
-    Rc[6] = t59;
-    const real t60 = Rt[7] * t22;
-    const real t61 = Rt[6] * t27;
-    const real t62 = t60 - t61;
-    const real t63 = Rt[8] * t30;
-    const real t64 = t62 + t63;
-    Rc[7] = t64;
-    const real t65 = Rt[6] * t33;
-    const real t66 = Rt[7] * t35;
-    const real t67 = t65 - t66;
-    const real t68 = Rt[8] * t6;
-    const real t69 = t67 + t68;
-    Rc[8] = t69;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t70 = motion_I[0] * t19;
-    const real t71 = motion_I[1] * t44;
-    const real t72 = t70 + t71;
-    const real t73 = motion_I[2] * t59;
-    const real t74 = t72 + t73;
-    const real t75 = u[0] * t17;
-    const real t76 = t74 + t75;
-    motion[0] = t76;
-    const real t77 = motion_I[0] * t32;
-    const real t78 = motion_I[1] * t49;
-    const real t79 = t77 + t78;
-    const real t80 = motion_I[2] * t64;
-    const real t81 = t79 + t80;
-    const real t82 = u[0] * t30;
-    const real t83 = t81 + t82;
-    motion[1] = t83;
-    const real t84 = motion_I[0] * t39;
-    const real t85 = motion_I[1] * t54;
-    const real t86 = t84 + t85;
-    const real t87 = motion_I[2] * t69;
-    const real t88 = t86 + t87;
-    const real t89 = u[0] * t6;
-    const real t90 = u[1] + t89;
-    const real t91 = t88 + t90;
-    motion[2] = t91;
-    const real t92 = motion_I[3] * t19;
-    const real t93 = motion_I[4] * t44;
-    const real t94 = t92 + t93;
-    const real t95 = motion_I[5] * t59;
-    const real t96 = t94 + t95;
-    const real t97 = s[0] * t17;
-    const real t98 = u[1] * t82;
-    const real t99 = t97 + t98;
-    const real t100 = t81 * t90;
-    const real t101 = t88 * t82;
-    const real t102 = t100 - t101;
-    const real t103 = t99 + t102;
-    const real t104 = t96 + t103;
-    motion[3] = t104;
-    const real t105 = motion_I[3] * t32;
-    const real t106 = motion_I[4] * t49;
-    const real t107 = t105 + t106;
-    const real t108 = motion_I[5] * t64;
-    const real t109 = t107 + t108;
-    const real t110 = s[0] * t30;
-    const real t111 = u[1] * t75;
-    const real t112 = t110 - t111;
-    const real t113 = t88 * t75;
-    const real t114 = t74 * t90;
-    const real t115 = t113 - t114;
-    const real t116 = t112 + t115;
-    const real t117 = t109 + t116;
-    motion[4] = t117;
-    const real t118 = motion_I[3] * t39;
-    const real t119 = motion_I[4] * t54;
-    const real t120 = t118 + t119;
-    const real t121 = motion_I[5] * t69;
-    const real t122 = t120 + t121;
-    const real t123 = s[0] * t6;
-    const real t124 = s[1] + t123;
-    const real t125 = t74 * t82;
-    const real t126 = t81 * t75;
-    const real t127 = t125 - t126;
-    const real t128 = t124 + t127;
-    const real t129 = t122 + t128;
-    motion[5] = t129;
-    const real t130 = motion_I[0] * motion_I[1];
-    const real t131 = t130 - motion_I[5];
-    const real t132 = ro[1] * t131;
-    const real t133 = motion_I[1] * motion_I[1];
-    const real t134 = motion_I[2] * motion_I[2];
-    const real t135 = t133 + t134;
-    const real t136 = ro[0] * t135;
-    const real t137 = t132 - t136;
-    const real t138 = motion_I[0] * motion_I[2];
-    const real t139 = motion_I[4] + t138;
-    const real t140 = ro[2] * t139;
-    const real t141 = t137 + t140;
-    const real t142 = motion_I[6] + t141;
-    const real t143 = t19 * t142;
-    const real t144 = motion_I[5] + t130;
-    const real t145 = ro[0] * t144;
-    const real t146 = motion_I[0] * motion_I[0];
-    const real t147 = t134 + t146;
-    const real t148 = ro[1] * t147;
-    const real t149 = t145 - t148;
-    const real t150 = motion_I[1] * motion_I[2];
-    const real t151 = t150 - motion_I[3];
-    const real t152 = ro[2] * t151;
-    const real t153 = t149 + t152;
-    const real t154 = motion_I[7] + t153;
-    const real t155 = t44 * t154;
-    const real t156 = t143 + t155;
-    const real t157 = t138 - motion_I[4];
-    const real t158 = ro[0] * t157;
-    const real t159 = motion_I[3] + t150;
-    const real t160 = ro[1] * t159;
-    const real t161 = t158 + t160;
-    const real t162 = t133 + t146;
-    const real t163 = ro[2] * t162;
-    const real t164 = t161 - t163;
-    const real t165 = motion_I[8] + t164;
-    const real t166 = t59 * t165;
-    const real t167 = t156 + t166;
-    motion[6] = t167;
-    const real t168 = t32 * t142;
-    const real t169 = t49 * t154;
-    const real t170 = t168 + t169;
-    const real t171 = t64 * t165;
-    const real t172 = t170 + t171;
-    motion[7] = t172;
-    const real t173 = t39 * t142;
-    const real t174 = t54 * t154;
-    const real t175 = t173 + t174;
-    const real t176 = t69 * t165;
-    const real t177 = t175 + t176;
-    motion[8] = t177;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    return 0;
+  real t0 = cos(q[0]);
+  real t1 = cos(q[1]);
+  real t3 = sin(q[0]);
+  real t4 = sin(q[1]);
+  real t5 = t3 * t4;
+  real t6 = cos(p[0]);
+  real t8 = t0 * t1 - t5 * t6;
+  real t13 = t1 * t3 + t0 * (t4 * t6);
+  real t16 = sin(p[0]);
+  real t17 = t4 * t16;
+  real t19 = Rt[0] * t8 + Rt[1] * t13 + Rt[2] * t17;
+  Rc[0] = t19;
+  real t22 = t1 * (t0 * t6) - t5;
+  real t27 = t0 * t4 + t1 * (t3 * t6);
+  real t30 = t1 * t16;
+  real t32 = Rt[1] * t22 - Rt[0] * t27 + Rt[2] * t30;
+  Rc[1] = t32;
+  real t33 = t3 * t16;
+  real t35 = t0 * t16;
+  real t39 = Rt[0] * t33 - Rt[1] * t35 + Rt[2] * t6;
+  Rc[2] = t39;
+  real t44 = Rt[3] * t8 + Rt[4] * t13 + Rt[5] * t17;
+  Rc[3] = t44;
+  real t49 = Rt[4] * t22 - Rt[3] * t27 + Rt[5] * t30;
+  Rc[4] = t49;
+  real t54 = Rt[3] * t33 - Rt[4] * t35 + Rt[5] * t6;
+  Rc[5] = t54;
+  real t59 = Rt[6] * t8 + Rt[7] * t13 + Rt[8] * t17;
+  Rc[6] = t59;
+  real t64 = Rt[7] * t22 - Rt[6] * t27 + Rt[8] * t30;
+  Rc[7] = t64;
+  real t69 = Rt[6] * t33 - Rt[7] * t35 + Rt[8] * t6;
+  Rc[8] = t69;
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t74 = motion_I[0] * t19 + motion_I[1] * t44 + motion_I[2] * t59;
+  real t75 = u[0] * t17;
+  motion[0] = t74 + t75;
+  real t81 = motion_I[0] * t32 + motion_I[1] * t49 + motion_I[2] * t64;
+  real t82 = u[0] * t30;
+  motion[1] = t81 + t82;
+  real t88 = motion_I[0] * t39 + motion_I[1] * t54 + motion_I[2] * t69;
+  real t90 = u[1] + u[0] * t6;
+  motion[2] = t88 + t90;
+  motion[3] = motion_I[3] * t19 + motion_I[4] * t44 + motion_I[5] * t59 + (s[0] * t17 + u[1] * t82 +
+    (t81 * t90 - t88 * t82));
+  motion[4] = motion_I[3] * t32 + motion_I[4] * t49 + motion_I[5] * t64 + (s[0] * t30 - u[1] * t75 +
+    (t88 * t75 - t74 * t90));
+  motion[5] = motion_I[3] * t39 + motion_I[4] * t54 + motion_I[5] * t69 + (s[1] + s[0] * t6 + (t74 *
+    t82 - t81 * t75));
+  real t130 = motion_I[0] * motion_I[1];
+  real t133 = motion_I[1] * motion_I[1];
+  real t134 = motion_I[2] * motion_I[2];
+  real t138 = motion_I[0] * motion_I[2];
+  real t142 = motion_I[6] + (ro[1] * (t130 - motion_I[5]) - ro[0] * (t133 + t134) + ro[2] *
+    (motion_I[4] + t138));
+  real t146 = motion_I[0] * motion_I[0];
+  real t150 = motion_I[1] * motion_I[2];
+  real t154 = motion_I[7] + (ro[0] * (motion_I[5] + t130) - ro[1] * (t134 + t146) + ro[2] * (t150 -
+    motion_I[3]));
+  real t165 = motion_I[8] + (ro[0] * (t138 - motion_I[4]) + ro[1] * (motion_I[3] + t150) - ro[2] *
+    (t133 + t146));
+  motion[6] = t19 * t142 + t44 * t154 + t59 * t165;
+  motion[7] = t32 * t142 + t49 * t154 + t64 * t165;
+  motion[8] = t39 * t142 + t54 * t154 + t69 * t165;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  return 0;
 }
 
-static int mstmm_hinge_universal_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_universal_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e carried across a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -418,608 +174,168 @@ static const mstmm_port mstmm_hinge_universal_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_universal_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_hinge_universal_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = sin(p[0]);
-    const real t1 = sin(q[1]);
-    const real t2 = t0 * t1;
-    const real t3 = S[15] * t2;
-    const real t4 = cos(q[1]);
-    const real t5 = t0 * t4;
-    const real t6 = S[16] * t5;
-    const real t7 = t3 + t6;
-    const real t8 = cos(p[0]);
-    const real t9 = S[17] * t8;
-    const real t10 = t7 + t9;
-    const real t11 = t2 * t10;
-    const real t12 = S[16] * t2;
-    const real t13 = S[18] * t5;
-    const real t14 = t12 + t13;
-    const real t15 = S[19] * t8;
-    const real t16 = t14 + t15;
-    const real t17 = t5 * t16;
-    const real t18 = t11 + t17;
-    const real t19 = S[17] * t2;
-    const real t20 = S[19] * t5;
-    const real t21 = t19 + t20;
-    const real t22 = S[20] * t8;
-    const real t23 = t21 + t22;
-    const real t24 = t8 * t23;
-    const real t25 = t18 + t24;
-    const real t26 = 0.0 < t25;
-    if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t27 = S[20] * ((real)1 / (real)10000000000000);
-    const real t28 = 1.0 / t25;
-    const real t29 = t23 * t28;
-    const real t30 = t23 * t29;
-    const real t31 = S[20] - t30;
-    const real t32 = t27 < t31;
-    if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t33 = t8 * t8;
-    const real t34 = t0 * t0;
-    const real t35 = t1 * t1;
-    const real t36 = t34 * t35;
-    const real t37 = t4 * t4;
-    const real t38 = t34 * t37;
-    const real t39 = t36 + t38;
-    const real t40 = t33 + t39;
-    const real t41 = 0.0 < floor_[1];
-    const real t42 = S[15] + S[18];
-    const real t43 = S[20] + t42;
-    const real t44 = ((real)1 / (real)300000000000000) * t43;
-    const real t45 = t41 != 0 ? floor_[1] : t44;
-    const real t46 = t40 * t45;
-    const real t47 = t46 < t25;
-    if (!(t47 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
-    const real t48 = t45 < S[20];
-    if (!(t48 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
-    const real t49 = S[3] * t2;
-    const real t50 = S[4] * t5;
-    const real t51 = t49 + t50;
-    const real t52 = S[5] * t8;
-    const real t53 = t51 + t52;
-    const real t54 = t53 * t28;
-    const real t55 = 1.0 / t31;
-    const real t56 = t53 * t29;
-    const real t57 = S[5] - t56;
-    const real t58 = t55 * t57;
-    const real t59 = t29 * t58;
-    const real t60 = t54 - t59;
-    G[0] = t60;
-    const real t61 = S[8] * t2;
-    const real t62 = S[9] * t5;
-    const real t63 = t61 + t62;
-    const real t64 = S[10] * t8;
-    const real t65 = t63 + t64;
-    const real t66 = t65 * t28;
-    const real t67 = t65 * t29;
-    const real t68 = S[10] - t67;
-    const real t69 = t55 * t68;
-    const real t70 = t29 * t69;
-    const real t71 = t66 - t70;
-    G[1] = t71;
-    const real t72 = S[12] * t2;
-    const real t73 = S[13] * t5;
-    const real t74 = t72 + t73;
-    const real t75 = S[14] * t8;
-    const real t76 = t74 + t75;
-    const real t77 = t76 * t28;
-    const real t78 = t76 * t29;
-    const real t79 = S[14] - t78;
-    const real t80 = t55 * t79;
-    const real t81 = t29 * t80;
-    const real t82 = t77 - t81;
-    G[2] = t82;
-    const real t83 = t10 * t28;
-    const real t84 = t10 * t29;
-    const real t85 = S[17] - t84;
-    const real t86 = t55 * t85;
-    const real t87 = t29 * t86;
-    const real t88 = t83 - t87;
-    G[3] = t88;
-    const real t89 = t16 * t28;
-    const real t90 = t16 * t29;
-    const real t91 = S[19] - t90;
-    const real t92 = t55 * t91;
-    const real t93 = t29 * t92;
-    const real t94 = t89 - t93;
-    G[4] = t94;
-    const real t95 = t31 * t55;
-    const real t96 = t29 * t95;
-    const real t97 = t29 - t96;
-    G[5] = t97;
-    G[6] = t58;
-    G[7] = t69;
-    G[8] = t80;
-    G[9] = t86;
-    G[10] = t92;
-    G[11] = t95;
-    const real t98 = e[3] * t2;
-    const real t99 = e[4] * t5;
-    const real t100 = t98 + t99;
-    const real t101 = e[5] * t8;
-    const real t102 = t100 + t101;
-    const real t103 = tau[0] - t102;
-    const real t104 = t28 * t103;
-    const real t105 = tau[1] - e[5];
-    const real t106 = t29 * t103;
-    const real t107 = t105 - t106;
-    const real t108 = t55 * t107;
-    const real t109 = t29 * t108;
-    const real t110 = t104 - t109;
-    g[0] = t110;
-    g[1] = t108;
-    const real t111 = t53 * t60;
-    const real t112 = S[5] * t58;
-    const real t113 = t111 + t112;
-    const real t114 = S[0] - t113;
-    const real t115 = Rc[0] * t114;
-    const real t116 = t53 * t71;
-    const real t117 = S[5] * t69;
-    const real t118 = t116 + t117;
-    const real t119 = S[1] - t118;
-    const real t120 = Rc[1] * t119;
-    const real t121 = t115 + t120;
-    const real t122 = t53 * t82;
-    const real t123 = S[5] * t80;
-    const real t124 = t122 + t123;
-    const real t125 = S[2] - t124;
-    const real t126 = Rc[2] * t125;
-    const real t127 = t121 + t126;
-    const real t128 = Rc[0] * t127;
-    const real t129 = Rc[0] * t119;
-    const real t130 = t65 * t71;
-    const real t131 = S[10] * t69;
-    const real t132 = t130 + t131;
-    const real t133 = S[6] - t132;
-    const real t134 = Rc[1] * t133;
-    const real t135 = t129 + t134;
-    const real t136 = t65 * t82;
-    const real t137 = S[10] * t80;
-    const real t138 = t136 + t137;
-    const real t139 = S[7] - t138;
-    const real t140 = Rc[2] * t139;
-    const real t141 = t135 + t140;
-    const real t142 = Rc[1] * t141;
-    const real t143 = t128 + t142;
-    const real t144 = Rc[0] * t125;
-    const real t145 = Rc[1] * t139;
-    const real t146 = t144 + t145;
-    const real t147 = t76 * t82;
-    const real t148 = S[14] * t80;
-    const real t149 = t147 + t148;
-    const real t150 = S[11] - t149;
-    const real t151 = Rc[2] * t150;
-    const real t152 = t146 + t151;
-    const real t153 = Rc[2] * t152;
-    const real t154 = t143 + t153;
-    S_I[0] += t154;
-    const real t155 = Rc[3] * t127;
-    const real t156 = Rc[4] * t141;
-    const real t157 = t155 + t156;
-    const real t158 = Rc[5] * t152;
-    const real t159 = t157 + t158;
-    S_I[1] += t159;
-    const real t160 = Rc[6] * t127;
-    const real t161 = Rc[7] * t141;
-    const real t162 = t160 + t161;
-    const real t163 = Rc[8] * t152;
-    const real t164 = t162 + t163;
-    S_I[2] += t164;
-    const real t165 = t53 * t88;
-    const real t166 = S[5] * t86;
-    const real t167 = t165 + t166;
-    const real t168 = S[3] - t167;
-    const real t169 = Rc[0] * t168;
-    const real t170 = t65 * t88;
-    const real t171 = S[10] * t86;
-    const real t172 = t170 + t171;
-    const real t173 = S[8] - t172;
-    const real t174 = Rc[1] * t173;
-    const real t175 = t169 + t174;
-    const real t176 = t76 * t88;
-    const real t177 = S[14] * t86;
-    const real t178 = t176 + t177;
-    const real t179 = S[12] - t178;
-    const real t180 = Rc[2] * t179;
-    const real t181 = t175 + t180;
-    const real t182 = Rc[0] * t181;
-    const real t183 = t53 * t94;
-    const real t184 = S[5] * t92;
-    const real t185 = t183 + t184;
-    const real t186 = S[4] - t185;
-    const real t187 = Rc[0] * t186;
-    const real t188 = t65 * t94;
-    const real t189 = S[10] * t92;
-    const real t190 = t188 + t189;
-    const real t191 = S[9] - t190;
-    const real t192 = Rc[1] * t191;
-    const real t193 = t187 + t192;
-    const real t194 = t76 * t94;
-    const real t195 = S[14] * t92;
-    const real t196 = t194 + t195;
-    const real t197 = S[13] - t196;
-    const real t198 = Rc[2] * t197;
-    const real t199 = t193 + t198;
-    const real t200 = Rc[1] * t199;
-    const real t201 = t182 + t200;
-    const real t202 = r[1] * t164;
-    const real t203 = r[2] * t159;
-    const real t204 = t202 - t203;
-    const real t205 = t201 + t204;
-    S_I[3] += t205;
-    const real t206 = Rc[3] * t181;
-    const real t207 = Rc[4] * t199;
-    const real t208 = t206 + t207;
-    const real t209 = r[2] * t154;
-    const real t210 = r[0] * t164;
-    const real t211 = t209 - t210;
-    const real t212 = t208 + t211;
-    S_I[4] += t212;
-    const real t213 = Rc[6] * t181;
-    const real t214 = Rc[7] * t199;
-    const real t215 = t213 + t214;
-    const real t216 = r[0] * t159;
-    const real t217 = r[1] * t154;
-    const real t218 = t216 - t217;
-    const real t219 = t215 + t218;
-    S_I[5] += t219;
-    const real t220 = Rc[3] * t114;
-    const real t221 = Rc[4] * t119;
-    const real t222 = t220 + t221;
-    const real t223 = Rc[5] * t125;
-    const real t224 = t222 + t223;
-    const real t225 = Rc[3] * t224;
-    const real t226 = Rc[3] * t119;
-    const real t227 = Rc[4] * t133;
-    const real t228 = t226 + t227;
-    const real t229 = Rc[5] * t139;
-    const real t230 = t228 + t229;
-    const real t231 = Rc[4] * t230;
-    const real t232 = t225 + t231;
-    const real t233 = Rc[3] * t125;
-    const real t234 = Rc[4] * t139;
-    const real t235 = t233 + t234;
-    const real t236 = Rc[5] * t150;
-    const real t237 = t235 + t236;
-    const real t238 = Rc[5] * t237;
-    const real t239 = t232 + t238;
-    S_I[6] += t239;
-    const real t240 = Rc[6] * t224;
-    const real t241 = Rc[7] * t230;
-    const real t242 = t240 + t241;
-    const real t243 = Rc[8] * t237;
-    const real t244 = t242 + t243;
-    S_I[7] += t244;
-    const real t245 = Rc[3] * t168;
-    const real t246 = Rc[4] * t173;
-    const real t247 = t245 + t246;
-    const real t248 = Rc[5] * t179;
-    const real t249 = t247 + t248;
-    const real t250 = Rc[0] * t249;
-    const real t251 = Rc[3] * t186;
-    const real t252 = Rc[4] * t191;
-    const real t253 = t251 + t252;
-    const real t254 = Rc[5] * t197;
-    const real t255 = t253 + t254;
-    const real t256 = Rc[1] * t255;
-    const real t257 = t250 + t256;
-    const real t258 = r[1] * t244;
-    const real t259 = r[2] * t239;
-    const real t260 = t258 - t259;
-    const real t261 = t257 + t260;
-    S_I[8] += t261;
-    const real t262 = Rc[3] * t249;
-    const real t263 = Rc[4] * t255;
-    const real t264 = t262 + t263;
-    const real t265 = r[0] * t244;
-    const real t266 = t203 - t265;
-    const real t267 = t264 + t266;
-    S_I[9] += t267;
-    const real t268 = Rc[6] * t249;
-    const real t269 = Rc[7] * t255;
-    const real t270 = t268 + t269;
-    const real t271 = r[0] * t239;
-    const real t272 = r[1] * t159;
-    const real t273 = t271 - t272;
-    const real t274 = t270 + t273;
-    S_I[10] += t274;
-    const real t275 = Rc[6] * t114;
-    const real t276 = Rc[7] * t119;
-    const real t277 = t275 + t276;
-    const real t278 = Rc[8] * t125;
-    const real t279 = t277 + t278;
-    const real t280 = Rc[6] * t279;
-    const real t281 = Rc[6] * t119;
-    const real t282 = Rc[7] * t133;
-    const real t283 = t281 + t282;
-    const real t284 = Rc[8] * t139;
-    const real t285 = t283 + t284;
-    const real t286 = Rc[7] * t285;
-    const real t287 = t280 + t286;
-    const real t288 = Rc[6] * t125;
-    const real t289 = Rc[7] * t139;
-    const real t290 = t288 + t289;
-    const real t291 = Rc[8] * t150;
-    const real t292 = t290 + t291;
-    const real t293 = Rc[8] * t292;
-    const real t294 = t287 + t293;
-    S_I[11] += t294;
-    const real t295 = Rc[6] * t168;
-    const real t296 = Rc[7] * t173;
-    const real t297 = t295 + t296;
-    const real t298 = Rc[8] * t179;
-    const real t299 = t297 + t298;
-    const real t300 = Rc[0] * t299;
-    const real t301 = Rc[6] * t186;
-    const real t302 = Rc[7] * t191;
-    const real t303 = t301 + t302;
-    const real t304 = Rc[8] * t197;
-    const real t305 = t303 + t304;
-    const real t306 = Rc[1] * t305;
-    const real t307 = t300 + t306;
-    const real t308 = r[1] * t294;
-    const real t309 = r[2] * t244;
-    const real t310 = t308 - t309;
-    const real t311 = t307 + t310;
-    S_I[12] += t311;
-    const real t312 = Rc[3] * t299;
-    const real t313 = Rc[4] * t305;
-    const real t314 = t312 + t313;
-    const real t315 = r[2] * t164;
-    const real t316 = r[0] * t294;
-    const real t317 = t315 - t316;
-    const real t318 = t314 + t317;
-    S_I[13] += t318;
-    const real t319 = Rc[6] * t299;
-    const real t320 = Rc[7] * t305;
-    const real t321 = t319 + t320;
-    const real t322 = t265 - t202;
-    const real t323 = t321 + t322;
-    S_I[14] += t323;
-    const real t324 = t10 * t88;
-    const real t325 = S[17] * t86;
-    const real t326 = t324 + t325;
-    const real t327 = S[15] - t326;
-    const real t328 = Rc[0] * t327;
-    const real t329 = t10 * t94;
-    const real t330 = S[17] * t92;
-    const real t331 = t329 + t330;
-    const real t332 = S[16] - t331;
-    const real t333 = Rc[1] * t332;
-    const real t334 = t328 + t333;
-    const real t335 = Rc[0] * t334;
-    const real t336 = Rc[0] * t332;
-    const real t337 = t16 * t94;
-    const real t338 = S[19] * t92;
-    const real t339 = t337 + t338;
-    const real t340 = S[18] - t339;
-    const real t341 = Rc[1] * t340;
-    const real t342 = t336 + t341;
-    const real t343 = Rc[1] * t342;
-    const real t344 = t335 + t343;
-    const real t345 = r[1] * t311;
-    const real t346 = r[2] * t261;
-    const real t347 = t345 - t346;
-    const real t348 = r[1] * t307;
-    const real t349 = r[2] * t257;
-    const real t350 = t348 - t349;
-    const real t351 = t347 + t350;
-    const real t352 = t344 + t351;
-    S_I[15] += t352;
-    const real t353 = Rc[3] * t334;
-    const real t354 = Rc[4] * t342;
-    const real t355 = t353 + t354;
-    const real t356 = r[1] * t318;
-    const real t357 = r[2] * t267;
-    const real t358 = t356 - t357;
-    const real t359 = r[2] * t201;
-    const real t360 = r[0] * t307;
-    const real t361 = t359 - t360;
-    const real t362 = t358 + t361;
-    const real t363 = t355 + t362;
-    S_I[16] += t363;
-    const real t364 = Rc[6] * t334;
-    const real t365 = Rc[7] * t342;
-    const real t366 = t364 + t365;
-    const real t367 = r[1] * t323;
-    const real t368 = r[2] * t274;
-    const real t369 = t367 - t368;
-    const real t370 = r[0] * t257;
-    const real t371 = r[1] * t201;
-    const real t372 = t370 - t371;
-    const real t373 = t369 + t372;
-    const real t374 = t366 + t373;
-    S_I[17] += t374;
-    const real t375 = Rc[3] * t327;
-    const real t376 = Rc[4] * t332;
-    const real t377 = t375 + t376;
-    const real t378 = Rc[3] * t377;
-    const real t379 = Rc[3] * t332;
-    const real t380 = Rc[4] * t340;
-    const real t381 = t379 + t380;
-    const real t382 = Rc[4] * t381;
-    const real t383 = t378 + t382;
-    const real t384 = r[2] * t212;
-    const real t385 = r[0] * t318;
-    const real t386 = t384 - t385;
-    const real t387 = r[2] * t208;
-    const real t388 = r[0] * t314;
-    const real t389 = t387 - t388;
-    const real t390 = t386 + t389;
-    const real t391 = t383 + t390;
-    S_I[18] += t391;
-    const real t392 = Rc[6] * t377;
-    const real t393 = Rc[7] * t381;
-    const real t394 = t392 + t393;
-    const real t395 = r[2] * t219;
-    const real t396 = r[0] * t323;
-    const real t397 = t395 - t396;
-    const real t398 = r[0] * t264;
-    const real t399 = r[1] * t208;
-    const real t400 = t398 - t399;
-    const real t401 = t397 + t400;
-    const real t402 = t394 + t401;
-    S_I[19] += t402;
-    const real t403 = Rc[6] * t327;
-    const real t404 = Rc[7] * t332;
-    const real t405 = t403 + t404;
-    const real t406 = Rc[6] * t405;
-    const real t407 = Rc[6] * t332;
-    const real t408 = Rc[7] * t340;
-    const real t409 = t407 + t408;
-    const real t410 = Rc[7] * t409;
-    const real t411 = t406 + t410;
-    const real t412 = r[0] * t274;
-    const real t413 = r[1] * t219;
-    const real t414 = t412 - t413;
-    const real t415 = r[0] * t270;
-    const real t416 = r[1] * t215;
-    const real t417 = t415 - t416;
-    const real t418 = t414 + t417;
-    const real t419 = t411 + t418;
-    S_I[20] += t419;
-    const real t420 = t53 * t110;
-    const real t421 = S[5] * t108;
-    const real t422 = t420 + t421;
-    const real t423 = e[0] + t422;
-    const real t424 = Rc[0] * t423;
-    const real t425 = t65 * t110;
-    const real t426 = S[10] * t108;
-    const real t427 = t425 + t426;
-    const real t428 = e[1] + t427;
-    const real t429 = Rc[1] * t428;
-    const real t430 = t424 + t429;
-    const real t431 = t76 * t110;
-    const real t432 = S[14] * t108;
-    const real t433 = t431 + t432;
-    const real t434 = e[2] + t433;
-    const real t435 = Rc[2] * t434;
-    const real t436 = t430 + t435;
-    e_I[0] += t436;
-    const real t437 = Rc[3] * t423;
-    const real t438 = Rc[4] * t428;
-    const real t439 = t437 + t438;
-    const real t440 = Rc[5] * t434;
-    const real t441 = t439 + t440;
-    e_I[1] += t441;
-    const real t442 = Rc[6] * t423;
-    const real t443 = Rc[7] * t428;
-    const real t444 = t442 + t443;
-    const real t445 = Rc[8] * t434;
-    const real t446 = t444 + t445;
-    e_I[2] += t446;
-    const real t447 = t10 * t110;
-    const real t448 = S[17] * t108;
-    const real t449 = t447 + t448;
-    const real t450 = e[3] + t449;
-    const real t451 = Rc[0] * t450;
-    const real t452 = t16 * t110;
-    const real t453 = S[19] * t108;
-    const real t454 = t452 + t453;
-    const real t455 = e[4] + t454;
-    const real t456 = Rc[1] * t455;
-    const real t457 = t451 + t456;
-    const real t458 = Rc[2] * tau[1];
-    const real t459 = t457 + t458;
-    const real t460 = Rc[6] * r[1];
-    const real t461 = Rc[3] * r[2];
-    const real t462 = t460 - t461;
-    const real t463 = t423 * t462;
-    const real t464 = Rc[7] * r[1];
-    const real t465 = Rc[4] * r[2];
-    const real t466 = t464 - t465;
-    const real t467 = t428 * t466;
-    const real t468 = t463 + t467;
-    const real t469 = Rc[8] * r[1];
-    const real t470 = Rc[5] * r[2];
-    const real t471 = t469 - t470;
-    const real t472 = t434 * t471;
-    const real t473 = t468 + t472;
-    const real t474 = t459 + t473;
-    e_I[3] += t474;
-    const real t475 = Rc[3] * t450;
-    const real t476 = Rc[4] * t455;
-    const real t477 = t475 + t476;
-    const real t478 = Rc[5] * tau[1];
-    const real t479 = t477 + t478;
-    const real t480 = Rc[0] * r[2];
-    const real t481 = Rc[6] * r[0];
-    const real t482 = t480 - t481;
-    const real t483 = t423 * t482;
-    const real t484 = Rc[1] * r[2];
-    const real t485 = Rc[7] * r[0];
-    const real t486 = t484 - t485;
-    const real t487 = t428 * t486;
-    const real t488 = t483 + t487;
-    const real t489 = Rc[2] * r[2];
-    const real t490 = Rc[8] * r[0];
-    const real t491 = t489 - t490;
-    const real t492 = t434 * t491;
-    const real t493 = t488 + t492;
-    const real t494 = t479 + t493;
-    e_I[4] += t494;
-    const real t495 = Rc[6] * t450;
-    const real t496 = Rc[7] * t455;
-    const real t497 = t495 + t496;
-    const real t498 = Rc[8] * tau[1];
-    const real t499 = t497 + t498;
-    const real t500 = Rc[3] * r[0];
-    const real t501 = Rc[0] * r[1];
-    const real t502 = t500 - t501;
-    const real t503 = t423 * t502;
-    const real t504 = Rc[4] * r[0];
-    const real t505 = Rc[1] * r[1];
-    const real t506 = t504 - t505;
-    const real t507 = t428 * t506;
-    const real t508 = t503 + t507;
-    const real t509 = Rc[5] * r[0];
-    const real t510 = Rc[2] * r[1];
-    const real t511 = t509 - t510;
-    const real t512 = t434 * t511;
-    const real t513 = t508 + t512;
-    const real t514 = t499 + t513;
-    e_I[5] += t514;
-    return 0;
+  real t0 = sin(p[0]);
+  real t1 = sin(q[1]);
+  real t2 = t0 * t1;
+  real t4 = cos(q[1]);
+  real t5 = t0 * t4;
+  real t8 = cos(p[0]);
+  real t10 = S[15] * t2 + S[16] * t5 + S[17] * t8;
+  real t16 = S[16] * t2 + S[18] * t5 + S[19] * t8;
+  real t23 = S[17] * t2 + S[19] * t5 + S[20] * t8;
+  real t25 = t2 * t10 + t5 * t16 + t8 * t23;
+  real t26 = 0.0 < t25;
+  if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t28 = 1.0 / t25;
+  real t29 = t23 * t28;
+  real t31 = S[20] - t23 * t29;
+  real t32 = S[20] * ((real)1 / (real)10000000000000) < t31;
+  if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t26 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t32 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t34 = t0 * t0;
+  real t44 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t45 = (0.0 < floor_[1]) ? floor_[1] : t44;
+  if (!(((t8 * t8 + (t34 * (t1 * t1) + t34 * (t4 * t4))) * t45 < t25))) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+  if (!((t45 < S[20]))) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+  real t53 = S[3] * t2 + S[4] * t5 + S[5] * t8;
+  real t55 = 1.0 / t31;
+  real t58 = t55 * (S[5] - t53 * t29);
+  real t60 = t53 * t28 - t29 * t58;
+  G[0] = t60;
+  real t65 = S[8] * t2 + S[9] * t5 + S[10] * t8;
+  real t69 = t55 * (S[10] - t65 * t29);
+  real t71 = t65 * t28 - t29 * t69;
+  G[1] = t71;
+  real t76 = S[12] * t2 + S[13] * t5 + S[14] * t8;
+  real t80 = t55 * (S[14] - t76 * t29);
+  real t82 = t76 * t28 - t29 * t80;
+  G[2] = t82;
+  real t86 = t55 * (S[17] - t10 * t29);
+  real t88 = t10 * t28 - t29 * t86;
+  G[3] = t88;
+  real t92 = t55 * (S[19] - t16 * t29);
+  real t94 = t16 * t28 - t29 * t92;
+  G[4] = t94;
+  real t95 = t31 * t55;
+  G[5] = t29 - t29 * t95;
+  G[6] = t58;
+  G[7] = t69;
+  G[8] = t80;
+  G[9] = t86;
+  G[10] = t92;
+  G[11] = t95;
+  real t103 = tau[0] - (e[3] * t2 + e[4] * t5 + e[5] * t8);
+  real t108 = t55 * (tau[1] - e[5] - t29 * t103);
+  real t110 = t28 * t103 - t29 * t108;
+  g[0] = t110;
+  g[1] = t108;
+  real t114 = S[0] - (t53 * t60 + S[5] * t58);
+  real t119 = S[1] - (t53 * t71 + S[5] * t69);
+  real t125 = S[2] - (t53 * t82 + S[5] * t80);
+  real t127 = Rc[0] * t114 + Rc[1] * t119 + Rc[2] * t125;
+  real t133 = S[6] - (t65 * t71 + S[10] * t69);
+  real t139 = S[7] - (t65 * t82 + S[10] * t80);
+  real t141 = Rc[0] * t119 + Rc[1] * t133 + Rc[2] * t139;
+  real t150 = S[11] - (t76 * t82 + S[14] * t80);
+  real t152 = Rc[0] * t125 + Rc[1] * t139 + Rc[2] * t150;
+  real t154 = Rc[0] * t127 + Rc[1] * t141 + Rc[2] * t152;
+  S_I[0] += t154;
+  real t159 = Rc[3] * t127 + Rc[4] * t141 + Rc[5] * t152;
+  S_I[1] += t159;
+  real t164 = Rc[6] * t127 + Rc[7] * t141 + Rc[8] * t152;
+  S_I[2] += t164;
+  real t168 = S[3] - (t53 * t88 + S[5] * t86);
+  real t173 = S[8] - (t65 * t88 + S[10] * t86);
+  real t179 = S[12] - (t76 * t88 + S[14] * t86);
+  real t181 = Rc[0] * t168 + Rc[1] * t173 + Rc[2] * t179;
+  real t186 = S[4] - (t53 * t94 + S[5] * t92);
+  real t191 = S[9] - (t65 * t94 + S[10] * t92);
+  real t197 = S[13] - (t76 * t94 + S[14] * t92);
+  real t199 = Rc[0] * t186 + Rc[1] * t191 + Rc[2] * t197;
+  real t201 = Rc[0] * t181 + Rc[1] * t199;
+  real t202 = r[1] * t164;
+  real t203 = r[2] * t159;
+  S_I[3] += t201 + (t202 - t203);
+  real t208 = Rc[3] * t181 + Rc[4] * t199;
+  real t212 = t208 + (r[2] * t154 - r[0] * t164);
+  S_I[4] += t212;
+  real t215 = Rc[6] * t181 + Rc[7] * t199;
+  real t219 = t215 + (r[0] * t159 - r[1] * t154);
+  S_I[5] += t219;
+  real t224 = Rc[3] * t114 + Rc[4] * t119 + Rc[5] * t125;
+  real t230 = Rc[3] * t119 + Rc[4] * t133 + Rc[5] * t139;
+  real t237 = Rc[3] * t125 + Rc[4] * t139 + Rc[5] * t150;
+  real t239 = Rc[3] * t224 + Rc[4] * t230 + Rc[5] * t237;
+  S_I[6] += t239;
+  real t244 = Rc[6] * t224 + Rc[7] * t230 + Rc[8] * t237;
+  S_I[7] += t244;
+  real t249 = Rc[3] * t168 + Rc[4] * t173 + Rc[5] * t179;
+  real t255 = Rc[3] * t186 + Rc[4] * t191 + Rc[5] * t197;
+  real t257 = Rc[0] * t249 + Rc[1] * t255;
+  real t261 = t257 + (r[1] * t244 - r[2] * t239);
+  S_I[8] += t261;
+  real t264 = Rc[3] * t249 + Rc[4] * t255;
+  real t265 = r[0] * t244;
+  real t267 = t264 + (t203 - t265);
+  S_I[9] += t267;
+  real t270 = Rc[6] * t249 + Rc[7] * t255;
+  real t274 = t270 + (r[0] * t239 - r[1] * t159);
+  S_I[10] += t274;
+  real t294 = Rc[6] * (Rc[6] * t114 + Rc[7] * t119 + Rc[8] * t125) + Rc[7] * (Rc[6] * t119 + Rc[7] *
+    t133 + Rc[8] * t139) + Rc[8] * (Rc[6] * t125 + Rc[7] * t139 + Rc[8] * t150);
+  S_I[11] += t294;
+  real t299 = Rc[6] * t168 + Rc[7] * t173 + Rc[8] * t179;
+  real t305 = Rc[6] * t186 + Rc[7] * t191 + Rc[8] * t197;
+  real t307 = Rc[0] * t299 + Rc[1] * t305;
+  real t311 = t307 + (r[1] * t294 - r[2] * t244);
+  S_I[12] += t311;
+  real t314 = Rc[3] * t299 + Rc[4] * t305;
+  real t318 = t314 + (r[2] * t164 - r[0] * t294);
+  S_I[13] += t318;
+  real t323 = Rc[6] * t299 + Rc[7] * t305 + (t265 - t202);
+  S_I[14] += t323;
+  real t327 = S[15] - (t10 * t88 + S[17] * t86);
+  real t332 = S[16] - (t10 * t94 + S[17] * t92);
+  real t334 = Rc[0] * t327 + Rc[1] * t332;
+  real t340 = S[18] - (t16 * t94 + S[19] * t92);
+  real t342 = Rc[0] * t332 + Rc[1] * t340;
+  S_I[15] += Rc[0] * t334 + Rc[1] * t342 + (r[1] * t311 - r[2] * t261 + (r[1] * t307 - r[2] *
+    t257));
+  S_I[16] += Rc[3] * t334 + Rc[4] * t342 + (r[1] * t318 - r[2] * t267 + (r[2] * t201 - r[0] *
+    t307));
+  S_I[17] += Rc[6] * t334 + Rc[7] * t342 + (r[1] * t323 - r[2] * t274 + (r[0] * t257 - r[1] *
+    t201));
+  real t377 = Rc[3] * t327 + Rc[4] * t332;
+  real t381 = Rc[3] * t332 + Rc[4] * t340;
+  S_I[18] += Rc[3] * t377 + Rc[4] * t381 + (r[2] * t212 - r[0] * t318 + (r[2] * t208 - r[0] *
+    t314));
+  S_I[19] += Rc[6] * t377 + Rc[7] * t381 + (r[2] * t219 - r[0] * t323 + (r[0] * t264 - r[1] *
+    t208));
+  S_I[20] += Rc[6] * (Rc[6] * t327 + Rc[7] * t332) + Rc[7] * (Rc[6] * t332 + Rc[7] * t340) + (r[0] *
+    t274 - r[1] * t219 + (r[0] * t270 - r[1] * t215));
+  real t423 = e[0] + (t53 * t110 + S[5] * t108);
+  real t428 = e[1] + (t65 * t110 + S[10] * t108);
+  real t434 = e[2] + (t76 * t110 + S[14] * t108);
+  e_I[0] += Rc[0] * t423 + Rc[1] * t428 + Rc[2] * t434;
+  e_I[1] += Rc[3] * t423 + Rc[4] * t428 + Rc[5] * t434;
+  e_I[2] += Rc[6] * t423 + Rc[7] * t428 + Rc[8] * t434;
+  real t450 = e[3] + (t10 * t110 + S[17] * t108);
+  real t455 = e[4] + (t16 * t110 + S[19] * t108);
+  e_I[3] += Rc[0] * t450 + Rc[1] * t455 + Rc[2] * tau[1] + (t423 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t428 * (Rc[7] * r[1] - Rc[4] * r[2]) + t434 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t450 + Rc[4] * t455 + Rc[5] * tau[1] + (t423 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t428 * (Rc[1] * r[2] - Rc[7] * r[0]) + t434 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t450 + Rc[7] * t455 + Rc[8] * tau[1] + (t423 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t428 * (Rc[4] * r[0] - Rc[1] * r[1]) + t434 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_hinge_universal_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_universal_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_condense_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_hinge_universal_condense_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_hinge_universal_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 2 free speeds
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -1034,120 +350,34 @@ static const mstmm_guard mstmm_hinge_universal_condense_guards[] = {
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_universal_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict p, const real *restrict q, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_hinge_universal_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    delta[0] = t16;
-    delta[1] = t22;
-    delta[2] = t29;
-    const real t66 = sin(p[0]);
-    const real t67 = sin(q[1]);
-    const real t68 = t66 * t67;
-    const real t69 = t53 * t68;
-    const real t70 = t36 + t69;
-    delta[3] = t70;
-    const real t71 = cos(q[1]);
-    const real t72 = t66 * t71;
-    const real t73 = t53 * t72;
-    const real t74 = t43 + t73;
-    delta[4] = t74;
-    const real t75 = cos(p[0]);
-    const real t76 = t53 * t75;
-    const real t77 = t65 + t76;
-    const real t78 = t50 + t77;
-    delta[5] = t78;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  delta[0] = t16;
+  delta[1] = t22;
+  delta[2] = t29;
+  real t66 = sin(p[0]);
+  delta[3] = t36 + t53 * (t66 * sin(q[1]));
+  delta[4] = t43 + t53 * (t66 * cos(q[1]));
+  delta[5] = t50 + (t65 + t53 * cos(p[0]));
+  return 0;
 }
 
-static int mstmm_hinge_universal_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_hinge_universal_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_recover_outputs[] = {
-    {"udot", 2, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 /* hinge and its derivative along a direction
  * in  p[1] parameters: alpha [rad]
@@ -1163,144 +393,54 @@ static const mstmm_port mstmm_hinge_universal_recover_outputs[] = {
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[2] derivative of qdot
  */
-int mstmm_hinge_universal_hinge_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict d_q, const real *restrict d_u, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c, real *restrict d_qdot)
+int mstmm_hinge_universal_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R,
+    out_t d_d, out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
-    const real t0 = cos(p[0]);
-    const real t1 = sin(q[1]);
-    const real t2 = cos(q[0]);
-    const real t3 = t2 * d_q[0];
-    const real t4 = t1 * t3;
-    const real t5 = sin(q[0]);
-    const real t6 = cos(q[1]);
-    const real t7 = t6 * d_q[1];
-    const real t8 = t5 * t7;
-    const real t9 = t4 + t8;
-    const real t10 = t0 * t9;
-    const real t11 = t5 * d_q[0];
-    const real t12 = t6 * t11;
-    const real t13 = t1 * d_q[1];
-    const real t14 = t2 * t13;
-    const real t15 = t12 + t14;
-    const real t16 = t10 + t15;
-    const real t17 = -t16;
-    d_R[0] = t17;
-    const real t18 = t0 * t3;
-    const real t19 = t6 * t18;
-    const real t20 = t5 * t0;
-    const real t21 = t20 * t13;
-    const real t22 = t19 - t21;
-    const real t23 = t2 * t7;
-    const real t24 = t1 * t11;
-    const real t25 = t23 - t24;
-    const real t26 = t22 + t25;
-    const real t27 = -t26;
-    d_R[1] = t27;
-    const real t28 = sin(p[0]);
-    const real t29 = t28 * t3;
-    d_R[2] = t29;
-    const real t30 = t0 * t7;
-    const real t31 = t2 * t30;
-    const real t32 = t1 * t0;
-    const real t33 = t32 * t11;
-    const real t34 = t31 - t33;
-    const real t35 = t6 * t3;
-    const real t36 = t5 * t13;
-    const real t37 = t35 - t36;
-    const real t38 = t34 + t37;
-    d_R[3] = t38;
-    const real t39 = t2 * t0;
-    const real t40 = t39 * t13;
-    const real t41 = t0 * t11;
-    const real t42 = t6 * t41;
-    const real t43 = t40 + t42;
-    const real t44 = t9 + t43;
-    const real t45 = -t44;
-    d_R[4] = t45;
-    const real t46 = t28 * t11;
-    d_R[5] = t46;
-    const real t47 = t28 * t7;
-    d_R[6] = t47;
-    const real t48 = t28 * t13;
-    const real t49 = -t48;
-    d_R[7] = t49;
-    d_R[8] = 0.0;
-    d_d[0] = 0.0;
-    d_d[1] = 0.0;
-    d_d[2] = 0.0;
-    d_H[0] = 0.0;
-    d_H[1] = 0.0;
-    d_H[2] = 0.0;
-    d_H[3] = 0.0;
-    d_H[4] = 0.0;
-    d_H[5] = 0.0;
-    d_H[6] = t47;
-    d_H[7] = 0.0;
-    d_H[8] = t49;
-    d_H[9] = 0.0;
-    d_H[10] = 0.0;
-    d_H[11] = 0.0;
-    d_v[0] = 0.0;
-    d_v[1] = 0.0;
-    d_v[2] = 0.0;
-    const real t50 = u[0] * t47;
-    const real t51 = t1 * t28;
-    const real t52 = t51 * d_u[0];
-    const real t53 = t50 + t52;
-    d_w[0] = t53;
-    const real t54 = t6 * t28;
-    const real t55 = t54 * d_u[0];
-    const real t56 = u[0] * t48;
-    const real t57 = t55 - t56;
-    d_w[1] = t57;
-    const real t58 = t0 * d_u[0];
-    const real t59 = d_u[1] + t58;
-    d_w[2] = t59;
-    d_c[0] = 0.0;
-    d_c[1] = 0.0;
-    d_c[2] = 0.0;
-    const real t60 = u[1] * t57;
-    const real t61 = t54 * u[0];
-    const real t62 = t61 * d_u[1];
-    const real t63 = t60 + t62;
-    d_c[3] = t63;
-    const real t64 = u[1] * t53;
-    const real t65 = t51 * u[0];
-    const real t66 = t65 * d_u[1];
-    const real t67 = t64 + t66;
-    const real t68 = -t67;
-    d_c[4] = t68;
-    d_c[5] = 0.0;
-    d_qdot[0] = d_u[0];
-    d_qdot[1] = d_u[1];
-    return 0;
+  real t0 = cos(p[0]);
+  real t1 = sin(q[1]);
+  real t2 = cos(q[0]);
+  real t3 = t2 * d_q[0];
+  real t5 = sin(q[0]);
+  real t6 = cos(q[1]);
+  real t7 = t6 * d_q[1];
+  real t9 = t1 * t3 + t5 * t7;
+  real t11 = t5 * d_q[0];
+  real t13 = t1 * d_q[1];
+  d_R[0] = -(t0 * t9 + (t6 * t11 + t2 * t13));
+  d_R[1] = -(t6 * (t0 * t3) - t5 * t0 * t13 + (t2 * t7 - t1 * t11));
+  real t28 = sin(p[0]);
+  d_R[2] = t28 * t3;
+  d_R[3] = t2 * (t0 * t7) - t1 * t0 * t11 + (t6 * t3 - t5 * t13);
+  d_R[4] = -(t9 + (t2 * t0 * t13 + t6 * (t0 * t11)));
+  d_R[5] = t28 * t11;
+  real t47 = t28 * t7;
+  d_R[6] = t47;
+  real t48 = t28 * t13;
+  real t49 = -t48;
+  d_R[7] = t49;
+  d_R[8] = d_d[0] = d_d[1] = d_d[2] = d_H[0] = d_H[1] = d_H[2] = d_H[3] = d_H[4] = d_H[5] = 0.0;
+  d_H[6] = t47;
+  d_H[7] = 0.0;
+  d_H[8] = t49;
+  d_H[9] = d_H[10] = d_H[11] = d_v[0] = d_v[1] = d_v[2] = 0.0;
+  real t51 = t1 * t28;
+  real t53 = u[0] * t47 + t51 * d_u[0];
+  d_w[0] = t53;
+  real t54 = t6 * t28;
+  real t57 = t54 * d_u[0] - u[0] * t48;
+  d_w[1] = t57;
+  d_w[2] = d_u[1] + t0 * d_u[0];
+  d_c[0] = d_c[1] = d_c[2] = 0.0;
+  d_c[3] = u[1] * t57 + t54 * u[0] * d_u[1];
+  d_c[4] = -(u[1] * t53 + t51 * u[0] * d_u[1]);
+  d_c[5] = 0.0;
+  d_qdot[0] = d_u[0];
+  d_qdot[1] = d_u[1];
+  return 0;
 }
 
-static int mstmm_hinge_universal_hinge_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_hinge_slope(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_hinge_universal_hinge_slope_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"d_q", 2, "", 0, 0},
-    {"d_u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_hinge_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H", 12, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* hinge by q
  * in  p[1] parameters: alpha [rad]
@@ -1308,34 +448,16 @@ static const mstmm_port mstmm_hinge_universal_hinge_slope_outputs[] = {
  * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * out J[2][2] qdot by q, transposed
  */
-int mstmm_hinge_universal_rates_by_coordinates(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_universal_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 0.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 0.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = J[1] = J[2] = J[3] = 0.0;
+  return 0;
 }
 
-static int mstmm_hinge_universal_rates_by_coordinates_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_rates_by_coordinates(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_universal_rates_by_coordinates_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_rates_by_coordinates_outputs[] = {
-    {"J", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
 
 /* hinge by u
  * in  p[1] parameters: alpha [rad]
@@ -1343,34 +465,18 @@ static const mstmm_port mstmm_hinge_universal_rates_by_coordinates_outputs[] = {
  * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * out J[2][2] qdot by u, transposed
  */
-int mstmm_hinge_universal_rates_by_speeds(const real *restrict p, const real *restrict q,
-    const real *restrict u, real *restrict J)
+int mstmm_hinge_universal_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
-    (void)p;
-    (void)q;
-    (void)u;
-    J[0] = 1.0;
-    J[1] = 0.0;
-    J[2] = 0.0;
-    J[3] = 1.0;
-    return 0;
+  (void)p;
+  (void)q;
+  (void)u;
+  J[0] = 1.0;
+  J[1] = J[2] = 0.0;
+  J[3] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_universal_rates_by_speeds_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_rates_by_speeds(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_hinge_universal_rates_by_speeds_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_rates_by_speeds_outputs[] = {
-    {"J", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_rates_by_speeds, (in[0], in[1], in[2], out[0]))
 
 /* motion across the hinge and of its outboard body
  * in  p[1] parameters: alpha [rad]
@@ -1391,283 +497,109 @@ static const mstmm_port mstmm_hinge_universal_rates_by_speeds_outputs[] = {
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_universal_body_motion(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict Rt, const real *restrict ro,
-    const real *restrict s, const real *restrict motion_I, real *restrict R, real *restrict d,
-    real *restrict H, real *restrict v, real *restrict w, real *restrict c, real *restrict qdot,
-    real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_hinge_universal_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s,
+    in_t motion_I, out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc,
+    out_t r, out_t motion)
 {
-    const real t0 = cos(q[0]);
-    const real t1 = cos(q[1]);
-    const real t2 = t0 * t1;
-    const real t3 = sin(q[0]);
-    const real t4 = sin(q[1]);
-    const real t5 = t3 * t4;
-    const real t6 = cos(p[0]);
-    const real t7 = t5 * t6;
-    const real t8 = t2 - t7;
-    R[0] = t8;
-    const real t9 = t0 * t4;
-    const real t10 = t3 * t6;
-    const real t11 = t1 * t10;
-    const real t12 = t9 + t11;
-    const real t13 = -t12;
-    R[1] = t13;
-    const real t14 = sin(p[0]);
-    const real t15 = t3 * t14;
-    R[2] = t15;
-    const real t16 = t1 * t3;
-    const real t17 = t4 * t6;
-    const real t18 = t0 * t17;
-    const real t19 = t16 + t18;
-    R[3] = t19;
-    const real t20 = t0 * t6;
-    const real t21 = t1 * t20;
-    const real t22 = t21 - t5;
-    R[4] = t22;
-    const real t23 = t0 * t14;
-    const real t24 = -t23;
-    R[5] = t24;
-    const real t25 = t4 * t14;
-    R[6] = t25;
-    const real t26 = t1 * t14;
-    R[7] = t26;
-    R[8] = t6;
-    d[0] = 0.0;
-    d[1] = 0.0;
-    d[2] = 0.0;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = t25;
-    H[7] = 0.0;
-    H[8] = t26;
-    H[9] = 0.0;
-    H[10] = t6;
-    H[11] = 1.0;
-    v[0] = 0.0;
-    v[1] = 0.0;
-    v[2] = 0.0;
-    const real t27 = u[0] * t25;
-    w[0] = t27;
-    const real t28 = u[0] * t26;
-    w[1] = t28;
-    const real t29 = u[0] * t6;
-    const real t30 = u[1] + t29;
-    w[2] = t30;
-    c[0] = 0.0;
-    c[1] = 0.0;
-    c[2] = 0.0;
-    const real t31 = u[1] * t28;
-    c[3] = t31;
-    const real t32 = u[1] * t27;
-    const real t33 = -t32;
-    c[4] = t33;
-    c[5] = 0.0;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    const real t34 = t8 * Rt[0];
-    const real t35 = t19 * Rt[1];
-    const real t36 = t34 + t35;
-    const real t37 = t25 * Rt[2];
-    const real t38 = t36 + t37;
-    Rc[0] = t38;
-    const real t39 = t22 * Rt[1];
-    const real t40 = t12 * Rt[0];
-    const real t41 = t39 - t40;
-    const real t42 = t26 * Rt[2];
-    const real t43 = t41 + t42;
-    Rc[1] = t43;
-    const real t44 = t15 * Rt[0];
-    const real t45 = t23 * Rt[1];
-    const real t46 = t44 - t45;
-    const real t47 = t6 * Rt[2];
-    const real t48 = t46 + t47;
-    Rc[2] = t48;
-    const real t49 = t8 * Rt[3];
-    const real t50 = t19 * Rt[4];
-    const real t51 = t49 + t50;
-    const real t52 = t25 * Rt[5];
-    const real t53 = t51 + t52;
-    Rc[3] = t53;
-    const real t54 = t22 * Rt[4];
-    const real t55 = t12 * Rt[3];
-    const real t56 = t54 - t55;
-    const real t57 = t26 * Rt[5];
-    const real t58 = t56 + t57;
-    Rc[4] = t58;
-    const real t59 = t15 * Rt[3];
-    const real t60 = t23 * Rt[4];
-    const real t61 = t59 - t60;
-    const real t62 = t6 * Rt[5];
-    const real t63 = t61 + t62;
-    Rc[5] = t63;
-    const real t64 = t8 * Rt[6];
-    const real t65 = t19 * Rt[7];
-    const real t66 = t64 + t65;
-    const real t67 = t25 * Rt[8];
-    const real t68 = t66 + t67;
-    Rc[6] = t68;
-    const real t69 = t22 * Rt[7];
-    const real t70 = t12 * Rt[6];
-    const real t71 = t69 - t70;
-    const real t72 = t26 * Rt[8];
-    const real t73 = t71 + t72;
-    Rc[7] = t73;
-    const real t74 = t15 * Rt[6];
-    const real t75 = t23 * Rt[7];
-    const real t76 = t74 - t75;
-    const real t77 = t6 * Rt[8];
-    const real t78 = t76 + t77;
-    Rc[8] = t78;
-    r[0] = ro[0];
-    r[1] = ro[1];
-    r[2] = ro[2];
-    const real t79 = motion_I[0] * t38;
-    const real t80 = motion_I[1] * t53;
-    const real t81 = t79 + t80;
-    const real t82 = motion_I[2] * t68;
-    const real t83 = t81 + t82;
-    const real t84 = t27 + t83;
-    motion[0] = t84;
-    const real t85 = motion_I[0] * t43;
-    const real t86 = motion_I[1] * t58;
-    const real t87 = t85 + t86;
-    const real t88 = motion_I[2] * t73;
-    const real t89 = t87 + t88;
-    const real t90 = t28 + t89;
-    motion[1] = t90;
-    const real t91 = motion_I[0] * t48;
-    const real t92 = motion_I[1] * t63;
-    const real t93 = t91 + t92;
-    const real t94 = motion_I[2] * t78;
-    const real t95 = t93 + t94;
-    const real t96 = t30 + t95;
-    motion[2] = t96;
-    const real t97 = motion_I[3] * t38;
-    const real t98 = motion_I[4] * t53;
-    const real t99 = t97 + t98;
-    const real t100 = motion_I[5] * t68;
-    const real t101 = t99 + t100;
-    const real t102 = t25 * s[0];
-    const real t103 = t31 + t102;
-    const real t104 = t30 * t89;
-    const real t105 = t28 * t95;
-    const real t106 = t104 - t105;
-    const real t107 = t103 + t106;
-    const real t108 = t101 + t107;
-    motion[3] = t108;
-    const real t109 = motion_I[3] * t43;
-    const real t110 = motion_I[4] * t58;
-    const real t111 = t109 + t110;
-    const real t112 = motion_I[5] * t73;
-    const real t113 = t111 + t112;
-    const real t114 = t26 * s[0];
-    const real t115 = t114 - t32;
-    const real t116 = t27 * t95;
-    const real t117 = t30 * t83;
-    const real t118 = t116 - t117;
-    const real t119 = t115 + t118;
-    const real t120 = t113 + t119;
-    motion[4] = t120;
-    const real t121 = motion_I[3] * t48;
-    const real t122 = motion_I[4] * t63;
-    const real t123 = t121 + t122;
-    const real t124 = motion_I[5] * t78;
-    const real t125 = t123 + t124;
-    const real t126 = t6 * s[0];
-    const real t127 = s[1] + t126;
-    const real t128 = t28 * t83;
-    const real t129 = t27 * t89;
-    const real t130 = t128 - t129;
-    const real t131 = t127 + t130;
-    const real t132 = t125 + t131;
-    motion[5] = t132;
-    const real t133 = motion_I[0] * motion_I[1];
-    const real t134 = t133 - motion_I[5];
-    const real t135 = ro[1] * t134;
-    const real t136 = motion_I[1] * motion_I[1];
-    const real t137 = motion_I[2] * motion_I[2];
-    const real t138 = t136 + t137;
-    const real t139 = ro[0] * t138;
-    const real t140 = t135 - t139;
-    const real t141 = motion_I[0] * motion_I[2];
-    const real t142 = motion_I[4] + t141;
-    const real t143 = ro[2] * t142;
-    const real t144 = t140 + t143;
-    const real t145 = motion_I[6] + t144;
-    const real t146 = t38 * t145;
-    const real t147 = motion_I[5] + t133;
-    const real t148 = ro[0] * t147;
-    const real t149 = motion_I[0] * motion_I[0];
-    const real t150 = t137 + t149;
-    const real t151 = ro[1] * t150;
-    const real t152 = t148 - t151;
-    const real t153 = motion_I[1] * motion_I[2];
-    const real t154 = t153 - motion_I[3];
-    const real t155 = ro[2] * t154;
-    const real t156 = t152 + t155;
-    const real t157 = motion_I[7] + t156;
-    const real t158 = t53 * t157;
-    const real t159 = t146 + t158;
-    const real t160 = t141 - motion_I[4];
-    const real t161 = ro[0] * t160;
-    const real t162 = motion_I[3] + t153;
-    const real t163 = ro[1] * t162;
-    const real t164 = t161 + t163;
-    const real t165 = t136 + t149;
-    const real t166 = ro[2] * t165;
-    const real t167 = t164 - t166;
-    const real t168 = motion_I[8] + t167;
-    const real t169 = t68 * t168;
-    const real t170 = t159 + t169;
-    motion[6] = t170;
-    const real t171 = t43 * t145;
-    const real t172 = t58 * t157;
-    const real t173 = t171 + t172;
-    const real t174 = t73 * t168;
-    const real t175 = t173 + t174;
-    motion[7] = t175;
-    const real t176 = t48 * t145;
-    const real t177 = t63 * t157;
-    const real t178 = t176 + t177;
-    const real t179 = t78 * t168;
-    const real t180 = t178 + t179;
-    motion[8] = t180;
-    return 0;
+  real t0 = cos(q[0]);
+  real t1 = cos(q[1]);
+  real t3 = sin(q[0]);
+  real t4 = sin(q[1]);
+  real t5 = t3 * t4;
+  real t6 = cos(p[0]);
+  real t8 = t0 * t1 - t5 * t6;
+  R[0] = t8;
+  real t12 = t0 * t4 + t1 * (t3 * t6);
+  R[1] = -t12;
+  real t14 = sin(p[0]);
+  real t15 = t3 * t14;
+  R[2] = t15;
+  real t19 = t1 * t3 + t0 * (t4 * t6);
+  R[3] = t19;
+  real t22 = t1 * (t0 * t6) - t5;
+  R[4] = t22;
+  real t23 = t0 * t14;
+  R[5] = -t23;
+  real t25 = t4 * t14;
+  R[6] = t25;
+  real t26 = t1 * t14;
+  R[7] = t26;
+  R[8] = t6;
+  d[0] = d[1] = d[2] = H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = 0.0;
+  H[6] = t25;
+  H[7] = 0.0;
+  H[8] = t26;
+  H[9] = 0.0;
+  H[10] = t6;
+  H[11] = 1.0;
+  v[0] = v[1] = v[2] = 0.0;
+  real t27 = u[0] * t25;
+  w[0] = t27;
+  real t28 = u[0] * t26;
+  w[1] = t28;
+  real t30 = u[1] + u[0] * t6;
+  w[2] = t30;
+  c[0] = c[1] = c[2] = 0.0;
+  real t31 = u[1] * t28;
+  c[3] = t31;
+  real t32 = u[1] * t27;
+  c[4] = -t32;
+  c[5] = 0.0;
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  real t38 = t8 * Rt[0] + t19 * Rt[1] + t25 * Rt[2];
+  Rc[0] = t38;
+  real t43 = t22 * Rt[1] - t12 * Rt[0] + t26 * Rt[2];
+  Rc[1] = t43;
+  real t48 = t15 * Rt[0] - t23 * Rt[1] + t6 * Rt[2];
+  Rc[2] = t48;
+  real t53 = t8 * Rt[3] + t19 * Rt[4] + t25 * Rt[5];
+  Rc[3] = t53;
+  real t58 = t22 * Rt[4] - t12 * Rt[3] + t26 * Rt[5];
+  Rc[4] = t58;
+  real t63 = t15 * Rt[3] - t23 * Rt[4] + t6 * Rt[5];
+  Rc[5] = t63;
+  real t68 = t8 * Rt[6] + t19 * Rt[7] + t25 * Rt[8];
+  Rc[6] = t68;
+  real t73 = t22 * Rt[7] - t12 * Rt[6] + t26 * Rt[8];
+  Rc[7] = t73;
+  real t78 = t15 * Rt[6] - t23 * Rt[7] + t6 * Rt[8];
+  Rc[8] = t78;
+  r[0] = ro[0];
+  r[1] = ro[1];
+  r[2] = ro[2];
+  real t83 = motion_I[0] * t38 + motion_I[1] * t53 + motion_I[2] * t68;
+  motion[0] = t27 + t83;
+  real t89 = motion_I[0] * t43 + motion_I[1] * t58 + motion_I[2] * t73;
+  motion[1] = t28 + t89;
+  real t95 = motion_I[0] * t48 + motion_I[1] * t63 + motion_I[2] * t78;
+  motion[2] = t30 + t95;
+  motion[3] = motion_I[3] * t38 + motion_I[4] * t53 + motion_I[5] * t68 + (t31 + t25 * s[0] + (t30 *
+    t89 - t28 * t95));
+  motion[4] = motion_I[3] * t43 + motion_I[4] * t58 + motion_I[5] * t73 + (t26 * s[0] - t32 + (t27 *
+    t95 - t30 * t83));
+  motion[5] = motion_I[3] * t48 + motion_I[4] * t63 + motion_I[5] * t78 + (s[1] + t6 * s[0] + (t28 *
+    t83 - t27 * t89));
+  real t133 = motion_I[0] * motion_I[1];
+  real t136 = motion_I[1] * motion_I[1];
+  real t137 = motion_I[2] * motion_I[2];
+  real t141 = motion_I[0] * motion_I[2];
+  real t145 = motion_I[6] + (ro[1] * (t133 - motion_I[5]) - ro[0] * (t136 + t137) + ro[2] *
+    (motion_I[4] + t141));
+  real t149 = motion_I[0] * motion_I[0];
+  real t153 = motion_I[1] * motion_I[2];
+  real t157 = motion_I[7] + (ro[0] * (motion_I[5] + t133) - ro[1] * (t137 + t149) + ro[2] * (t153 -
+    motion_I[3]));
+  real t168 = motion_I[8] + (ro[0] * (t141 - motion_I[4]) + ro[1] * (motion_I[3] + t153) - ro[2] *
+    (t136 + t149));
+  motion[6] = t38 * t145 + t53 * t157 + t68 * t168;
+  motion[7] = t43 * t145 + t58 * t157 + t73 * t168;
+  motion[8] = t48 * t145 + t63 * t157 + t78 * t168;
+  return 0;
 }
 
-static int mstmm_hinge_universal_body_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_body_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]);
-}
-
-static const mstmm_port mstmm_hinge_universal_body_motion_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_body_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"qdot", 2, "", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_body_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8], out[9]))
 
 /* directions of the unknowns of the hinge
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1689,277 +621,91 @@ static const mstmm_port mstmm_hinge_universal_body_motion_outputs[] = {
  * out W[2][2] slopes of the rows by load, rotors and laws
  * out H[6][2] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_universal_directions(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict s, const real *restrict motion,
-    const real *restrict f, const real *restrict J, const real *restrict laws,
-    const real *restrict along, const real *restrict rate, const real *restrict scale,
-    const real *restrict sq, real *restrict B, real *restrict G, real *restrict W, real *restrict H)
+int mstmm_hinge_universal_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+    in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
-    (void)along;
-    const real t0 = sin(q[1]);
-    const real t1 = sin(p[0]);
-    const real t2 = t0 * t1;
-    const real t3 = t2 * rate[0];
-    const real t4 = cos(p[0]);
-    const real t5 = 1.0 / sq[0];
-    const real t6 = t4 * t5;
-    const real t7 = cos(q[1]);
-    const real t8 = t7 * t1;
-    const real t9 = u[0] * t8;
-    const real t10 = motion[1] - t9;
-    const real t11 = t6 * t10;
-    const real t12 = t8 * t5;
-    const real t13 = u[0] * t4;
-    const real t14 = u[1] + t13;
-    const real t15 = motion[2] - t14;
-    const real t16 = t12 * t15;
-    const real t17 = t11 - t16;
-    const real t18 = t3 + t17;
-    B[0] = t18;
-    const real t19 = t8 * rate[0];
-    const real t20 = t2 * t5;
-    const real t21 = t20 * t15;
-    const real t22 = u[0] * t2;
-    const real t23 = motion[0] - t22;
-    const real t24 = t6 * t23;
-    const real t25 = t21 - t24;
-    const real t26 = t19 + t25;
-    B[1] = t26;
-    const real t27 = t4 * rate[0];
-    const real t28 = t12 * t23;
-    const real t29 = t20 * t10;
-    const real t30 = t28 - t29;
-    const real t31 = t27 + t30;
-    B[2] = t31;
-    const real t32 = t14 * t25;
-    const real t33 = t9 * t30;
-    const real t34 = t32 - t33;
-    const real t35 = u[1] * t19;
-    const real t36 = t2 * scale[0];
-    const real t37 = t35 + t36;
-    const real t38 = t14 * t23;
-    const real t39 = t22 * t15;
-    const real t40 = t38 - t39;
-    const real t41 = t8 * s[0];
-    const real t42 = u[1] * t22;
-    const real t43 = t41 - t42;
-    const real t44 = t40 - t43;
-    const real t45 = motion[4] + t44;
-    const real t46 = t6 * t45;
-    const real t47 = t27 * t10;
-    const real t48 = t19 * t15;
-    const real t49 = t47 - t48;
-    const real t50 = t46 + t49;
-    const real t51 = t22 * t10;
-    const real t52 = t9 * t23;
-    const real t53 = t51 - t52;
-    const real t54 = t4 * s[0];
-    const real t55 = s[1] + t54;
-    const real t56 = t53 - t55;
-    const real t57 = motion[5] + t56;
-    const real t58 = t12 * t57;
-    const real t59 = t50 - t58;
-    const real t60 = t37 + t59;
-    const real t61 = t34 + t60;
-    B[3] = t61;
-    const real t62 = t22 * t30;
-    const real t63 = t14 * t17;
-    const real t64 = t62 - t63;
-    const real t65 = t8 * scale[0];
-    const real t66 = u[1] * t3;
-    const real t67 = t65 - t66;
-    const real t68 = t20 * t57;
-    const real t69 = t3 * t15;
-    const real t70 = t27 * t23;
-    const real t71 = t69 - t70;
-    const real t72 = t9 * t15;
-    const real t73 = t14 * t10;
-    const real t74 = t72 - t73;
-    const real t75 = u[1] * t9;
-    const real t76 = t2 * s[0];
-    const real t77 = t75 + t76;
-    const real t78 = t74 - t77;
-    const real t79 = motion[3] + t78;
-    const real t80 = t6 * t79;
-    const real t81 = t71 - t80;
-    const real t82 = t68 + t81;
-    const real t83 = t67 + t82;
-    const real t84 = t64 + t83;
-    B[4] = t84;
-    const real t85 = t9 * t17;
-    const real t86 = t22 * t25;
-    const real t87 = t85 - t86;
-    const real t88 = t4 * scale[0];
-    const real t89 = t12 * t79;
-    const real t90 = t19 * t23;
-    const real t91 = t3 * t10;
-    const real t92 = t90 - t91;
-    const real t93 = t89 + t92;
-    const real t94 = t20 * t45;
-    const real t95 = t93 - t94;
-    const real t96 = t88 + t95;
-    const real t97 = t87 + t96;
-    B[5] = t97;
-    const real t98 = motion[7] * t6;
-    const real t99 = motion[8] * t12;
-    const real t100 = t98 - t99;
-    B[6] = t100;
-    const real t101 = motion[8] * t20;
-    const real t102 = motion[6] * t6;
-    const real t103 = t101 - t102;
-    B[7] = t103;
-    const real t104 = motion[6] * t12;
-    const real t105 = motion[7] * t20;
-    const real t106 = t104 - t105;
-    B[8] = t106;
-    const real t107 = t7 * t5;
-    const real t108 = t1 * t107;
-    const real t109 = u[0] * t108;
-    const real t110 = t5 * t10;
-    const real t111 = t109 + t110;
-    B[9] = t111;
-    const real t112 = t0 * t5;
-    const real t113 = t1 * t112;
-    const real t114 = u[0] * t113;
-    const real t115 = t5 * t23;
-    const real t116 = t114 + t115;
-    const real t117 = -t116;
-    B[10] = t117;
-    B[11] = rate[0];
-    const real t118 = t9 * rate[0];
-    const real t119 = u[1] * t114;
-    const real t120 = t118 - t119;
-    const real t121 = s[0] * t108;
-    const real t122 = t120 + t121;
-    const real t123 = t5 * t45;
-    const real t124 = rate[0] * t10;
-    const real t125 = t15 * t114;
-    const real t126 = t124 + t125;
-    const real t127 = t123 + t126;
-    const real t128 = t122 + t127;
-    const real t129 = t14 * t115;
-    const real t130 = t128 - t129;
-    B[12] = t130;
-    const real t131 = t15 * t109;
-    const real t132 = rate[0] * t23;
-    const real t133 = t131 - t132;
-    const real t134 = t5 * t79;
-    const real t135 = t133 - t134;
-    const real t136 = t22 * rate[0];
-    const real t137 = u[1] * t109;
-    const real t138 = t136 + t137;
-    const real t139 = s[0] * t113;
-    const real t140 = t138 + t139;
-    const real t141 = t135 - t140;
-    const real t142 = t14 * t110;
-    const real t143 = t141 - t142;
-    B[13] = t143;
-    const real t144 = t9 * t110;
-    const real t145 = t22 * t115;
-    const real t146 = t144 + t145;
-    const real t147 = t23 * t114;
-    const real t148 = t10 * t109;
-    const real t149 = t147 + t148;
-    const real t150 = scale[0] - t149;
-    const real t151 = t146 + t150;
-    B[14] = t151;
-    const real t152 = motion[7] * t5;
-    B[15] = t152;
-    const real t153 = motion[6] * t5;
-    const real t154 = -t153;
-    B[16] = t154;
-    B[17] = 0.0;
-    const real t155 = f[2] * t12;
-    const real t156 = f[1] * t6;
-    const real t157 = t155 - t156;
-    G[0] = t157;
-    const real t158 = f[0] * t6;
-    const real t159 = f[2] * t20;
-    const real t160 = t158 - t159;
-    G[1] = t160;
-    const real t161 = f[1] * t20;
-    const real t162 = f[0] * t12;
-    const real t163 = t161 - t162;
-    G[2] = t163;
-    const real t164 = f[5] * t12;
-    const real t165 = f[4] * t6;
-    const real t166 = t164 - t165;
-    G[3] = t166;
-    const real t167 = f[3] * t6;
-    const real t168 = f[5] * t20;
-    const real t169 = t167 - t168;
-    G[4] = t169;
-    const real t170 = f[4] * t20;
-    const real t171 = f[3] * t12;
-    const real t172 = t170 - t171;
-    G[5] = t172;
-    const real t173 = f[1] * t5;
-    const real t174 = -t173;
-    G[6] = t174;
-    const real t175 = f[0] * t5;
-    G[7] = t175;
-    G[8] = 0.0;
-    const real t176 = f[4] * t5;
-    const real t177 = -t176;
-    G[9] = t177;
-    const real t178 = f[3] * t5;
-    G[10] = t178;
-    G[11] = 0.0;
-    const real t179 = J[0] * scale[0];
-    const real t180 = t179 - laws[0];
-    W[0] = t180;
-    const real t181 = -laws[1];
-    W[1] = t181;
-    const real t182 = f[3] * t108;
-    const real t183 = f[4] * t113;
-    const real t184 = t182 - t183;
-    const real t185 = t184 - laws[2];
-    W[2] = t185;
-    const real t186 = J[1] * scale[0];
-    const real t187 = t186 - laws[3];
-    W[3] = t187;
-    H[0] = 0.0;
-    H[1] = 0.0;
-    H[2] = 0.0;
-    H[3] = 0.0;
-    H[4] = 0.0;
-    H[5] = 0.0;
-    H[6] = t2;
-    H[7] = 0.0;
-    H[8] = t8;
-    H[9] = 0.0;
-    H[10] = t4;
-    H[11] = 1.0;
-    return 0;
+  (void)along;
+  real t0 = sin(q[1]);
+  real t1 = sin(p[0]);
+  real t2 = t0 * t1;
+  real t3 = t2 * rate[0];
+  real t4 = cos(p[0]);
+  real t5 = 1.0 / sq[0];
+  real t6 = t4 * t5;
+  real t7 = cos(q[1]);
+  real t8 = t7 * t1;
+  real t9 = u[0] * t8;
+  real t10 = motion[1] - t9;
+  real t12 = t8 * t5;
+  real t14 = u[1] + u[0] * t4;
+  real t15 = motion[2] - t14;
+  real t17 = t6 * t10 - t12 * t15;
+  B[0] = t3 + t17;
+  real t19 = t8 * rate[0];
+  real t20 = t2 * t5;
+  real t22 = u[0] * t2;
+  real t23 = motion[0] - t22;
+  real t25 = t20 * t15 - t6 * t23;
+  B[1] = t19 + t25;
+  real t27 = t4 * rate[0];
+  real t30 = t12 * t23 - t20 * t10;
+  B[2] = t27 + t30;
+  real t45 = motion[4] + (t14 * t23 - t22 * t15 - (t8 * s[0] - u[1] * t22));
+  real t57 = motion[5] + (t22 * t10 - t9 * t23 - (s[1] + t4 * s[0]));
+  B[3] = t14 * t25 - t9 * t30 + (u[1] * t19 + t2 * scale[0] + (t6 * t45 + (t27 * t10 - t19 * t15) -
+    t12 * t57));
+  real t79 = motion[3] + (t9 * t15 - t14 * t10 - (u[1] * t9 + t2 * s[0]));
+  B[4] = t22 * t30 - t14 * t17 + (t8 * scale[0] - u[1] * t3 + (t20 * t57 + (t3 * t15 - t27 * t23 -
+    t6 * t79)));
+  B[5] = t9 * t17 - t22 * t25 + (t4 * scale[0] + (t12 * t79 + (t19 * t23 - t3 * t10) - t20 * t45));
+  B[6] = motion[7] * t6 - motion[8] * t12;
+  B[7] = motion[8] * t20 - motion[6] * t6;
+  B[8] = motion[6] * t12 - motion[7] * t20;
+  real t108 = t1 * (t7 * t5);
+  real t109 = u[0] * t108;
+  real t110 = t5 * t10;
+  B[9] = t109 + t110;
+  real t113 = t1 * (t0 * t5);
+  real t114 = u[0] * t113;
+  real t115 = t5 * t23;
+  B[10] = -(t114 + t115);
+  B[11] = rate[0];
+  B[12] = t9 * rate[0] - u[1] * t114 + s[0] * t108 + (t5 * t45 + (rate[0] * t10 + t15 * t114)) - t14
+    * t115;
+  B[13] = t15 * t109 - rate[0] * t23 - t5 * t79 - (t22 * rate[0] + u[1] * t109 + s[0] * t113) - t14
+    * t110;
+  B[14] = t9 * t110 + t22 * t115 + (scale[0] - (t23 * t114 + t10 * t109));
+  B[15] = motion[7] * t5;
+  B[16] = -(motion[6] * t5);
+  B[17] = 0.0;
+  G[0] = f[2] * t12 - f[1] * t6;
+  G[1] = f[0] * t6 - f[2] * t20;
+  G[2] = f[1] * t20 - f[0] * t12;
+  G[3] = f[5] * t12 - f[4] * t6;
+  G[4] = f[3] * t6 - f[5] * t20;
+  G[5] = f[4] * t20 - f[3] * t12;
+  G[6] = -(f[1] * t5);
+  G[7] = f[0] * t5;
+  G[8] = 0.0;
+  G[9] = -(f[4] * t5);
+  G[10] = f[3] * t5;
+  G[11] = 0.0;
+  W[0] = J[0] * scale[0] - laws[0];
+  W[1] = -laws[1];
+  W[2] = f[3] * t108 - f[4] * t113 - laws[2];
+  W[3] = J[1] * scale[0] - laws[3];
+  H[0] = H[1] = H[2] = H[3] = H[4] = H[5] = 0.0;
+  H[6] = t2;
+  H[7] = 0.0;
+  H[8] = t8;
+  H[9] = 0.0;
+  H[10] = t4;
+  H[11] = 1.0;
+  return 0;
 }
 
-static int mstmm_hinge_universal_directions_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_hinge_universal_directions(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_hinge_universal_directions_inputs[] = {
-    {"p", 1, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"laws", 4, "", 0, 0},
-    {"along", 4, "", 0, 0},
-    {"rate", 1, "", 0, 0},
-    {"scale", 1, "1/s", 0, 0},
-    {"sq", 1, "1/s", 0, 0},
-};
-
-static const mstmm_port mstmm_hinge_universal_directions_outputs[] = {
-    {"B", 18, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"W", 4, "", 0, 0},
-    {"H", 12, "", 0, 0},
-};
+MSTMM_CALL(mstmm_hinge_universal_directions, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], out[0], out[1], out[2], out[3]))
 
 static const char *const mstmm_hinge_universal_q_names[] = {
     "angle1", "angle2",
@@ -1986,121 +732,67 @@ static const char *const mstmm_hinge_universal_p_units[] = {
 };
 
 static const mstmm_kernel mstmm_hinge_universal_kernels[] = {
-    {
-        .name = "hinge",
-        .function = (void (*)(void))mstmm_hinge_universal_hinge,
-        .call = mstmm_hinge_universal_hinge_call,
-        .n_inputs = 3,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_universal_hinge_inputs,
-        .outputs = mstmm_hinge_universal_hinge_outputs,
-        .ir_hash = "b88348cb25b75d4181745ab96370add5f49d15ac3f6c26be88784631d2467a9a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_hinge_universal_forward,
-        .call = mstmm_hinge_universal_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_universal_forward_inputs,
-        .outputs = mstmm_hinge_universal_forward_outputs,
-        .ir_hash = "e759c0fdb8f85aade5a4a475ec8a60ad024c4e055dafce335ab2e8dc024c6030",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_hinge_universal_condense,
-        .call = mstmm_hinge_universal_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_universal_condense_inputs,
-        .outputs = mstmm_hinge_universal_condense_outputs,
-        .ir_hash = "055cbbc3b1532c8ed3e296ed912ae0d64ec719283ecf98d65c912a30bb938656",
-        .n_guards = 6,
-        .guards = mstmm_hinge_universal_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_hinge_universal_recover,
-        .call = mstmm_hinge_universal_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_hinge_universal_recover_inputs,
-        .outputs = mstmm_hinge_universal_recover_outputs,
-        .ir_hash = "cc00a7f59082a982ef9fe9a5d3bd1a3f07607febeb5c934205b312f2ad2cace7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "hinge_slope",
-        .function = (void (*)(void))mstmm_hinge_universal_hinge_slope,
-        .call = mstmm_hinge_universal_hinge_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_hinge_universal_hinge_slope_inputs,
-        .outputs = mstmm_hinge_universal_hinge_slope_outputs,
-        .ir_hash = "62784c1b755e64a4d5f01ab6a770b499f3e3d1ac3e33757cdbd24384ea4a197a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_coordinates",
-        .function = (void (*)(void))mstmm_hinge_universal_rates_by_coordinates,
-        .call = mstmm_hinge_universal_rates_by_coordinates_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_universal_rates_by_coordinates_inputs,
-        .outputs = mstmm_hinge_universal_rates_by_coordinates_outputs,
-        .ir_hash = "eeb8c7a53d7f428e37f818b856398636eb74c0ae310a35028b08564ccaa4d8a0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rates_by_speeds",
-        .function = (void (*)(void))mstmm_hinge_universal_rates_by_speeds,
-        .call = mstmm_hinge_universal_rates_by_speeds_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_hinge_universal_rates_by_speeds_inputs,
-        .outputs = mstmm_hinge_universal_rates_by_speeds_outputs,
-        .ir_hash = "39b7ac214404f98979f89e8df7abd3c82079045a73ecbb39e4f0745859fd901f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "body_motion",
-        .function = (void (*)(void))mstmm_hinge_universal_body_motion,
-        .call = mstmm_hinge_universal_body_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 10,
-        .inputs = mstmm_hinge_universal_body_motion_inputs,
-        .outputs = mstmm_hinge_universal_body_motion_outputs,
-        .ir_hash = "7823d7f9f5846a1b5d18d6798de6e4ea0a66a805414ffc891a373010ce599208",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "directions",
-        .function = (void (*)(void))mstmm_hinge_universal_directions,
-        .call = mstmm_hinge_universal_directions_call,
-        .n_inputs = 12,
-        .n_outputs = 4,
-        .inputs = mstmm_hinge_universal_directions_inputs,
-        .outputs = mstmm_hinge_universal_directions_outputs,
-        .ir_hash = "00880e735469b598669163786ea28aaf15d25f1880349fe5d0e147379085d4df",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"hinge", MSTMM_FUNCTIONS(mstmm_hinge_universal_hinge), 3, 7, (const mstmm_port[]){{"p", 1, "", 0,
+    0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3,
+    "m", 0, 0}, {"H", 12, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6,
+    "m/s2, rad/s2", 0, 0}, {"qdot", 2, "", 0, 0}},
+    "01a05434a8d5cdb83072cc6674b92114b9d63e70b3147453b84211345148e9ee", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_hinge_universal_forward), 7, 4, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0},
+    {"s", 2, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r",
+    3, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"qdot", 2, "", 0, 0}},
+    "f25e473af6889eb8f9316ed29d86f34622a256dbe9da447625941dfcb9a4c6cc", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_hinge_universal_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 12, "", 0, 0}, {"g", 2, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "33fd806f3afd8c446583d98f4b9318034d4cac3e12ae1e0c116f37edddee9fed", 6, (const
+    mstmm_guard[]){{1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 2 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_hinge_universal_recover), 7, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"G", 12, "", 0, 0},
+    {"g", 2, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 2, "", 0, 0},
+    {"delta", 6, "", 0, 0}}, "b845ef7f2e5a9425e79b08a1bc6f0e04b46e96c0701b80e82b3f28d42d94a467", 0,
+    NULL},
+  {"hinge_slope", MSTMM_FUNCTIONS(mstmm_hinge_universal_hinge_slope), 5, 7, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"d_q", 2, "", 0, 0},
+    {"d_u", 2, "", 0, 0}}, (const mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H",
+    12, "", 0, 0}, {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0,
+    0}, {"d_qdot", 2, "", 0, 0}},
+    "aa10d7b1c99997f3f4da46288e6928cfc671eb6b222543c8693286a9aac25607", 0, NULL},
+  {"rates_by_coordinates", MSTMM_FUNCTIONS(mstmm_hinge_universal_rates_by_coordinates), 3, 1, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 4, "", 0, 0}},
+    "548b772a797860fbafcfcb6f68b6b9d9d3c158625ec0e17de1fe73e4cd7a78b5", 0, NULL},
+  {"rates_by_speeds", MSTMM_FUNCTIONS(mstmm_hinge_universal_rates_by_speeds), 3, 1, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"J", 4, "", 0, 0}},
+    "7f2d97868e765ffa97593516989f1f320abe64d85618f83ab7e8313a05f48ef9", 0, NULL},
+  {"body_motion", MSTMM_FUNCTIONS(mstmm_hinge_universal_body_motion), 7, 10, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"Rt", 9, "", 0, 0},
+    {"ro", 3, "m", 0, 0}, {"s", 2, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"R",
+    9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s",
+    0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}, {"qdot", 2, "", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m",
+    0, 0}, {"motion", 9, "", 0, 0}},
+    "e3ba975ddd643118685b38f4ed8e051dba2c9f3858ec33d07949f34da8d0d41c", 0, NULL},
+  {"directions", MSTMM_FUNCTIONS(mstmm_hinge_universal_directions), 12, 4, (const
+    mstmm_port[]){{"p", 1, "", 0, 0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"s", 2, "", 0, 0},
+    {"motion", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"laws", 4,
+    "", 0, 0}, {"along", 4, "", 0, 0}, {"rate", 1, "", 0, 0}, {"scale", 1, "1/s", 0, 0}, {"sq", 1,
+    "1/s", 0, 0}}, (const mstmm_port[]){{"B", 18, "", 0, 0}, {"G", 12, "", 0, 0}, {"W", 4, "", 0,
+    0}, {"H", 12, "", 0, 0}}, "b86c05e87da62db1fa4b6f3f15f29164e2e158d053c431096932fba58ebbf99d", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_hinge_universal = {
     .abi = MSTMM_ABI,
     .kind = "hinge",
     .name = "universal",
-    .hash = "49cd9ecd157e42c9267733ae2533ae7b63f6fd016fcec28623a5511a684d2b37",
+    .hash = "d8264648bb6bbfe3f9c32089b300a464db17c7aa00930f3e156d00aadf9edf6f",
     .nq = 2,
     .nu = 2,
     .np = 1,

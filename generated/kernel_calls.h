@@ -8,168 +8,115 @@
 #include "elements.h"
 
 struct mstmm_frames_pose {
-    const real *A_I;
-    const real *x_I;
-    const real *Rc;
-    const real *r;
-    real *A;
-    real *x;
+    const real *A_I, *x_I, *Rc, *r;
+    real *A, *x;
 };
 static inline int mstmm_frames_pose_by(struct mstmm_frames_pose to)
 {
-    return mstmm_sweep_frames_pose(
-        to.A_I, to.x_I, to.Rc, to.r, to.A, to.x);
+    return mstmm_sweep_frames_pose(to.A_I, to.x_I, to.Rc, to.r, to.A, to.x);
 }
-#define mstmm_frames_pose(...) mstmm_frames_pose_by((struct mstmm_frames_pose){__VA_ARGS__})
+#define mstmm_frames_pose(...) MSTMM_NAMED(mstmm_frames_pose, __VA_ARGS__)
 
 struct mstmm_frames_velocity {
-    const real *Rc;
-    const real *r;
-    const real *v_I;
-    const real *w_I;
-    const real *v_rel;
+    const real *Rc, *r, *v_I, *w_I, *v_rel;
     real *v;
 };
 static inline int mstmm_frames_velocity_by(struct mstmm_frames_velocity to)
 {
-    return mstmm_sweep_frames_velocity(
-        to.Rc, to.r, to.v_I, to.w_I, to.v_rel, to.v);
+    return mstmm_sweep_frames_velocity(to.Rc, to.r, to.v_I, to.w_I, to.v_rel, to.v);
 }
-#define mstmm_frames_velocity(...) mstmm_frames_velocity_by((struct mstmm_frames_velocity){__VA_ARGS__})
+#define mstmm_frames_velocity(...) MSTMM_NAMED(mstmm_frames_velocity, __VA_ARGS__)
 
 struct mstmm_frames_point {
-    const real *A;
-    const real *x;
-    const real *v;
-    const real *motion;
-    const real *delta;
-    const real *offset;
-    const real *gravity;
-    real *x_K;
-    real *v_K;
-    real *a_K;
+    const real *A, *x, *v, *motion, *delta, *offset, *gravity;
+    real *x_K, *v_K, *a_K;
 };
 static inline int mstmm_frames_point_by(struct mstmm_frames_point to)
 {
-    return mstmm_sweep_frames_point(
-        to.A, to.x, to.v, to.motion, to.delta, to.offset, to.gravity, to.x_K, to.v_K, to.a_K);
+    return mstmm_sweep_frames_point(to.A, to.x, to.v, to.motion, to.delta, to.offset, to.gravity,
+      to.x_K, to.v_K, to.a_K);
 }
-#define mstmm_frames_point(...) mstmm_frames_point_by((struct mstmm_frames_point){__VA_ARGS__})
+#define mstmm_frames_point(...) MSTMM_NAMED(mstmm_frames_point, __VA_ARGS__)
 
 struct mstmm_frames_angular_motion {
-    const real *A;
-    const real *motion;
-    const real *delta;
-    real *w_K;
-    real *alpha_K;
+    const real *A, *motion, *delta;
+    real *w_K, *alpha_K;
 };
 static inline int mstmm_frames_angular_motion_by(struct mstmm_frames_angular_motion to)
 {
-    return mstmm_sweep_frames_angular_motion(
-        to.A, to.motion, to.delta, to.w_K, to.alpha_K);
+    return mstmm_sweep_frames_angular_motion(to.A, to.motion, to.delta, to.w_K, to.alpha_K);
 }
-#define mstmm_frames_angular_motion(...) mstmm_frames_angular_motion_by((struct mstmm_frames_angular_motion){__VA_ARGS__})
+#define mstmm_frames_angular_motion(...) MSTMM_NAMED(mstmm_frames_angular_motion, __VA_ARGS__)
 
 struct mstmm_frames_end_frame {
-    const real *A;
-    const real *R_end;
+    const real *A, *R_end;
     real *A_end;
 };
 static inline int mstmm_frames_end_frame_by(struct mstmm_frames_end_frame to)
 {
-    return mstmm_sweep_frames_end_frame(
-        to.A, to.R_end, to.A_end);
+    return mstmm_sweep_frames_end_frame(to.A, to.R_end, to.A_end);
 }
-#define mstmm_frames_end_frame(...) mstmm_frames_end_frame_by((struct mstmm_frames_end_frame){__VA_ARGS__})
+#define mstmm_frames_end_frame(...) MSTMM_NAMED(mstmm_frames_end_frame, __VA_ARGS__)
 
 struct mstmm_frames_applied_load {
-    const real *A;
-    const real *A_F;
-    const real *offset;
-    const real *F;
-    const real *M;
+    const real *A, *A_F, *offset, *F, *M;
     real *e;
 };
 static inline int mstmm_frames_applied_load_by(struct mstmm_frames_applied_load to)
 {
-    return mstmm_sweep_frames_applied_load(
-        to.A, to.A_F, to.offset, to.F, to.M, to.e);
+    return mstmm_sweep_frames_applied_load(to.A, to.A_F, to.offset, to.F, to.M, to.e);
 }
-#define mstmm_frames_applied_load(...) mstmm_frames_applied_load_by((struct mstmm_frames_applied_load){__VA_ARGS__})
+#define mstmm_frames_applied_load(...) MSTMM_NAMED(mstmm_frames_applied_load, __VA_ARGS__)
 
 struct mstmm_frames_reaction_wrench {
-    const real *x_F;
-    const real *x_T;
-    const real *F;
-    const real *M;
-    real *F_back;
-    real *M_back;
+    const real *x_F, *x_T, *F, *M;
+    real *F_back, *M_back;
 };
 static inline int mstmm_frames_reaction_wrench_by(struct mstmm_frames_reaction_wrench to)
 {
-    return mstmm_sweep_frames_reaction_wrench(
-        to.x_F, to.x_T, to.F, to.M, to.F_back, to.M_back);
+    return mstmm_sweep_frames_reaction_wrench(to.x_F, to.x_T, to.F, to.M, to.F_back, to.M_back);
 }
-#define mstmm_frames_reaction_wrench(...) mstmm_frames_reaction_wrench_by((struct mstmm_frames_reaction_wrench){__VA_ARGS__})
+#define mstmm_frames_reaction_wrench(...) MSTMM_NAMED(mstmm_frames_reaction_wrench, __VA_ARGS__)
 
 struct mstmm_frames_power {
-    const real *A_F;
-    const real *F;
-    const real *M;
-    const real *v_K;
-    const real *w_K;
+    const real *A_F, *F, *M, *v_K, *w_K;
     real *P;
 };
 static inline int mstmm_frames_power_by(struct mstmm_frames_power to)
 {
-    return mstmm_sweep_frames_power(
-        to.A_F, to.F, to.M, to.v_K, to.w_K, to.P);
+    return mstmm_sweep_frames_power(to.A_F, to.F, to.M, to.v_K, to.w_K, to.P);
 }
-#define mstmm_frames_power(...) mstmm_frames_power_by((struct mstmm_frames_power){__VA_ARGS__})
+#define mstmm_frames_power(...) MSTMM_NAMED(mstmm_frames_power, __VA_ARGS__)
 
 struct mstmm_frames_momentum {
-    const real *S;
-    const real *A;
-    const real *x;
-    const real *v;
-    const real *w;
-    real *L;
-    real *K;
+    const real *S, *A, *x, *v, *w;
+    real *L, *K;
 };
 static inline int mstmm_frames_momentum_by(struct mstmm_frames_momentum to)
 {
-    return mstmm_sweep_frames_momentum(
-        to.S, to.A, to.x, to.v, to.w, to.L, to.K);
+    return mstmm_sweep_frames_momentum(to.S, to.A, to.x, to.v, to.w, to.L, to.K);
 }
-#define mstmm_frames_momentum(...) mstmm_frames_momentum_by((struct mstmm_frames_momentum){__VA_ARGS__})
+#define mstmm_frames_momentum(...) MSTMM_NAMED(mstmm_frames_momentum, __VA_ARGS__)
 
 struct mstmm_frames_carried_momentum {
-    const real *A;
-    const real *x;
-    const real *h;
-    real *p;
-    real *L;
+    const real *A, *x, *h;
+    real *p, *L;
 };
 static inline int mstmm_frames_carried_momentum_by(struct mstmm_frames_carried_momentum to)
 {
-    return mstmm_sweep_frames_carried_momentum(
-        to.A, to.x, to.h, to.p, to.L);
+    return mstmm_sweep_frames_carried_momentum(to.A, to.x, to.h, to.p, to.L);
 }
-#define mstmm_frames_carried_momentum(...) mstmm_frames_carried_momentum_by((struct mstmm_frames_carried_momentum){__VA_ARGS__})
+#define mstmm_frames_carried_momentum(...) MSTMM_NAMED(mstmm_frames_carried_momentum, __VA_ARGS__)
 
 struct mstmm_frames_gravity_energy {
-    const real *S;
-    const real *A;
-    const real *x;
-    const real *gravity;
+    const real *S, *A, *x, *gravity;
     real *V;
 };
 static inline int mstmm_frames_gravity_energy_by(struct mstmm_frames_gravity_energy to)
 {
-    return mstmm_sweep_frames_gravity_energy(
-        to.S, to.A, to.x, to.gravity, to.V);
+    return mstmm_sweep_frames_gravity_energy(to.S, to.A, to.x, to.gravity, to.V);
 }
-#define mstmm_frames_gravity_energy(...) mstmm_frames_gravity_energy_by((struct mstmm_frames_gravity_energy){__VA_ARGS__})
+#define mstmm_frames_gravity_energy(...) MSTMM_NAMED(mstmm_frames_gravity_energy, __VA_ARGS__)
 
 struct mstmm_frames_pivot_floor {
     const real *S;
@@ -177,1371 +124,848 @@ struct mstmm_frames_pivot_floor {
 };
 static inline int mstmm_frames_pivot_floor_by(struct mstmm_frames_pivot_floor to)
 {
-    return mstmm_sweep_frames_pivot_floor(
-        to.S, to.floor_);
+    return mstmm_sweep_frames_pivot_floor(to.S, to.floor_);
 }
-#define mstmm_frames_pivot_floor(...) mstmm_frames_pivot_floor_by((struct mstmm_frames_pivot_floor){__VA_ARGS__})
+#define mstmm_frames_pivot_floor(...) MSTMM_NAMED(mstmm_frames_pivot_floor, __VA_ARGS__)
 
 struct mstmm_frames_reaction {
-    const real *S;
-    const real *e;
-    const real *delta;
-    const real *A;
-    real *f;
-    real *force;
-    real *moment;
+    const real *S, *e, *delta, *A;
+    real *f, *force, *moment;
 };
 static inline int mstmm_frames_reaction_by(struct mstmm_frames_reaction to)
 {
-    return mstmm_sweep_frames_reaction(
-        to.S, to.e, to.delta, to.A, to.f, to.force, to.moment);
+    return mstmm_sweep_frames_reaction(to.S, to.e, to.delta, to.A, to.f, to.force, to.moment);
 }
-#define mstmm_frames_reaction(...) mstmm_frames_reaction_by((struct mstmm_frames_reaction){__VA_ARGS__})
+#define mstmm_frames_reaction(...) MSTMM_NAMED(mstmm_frames_reaction, __VA_ARGS__)
 
 struct mstmm_frames_moment_about {
-    const real *A;
-    const real *offset;
-    const real *f;
+    const real *A, *offset, *f;
     real *moment;
 };
 static inline int mstmm_frames_moment_about_by(struct mstmm_frames_moment_about to)
 {
-    return mstmm_sweep_frames_moment_about(
-        to.A, to.offset, to.f, to.moment);
+    return mstmm_sweep_frames_moment_about(to.A, to.offset, to.f, to.moment);
 }
-#define mstmm_frames_moment_about(...) mstmm_frames_moment_about_by((struct mstmm_frames_moment_about){__VA_ARGS__})
+#define mstmm_frames_moment_about(...) MSTMM_NAMED(mstmm_frames_moment_about, __VA_ARGS__)
 
 struct mstmm_frames_transport {
-    const real *Rc;
-    const real *r;
-    const real *e;
+    const real *Rc, *r, *e;
     real *e_I;
 };
 static inline int mstmm_frames_transport_by(struct mstmm_frames_transport to)
 {
-    return mstmm_sweep_frames_transport(
-        to.Rc, to.r, to.e, to.e_I);
+    return mstmm_sweep_frames_transport(to.Rc, to.r, to.e, to.e_I);
 }
-#define mstmm_frames_transport(...) mstmm_frames_transport_by((struct mstmm_frames_transport){__VA_ARGS__})
+#define mstmm_frames_transport(...) MSTMM_NAMED(mstmm_frames_transport, __VA_ARGS__)
 
 struct mstmm_frames_rotor_energy {
-    const real *J;
-    const real *u;
+    const real *J, *u;
     real *T;
 };
 static inline int mstmm_frames_rotor_energy_by(struct mstmm_frames_rotor_energy to)
 {
-    return mstmm_sweep_frames_rotor_energy(
-        to.J, to.u, to.T);
+    return mstmm_sweep_frames_rotor_energy(to.J, to.u, to.T);
 }
-#define mstmm_frames_rotor_energy(...) mstmm_frames_rotor_energy_by((struct mstmm_frames_rotor_energy){__VA_ARGS__})
+#define mstmm_frames_rotor_energy(...) MSTMM_NAMED(mstmm_frames_rotor_energy, __VA_ARGS__)
 
 struct mstmm_frames_driven_effort {
-    const real *load;
-    const real *J;
-    const real *udot;
-    const real *tau;
+    const real *load, *J, *udot, *tau;
     real *tau_d;
 };
 static inline int mstmm_frames_driven_effort_by(struct mstmm_frames_driven_effort to)
 {
-    return mstmm_sweep_frames_driven_effort(
-        to.load, to.J, to.udot, to.tau, to.tau_d);
+    return mstmm_sweep_frames_driven_effort(to.load, to.J, to.udot, to.tau, to.tau_d);
 }
-#define mstmm_frames_driven_effort(...) mstmm_frames_driven_effort_by((struct mstmm_frames_driven_effort){__VA_ARGS__})
+#define mstmm_frames_driven_effort(...) MSTMM_NAMED(mstmm_frames_driven_effort, __VA_ARGS__)
 
 struct mstmm_frames_speed_power {
-    const real *tau;
-    const real *u;
+    const real *tau, *u;
     real *P;
 };
 static inline int mstmm_frames_speed_power_by(struct mstmm_frames_speed_power to)
 {
-    return mstmm_sweep_frames_speed_power(
-        to.tau, to.u, to.P);
+    return mstmm_sweep_frames_speed_power(to.tau, to.u, to.P);
 }
-#define mstmm_frames_speed_power(...) mstmm_frames_speed_power_by((struct mstmm_frames_speed_power){__VA_ARGS__})
+#define mstmm_frames_speed_power(...) MSTMM_NAMED(mstmm_frames_speed_power, __VA_ARGS__)
 
 struct mstmm_frames_length {
-    const real *x_F;
-    const real *v_F;
-    const real *x_T;
-    const real *v_T;
+    const real *x_F, *v_F, *x_T, *v_T;
     real *l;
 };
 static inline int mstmm_frames_length_by(struct mstmm_frames_length to)
 {
-    return mstmm_sweep_frames_length(
-        to.x_F, to.v_F, to.x_T, to.v_T, to.l);
+    return mstmm_sweep_frames_length(to.x_F, to.v_F, to.x_T, to.v_T, to.l);
 }
-#define mstmm_frames_length(...) mstmm_frames_length_by((struct mstmm_frames_length){__VA_ARGS__})
+#define mstmm_frames_length(...) MSTMM_NAMED(mstmm_frames_length, __VA_ARGS__)
 
 struct mstmm_frames_to_inertial {
-    const real *A;
-    const real *b;
+    const real *A, *b;
     real *b_0;
 };
 static inline int mstmm_frames_to_inertial_by(struct mstmm_frames_to_inertial to)
 {
-    return mstmm_sweep_frames_to_inertial(
-        to.A, to.b, to.b_0);
+    return mstmm_sweep_frames_to_inertial(to.A, to.b, to.b_0);
 }
-#define mstmm_frames_to_inertial(...) mstmm_frames_to_inertial_by((struct mstmm_frames_to_inertial){__VA_ARGS__})
+#define mstmm_frames_to_inertial(...) MSTMM_NAMED(mstmm_frames_to_inertial, __VA_ARGS__)
 
 struct mstmm_frames_classical_body {
-    const real *A;
-    const real *p;
-    const real *motion;
-    const real *load;
-    const real *ro_n;
-    real *M;
-    real *r_IO;
-    real *r_IC;
-    real *J_I;
-    real *omega;
-    real *f_C;
-    real *m_C;
+    const real *A, *p, *motion, *load, *ro_n;
+    real *M, *r_IO, *r_IC, *J_I, *omega, *f_C, *m_C;
 };
 static inline int mstmm_frames_classical_body_by(struct mstmm_frames_classical_body to)
 {
-    return mstmm_sweep_frames_classical_body(
-        to.A, to.p, to.motion, to.load, to.ro_n, to.M, to.r_IO, to.r_IC, to.J_I, to.omega, to.f_C,
-        to.m_C);
+    return mstmm_sweep_frames_classical_body(to.A, to.p, to.motion, to.load, to.ro_n, to.M, to.r_IO,
+      to.r_IC, to.J_I, to.omega, to.f_C, to.m_C);
 }
-#define mstmm_frames_classical_body(...) mstmm_frames_classical_body_by((struct mstmm_frames_classical_body){__VA_ARGS__})
+#define mstmm_frames_classical_body(...) MSTMM_NAMED(mstmm_frames_classical_body, __VA_ARGS__)
 
 struct mstmm_frames_state_deviation {
-    const real *A;
-    const real *motion;
-    const real *z;
+    const real *A, *motion, *z;
     real *delta;
 };
 static inline int mstmm_frames_state_deviation_by(struct mstmm_frames_state_deviation to)
 {
-    return mstmm_sweep_frames_state_deviation(
-        to.A, to.motion, to.z, to.delta);
+    return mstmm_sweep_frames_state_deviation(to.A, to.motion, to.z, to.delta);
 }
-#define mstmm_frames_state_deviation(...) mstmm_frames_state_deviation_by((struct mstmm_frames_state_deviation){__VA_ARGS__})
+#define mstmm_frames_state_deviation(...) MSTMM_NAMED(mstmm_frames_state_deviation, __VA_ARGS__)
 
 struct mstmm_frames_tangent_carry {
-    const real *Rc;
-    const real *r;
-    const real *w_I;
-    const real *v;
-    const real *w;
-    const real *S;
-    real *T;
-    real *S_I;
+    const real *Rc, *r, *w_I, *v, *w, *S;
+    real *T, *S_I;
 };
 static inline int mstmm_frames_tangent_carry_by(struct mstmm_frames_tangent_carry to)
 {
-    return mstmm_sweep_frames_tangent_carry(
-        to.Rc, to.r, to.w_I, to.v, to.w, to.S, to.T, to.S_I);
+    return mstmm_sweep_frames_tangent_carry(to.Rc, to.r, to.w_I, to.v, to.w, to.S, to.T, to.S_I);
 }
-#define mstmm_frames_tangent_carry(...) mstmm_frames_tangent_carry_by((struct mstmm_frames_tangent_carry){__VA_ARGS__})
+#define mstmm_frames_tangent_carry(...) MSTMM_NAMED(mstmm_frames_tangent_carry, __VA_ARGS__)
 
 struct mstmm_frames_tangent_motion {
-    const real *Rc;
-    const real *r;
-    const real *w_I;
-    const real *v;
-    const real *w;
-    const real *z_I;
+    const real *Rc, *r, *w_I, *v, *w, *z_I;
     real *z;
 };
 static inline int mstmm_frames_tangent_motion_by(struct mstmm_frames_tangent_motion to)
 {
-    return mstmm_sweep_frames_tangent_motion(
-        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.z);
+    return mstmm_sweep_frames_tangent_motion(to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.z);
 }
-#define mstmm_frames_tangent_motion(...) mstmm_frames_tangent_motion_by((struct mstmm_frames_tangent_motion){__VA_ARGS__})
+#define mstmm_frames_tangent_motion(...) MSTMM_NAMED(mstmm_frames_tangent_motion, __VA_ARGS__)
 
 struct mstmm_frames_tangent_pose_change {
-    const real *R;
-    const real *d_R;
-    const real *d_d;
-    real *theta;
-    real *x;
+    const real *R, *d_R, *d_d;
+    real *theta, *x;
 };
 static inline int mstmm_frames_tangent_pose_change_by(struct mstmm_frames_tangent_pose_change to)
 {
-    return mstmm_sweep_frames_tangent_pose_change(
-        to.R, to.d_R, to.d_d, to.theta, to.x);
+    return mstmm_sweep_frames_tangent_pose_change(to.R, to.d_R, to.d_d, to.theta, to.x);
 }
-#define mstmm_frames_tangent_pose_change(...) mstmm_frames_tangent_pose_change_by((struct mstmm_frames_tangent_pose_change){__VA_ARGS__})
+#define mstmm_frames_tangent_pose_change(...) MSTMM_NAMED(mstmm_frames_tangent_pose_change, __VA_ARGS__)
 
 struct mstmm_frames_tangent_known_load {
-    const real *S;
-    const real *b;
-    const real *g;
-    real *e_S;
-    real *e_b;
+    const real *S, *b, *g;
+    real *e_S, *e_b;
 };
 static inline int mstmm_frames_tangent_known_load_by(struct mstmm_frames_tangent_known_load to)
 {
-    return mstmm_sweep_frames_tangent_known_load(
-        to.S, to.b, to.g, to.e_S, to.e_b);
+    return mstmm_sweep_frames_tangent_known_load(to.S, to.b, to.g, to.e_S, to.e_b);
 }
-#define mstmm_frames_tangent_known_load(...) mstmm_frames_tangent_known_load_by((struct mstmm_frames_tangent_known_load){__VA_ARGS__})
+#define mstmm_frames_tangent_known_load(...) MSTMM_NAMED(mstmm_frames_tangent_known_load, __VA_ARGS__)
 
 struct mstmm_frames_placed_displacement {
-    const real *Rc;
-    const real *r;
-    const real *z_I;
-    const real *p_I;
+    const real *Rc, *r, *z_I, *p_I;
     real *p;
 };
 static inline int mstmm_frames_placed_displacement_by(struct mstmm_frames_placed_displacement to)
 {
-    return mstmm_sweep_frames_placed_displacement(
-        to.Rc, to.r, to.z_I, to.p_I, to.p);
+    return mstmm_sweep_frames_placed_displacement(to.Rc, to.r, to.z_I, to.p_I, to.p);
 }
-#define mstmm_frames_placed_displacement(...) mstmm_frames_placed_displacement_by((struct mstmm_frames_placed_displacement){__VA_ARGS__})
+#define mstmm_frames_placed_displacement(...) MSTMM_NAMED(mstmm_frames_placed_displacement, __VA_ARGS__)
 
 struct mstmm_frames_placed_pose {
-    const real *A;
-    const real *p;
-    real *d_A;
-    real *d_x;
-    real *d_v;
+    const real *A, *p;
+    real *d_A, *d_x, *d_v;
 };
 static inline int mstmm_frames_placed_pose_by(struct mstmm_frames_placed_pose to)
 {
-    return mstmm_sweep_frames_placed_pose(
-        to.A, to.p, to.d_A, to.d_x, to.d_v);
+    return mstmm_sweep_frames_placed_pose(to.A, to.p, to.d_A, to.d_x, to.d_v);
 }
-#define mstmm_frames_placed_pose(...) mstmm_frames_placed_pose_by((struct mstmm_frames_placed_pose){__VA_ARGS__})
+#define mstmm_frames_placed_pose(...) MSTMM_NAMED(mstmm_frames_placed_pose, __VA_ARGS__)
 
 struct mstmm_frames_placed_column {
-    const real *theta;
-    const real *x;
-    const real *v_P;
-    const real *v;
-    const real *d_v;
-    const real *Q;
+    const real *theta, *x, *v_P, *v, *d_v, *Q;
     real *B_p;
 };
 static inline int mstmm_frames_placed_column_by(struct mstmm_frames_placed_column to)
 {
-    return mstmm_sweep_frames_placed_column(
-        to.theta, to.x, to.v_P, to.v, to.d_v, to.Q, to.B_p);
+    return mstmm_sweep_frames_placed_column(to.theta, to.x, to.v_P, to.v, to.d_v, to.Q, to.B_p);
 }
-#define mstmm_frames_placed_column(...) mstmm_frames_placed_column_by((struct mstmm_frames_placed_column){__VA_ARGS__})
+#define mstmm_frames_placed_column(...) MSTMM_NAMED(mstmm_frames_placed_column, __VA_ARGS__)
 
 struct mstmm_frames_placed_carry {
-    const real *Rc;
-    const real *r;
-    const real *S_p;
-    real *T_p;
-    real *T_w;
-    real *S_pI;
-    real *S_wI;
+    const real *Rc, *r, *S_p;
+    real *T_p, *T_w, *S_pI, *S_wI;
 };
 static inline int mstmm_frames_placed_carry_by(struct mstmm_frames_placed_carry to)
 {
-    return mstmm_sweep_frames_placed_carry(
-        to.Rc, to.r, to.S_p, to.T_p, to.T_w, to.S_pI, to.S_wI);
+    return mstmm_sweep_frames_placed_carry(to.Rc, to.r, to.S_p, to.T_p, to.T_w, to.S_pI, to.S_wI);
 }
-#define mstmm_frames_placed_carry(...) mstmm_frames_placed_carry_by((struct mstmm_frames_placed_carry){__VA_ARGS__})
+#define mstmm_frames_placed_carry(...) MSTMM_NAMED(mstmm_frames_placed_carry, __VA_ARGS__)
 
 struct mstmm_frames_placed_known_load {
-    const real *S_p;
-    const real *b_p;
-    real *e_S;
-    real *e_b;
+    const real *S_p, *b_p;
+    real *e_S, *e_b;
 };
 static inline int mstmm_frames_placed_known_load_by(struct mstmm_frames_placed_known_load to)
 {
-    return mstmm_sweep_frames_placed_known_load(
-        to.S_p, to.b_p, to.e_S, to.e_b);
+    return mstmm_sweep_frames_placed_known_load(to.S_p, to.b_p, to.e_S, to.e_b);
 }
-#define mstmm_frames_placed_known_load(...) mstmm_frames_placed_known_load_by((struct mstmm_frames_placed_known_load){__VA_ARGS__})
+#define mstmm_frames_placed_known_load(...) MSTMM_NAMED(mstmm_frames_placed_known_load, __VA_ARGS__)
 
 struct mstmm_frames_pose_slope {
-    const real *A_I;
-    const real *x_I;
-    const real *Rc;
-    const real *r;
-    const real *d_A_I;
-    const real *d_x_I;
-    const real *d_Rc;
-    const real *d_r;
-    real *d_A;
-    real *d_x;
+    const real *A_I, *x_I, *Rc, *r, *d_A_I, *d_x_I, *d_Rc, *d_r;
+    real *d_A, *d_x;
 };
 static inline int mstmm_frames_pose_slope_by(struct mstmm_frames_pose_slope to)
 {
-    return mstmm_sweep_frames_pose_slope(
-        to.A_I, to.x_I, to.Rc, to.r, to.d_A_I, to.d_x_I, to.d_Rc, to.d_r, to.d_A, to.d_x);
+    return mstmm_sweep_frames_pose_slope(to.A_I, to.x_I, to.Rc, to.r, to.d_A_I, to.d_x_I, to.d_Rc,
+      to.d_r, to.d_A, to.d_x);
 }
-#define mstmm_frames_pose_slope(...) mstmm_frames_pose_slope_by((struct mstmm_frames_pose_slope){__VA_ARGS__})
+#define mstmm_frames_pose_slope(...) MSTMM_NAMED(mstmm_frames_pose_slope, __VA_ARGS__)
 
 struct mstmm_frames_velocity_slope {
-    const real *Rc;
-    const real *r;
-    const real *v_I;
-    const real *w_I;
-    const real *v_rel;
-    const real *d_Rc;
-    const real *d_r;
-    const real *d_v_I;
-    const real *d_w_I;
-    const real *d_v_rel;
+    const real *Rc, *r, *v_I, *w_I, *v_rel, *d_Rc, *d_r, *d_v_I, *d_w_I, *d_v_rel;
     real *d_v;
 };
 static inline int mstmm_frames_velocity_slope_by(struct mstmm_frames_velocity_slope to)
 {
-    return mstmm_sweep_frames_velocity_slope(
-        to.Rc, to.r, to.v_I, to.w_I, to.v_rel, to.d_Rc, to.d_r, to.d_v_I, to.d_w_I, to.d_v_rel,
-        to.d_v);
+    return mstmm_sweep_frames_velocity_slope(to.Rc, to.r, to.v_I, to.w_I, to.v_rel, to.d_Rc, to.d_r,
+      to.d_v_I, to.d_w_I, to.d_v_rel, to.d_v);
 }
-#define mstmm_frames_velocity_slope(...) mstmm_frames_velocity_slope_by((struct mstmm_frames_velocity_slope){__VA_ARGS__})
+#define mstmm_frames_velocity_slope(...) MSTMM_NAMED(mstmm_frames_velocity_slope, __VA_ARGS__)
 
 struct mstmm_frames_point_slope {
-    const real *A;
-    const real *x;
-    const real *v;
-    const real *motion;
-    const real *delta;
-    const real *offset;
-    const real *gravity;
-    const real *d_A;
-    const real *d_x;
-    const real *d_v;
-    const real *d_motion;
-    real *d_x_K;
-    real *d_v_K;
+    const real *A, *x, *v, *motion, *delta, *offset, *gravity, *d_A, *d_x, *d_v, *d_motion;
+    real *d_x_K, *d_v_K;
 };
 static inline int mstmm_frames_point_slope_by(struct mstmm_frames_point_slope to)
 {
-    return mstmm_sweep_frames_point_slope(
-        to.A, to.x, to.v, to.motion, to.delta, to.offset, to.gravity, to.d_A, to.d_x, to.d_v,
-        to.d_motion, to.d_x_K, to.d_v_K);
+    return mstmm_sweep_frames_point_slope(to.A, to.x, to.v, to.motion, to.delta, to.offset,
+      to.gravity, to.d_A, to.d_x, to.d_v, to.d_motion, to.d_x_K, to.d_v_K);
 }
-#define mstmm_frames_point_slope(...) mstmm_frames_point_slope_by((struct mstmm_frames_point_slope){__VA_ARGS__})
+#define mstmm_frames_point_slope(...) MSTMM_NAMED(mstmm_frames_point_slope, __VA_ARGS__)
 
 struct mstmm_frames_angular_motion_slope {
-    const real *A;
-    const real *motion;
-    const real *delta;
-    const real *d_A;
-    const real *d_motion;
+    const real *A, *motion, *delta, *d_A, *d_motion;
     real *d_w_K;
 };
 static inline int mstmm_frames_angular_motion_slope_by(struct mstmm_frames_angular_motion_slope to)
 {
-    return mstmm_sweep_frames_angular_motion_slope(
-        to.A, to.motion, to.delta, to.d_A, to.d_motion, to.d_w_K);
+    return mstmm_sweep_frames_angular_motion_slope(to.A, to.motion, to.delta, to.d_A, to.d_motion,
+      to.d_w_K);
 }
-#define mstmm_frames_angular_motion_slope(...) mstmm_frames_angular_motion_slope_by((struct mstmm_frames_angular_motion_slope){__VA_ARGS__})
+#define mstmm_frames_angular_motion_slope(...) MSTMM_NAMED(mstmm_frames_angular_motion_slope, __VA_ARGS__)
 
 struct mstmm_frames_end_frame_slope {
-    const real *A;
-    const real *R_end;
-    const real *d_A;
+    const real *A, *R_end, *d_A;
     real *d_A_end;
 };
 static inline int mstmm_frames_end_frame_slope_by(struct mstmm_frames_end_frame_slope to)
 {
-    return mstmm_sweep_frames_end_frame_slope(
-        to.A, to.R_end, to.d_A, to.d_A_end);
+    return mstmm_sweep_frames_end_frame_slope(to.A, to.R_end, to.d_A, to.d_A_end);
 }
-#define mstmm_frames_end_frame_slope(...) mstmm_frames_end_frame_slope_by((struct mstmm_frames_end_frame_slope){__VA_ARGS__})
+#define mstmm_frames_end_frame_slope(...) MSTMM_NAMED(mstmm_frames_end_frame_slope, __VA_ARGS__)
 
 struct mstmm_frames_applied_load_slope {
-    const real *A;
-    const real *A_F;
-    const real *offset;
-    const real *F;
-    const real *M;
-    const real *d_A;
-    const real *d_A_F;
-    const real *d_F;
-    const real *d_M;
+    const real *A, *A_F, *offset, *F, *M, *d_A, *d_A_F, *d_F, *d_M;
     real *d_e;
 };
 static inline int mstmm_frames_applied_load_slope_by(struct mstmm_frames_applied_load_slope to)
 {
-    return mstmm_sweep_frames_applied_load_slope(
-        to.A, to.A_F, to.offset, to.F, to.M, to.d_A, to.d_A_F, to.d_F, to.d_M, to.d_e);
+    return mstmm_sweep_frames_applied_load_slope(to.A, to.A_F, to.offset, to.F, to.M, to.d_A,
+      to.d_A_F, to.d_F, to.d_M, to.d_e);
 }
-#define mstmm_frames_applied_load_slope(...) mstmm_frames_applied_load_slope_by((struct mstmm_frames_applied_load_slope){__VA_ARGS__})
+#define mstmm_frames_applied_load_slope(...) MSTMM_NAMED(mstmm_frames_applied_load_slope, __VA_ARGS__)
 
 struct mstmm_frames_reaction_wrench_slope {
-    const real *x_F;
-    const real *x_T;
-    const real *F;
-    const real *M;
-    const real *d_x_F;
-    const real *d_x_T;
-    const real *d_F;
-    const real *d_M;
-    real *d_F_back;
-    real *d_M_back;
+    const real *x_F, *x_T, *F, *M, *d_x_F, *d_x_T, *d_F, *d_M;
+    real *d_F_back, *d_M_back;
 };
 static inline int mstmm_frames_reaction_wrench_slope_by(struct mstmm_frames_reaction_wrench_slope to)
 {
-    return mstmm_sweep_frames_reaction_wrench_slope(
-        to.x_F, to.x_T, to.F, to.M, to.d_x_F, to.d_x_T, to.d_F, to.d_M, to.d_F_back, to.d_M_back);
+    return mstmm_sweep_frames_reaction_wrench_slope(to.x_F, to.x_T, to.F, to.M, to.d_x_F, to.d_x_T,
+      to.d_F, to.d_M, to.d_F_back, to.d_M_back);
 }
-#define mstmm_frames_reaction_wrench_slope(...) mstmm_frames_reaction_wrench_slope_by((struct mstmm_frames_reaction_wrench_slope){__VA_ARGS__})
+#define mstmm_frames_reaction_wrench_slope(...) MSTMM_NAMED(mstmm_frames_reaction_wrench_slope, __VA_ARGS__)
 
 struct mstmm_frames_transport_slope {
-    const real *Rc;
-    const real *r;
-    const real *e;
-    const real *d_Rc;
-    const real *d_r;
-    const real *d_e;
+    const real *Rc, *r, *e, *d_Rc, *d_r, *d_e;
     real *d_e_I;
 };
 static inline int mstmm_frames_transport_slope_by(struct mstmm_frames_transport_slope to)
 {
-    return mstmm_sweep_frames_transport_slope(
-        to.Rc, to.r, to.e, to.d_Rc, to.d_r, to.d_e, to.d_e_I);
+    return mstmm_sweep_frames_transport_slope(to.Rc, to.r, to.e, to.d_Rc, to.d_r, to.d_e, to.d_e_I);
 }
-#define mstmm_frames_transport_slope(...) mstmm_frames_transport_slope_by((struct mstmm_frames_transport_slope){__VA_ARGS__})
+#define mstmm_frames_transport_slope(...) MSTMM_NAMED(mstmm_frames_transport_slope, __VA_ARGS__)
 
 struct mstmm_frames_driven_effort_slope {
-    const real *load;
-    const real *J;
-    const real *udot;
-    const real *tau;
-    const real *d_load;
-    const real *d_udot;
-    const real *d_tau;
+    const real *load, *J, *udot, *tau, *d_load, *d_udot, *d_tau;
     real *d_tau_d;
 };
 static inline int mstmm_frames_driven_effort_slope_by(struct mstmm_frames_driven_effort_slope to)
 {
-    return mstmm_sweep_frames_driven_effort_slope(
-        to.load, to.J, to.udot, to.tau, to.d_load, to.d_udot, to.d_tau, to.d_tau_d);
+    return mstmm_sweep_frames_driven_effort_slope(to.load, to.J, to.udot, to.tau, to.d_load,
+      to.d_udot, to.d_tau, to.d_tau_d);
 }
-#define mstmm_frames_driven_effort_slope(...) mstmm_frames_driven_effort_slope_by((struct mstmm_frames_driven_effort_slope){__VA_ARGS__})
+#define mstmm_frames_driven_effort_slope(...) MSTMM_NAMED(mstmm_frames_driven_effort_slope, __VA_ARGS__)
 
 struct mstmm_frames_length_slope {
-    const real *x_F;
-    const real *v_F;
-    const real *x_T;
-    const real *v_T;
-    const real *d_x_F;
-    const real *d_v_F;
-    const real *d_x_T;
-    const real *d_v_T;
+    const real *x_F, *v_F, *x_T, *v_T, *d_x_F, *d_v_F, *d_x_T, *d_v_T;
     real *d_l;
 };
 static inline int mstmm_frames_length_slope_by(struct mstmm_frames_length_slope to)
 {
-    return mstmm_sweep_frames_length_slope(
-        to.x_F, to.v_F, to.x_T, to.v_T, to.d_x_F, to.d_v_F, to.d_x_T, to.d_v_T, to.d_l);
+    return mstmm_sweep_frames_length_slope(to.x_F, to.v_F, to.x_T, to.v_T, to.d_x_F, to.d_v_F,
+      to.d_x_T, to.d_v_T, to.d_l);
 }
-#define mstmm_frames_length_slope(...) mstmm_frames_length_slope_by((struct mstmm_frames_length_slope){__VA_ARGS__})
+#define mstmm_frames_length_slope(...) MSTMM_NAMED(mstmm_frames_length_slope, __VA_ARGS__)
 
 struct mstmm_modal_residual {
     int n;
-    const real *p;
-    const real *C;
-    const real *P;
-    const real *B;
-    const real *Z_xx;
-    const real *Z_xy;
-    const real *Z_xz;
-    const real *Z_yy;
-    const real *Z_yz;
-    const real *Z_zz;
-    const real *Y_x;
-    const real *Y_y;
-    const real *Y_z;
-    const real *G_x;
-    const real *G_y;
-    const real *G_z;
-    const real *M;
-    const real *K;
-    const real *D;
-    const real *eta;
-    const real *etad;
-    const real *motion;
-    real *S;
-    real *S_rf;
-    real *A;
-    real *S_ff;
-    real *e;
-    real *e_f;
+    const real *p, *C, *P, *B, *Z_xx, *Z_xy, *Z_xz, *Z_yy, *Z_yz, *Z_zz, *Y_x, *Y_y, *Y_z, *G_x,
+      *G_y, *G_z, *M, *K, *D, *eta, *etad, *motion;
+    real *S, *S_rf, *A, *S_ff, *e, *e_f;
 };
 static inline int mstmm_modal_residual_by(struct mstmm_modal_residual to)
 {
-    return mstmm_sweep_modal_residual(
-        to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz, to.Z_yy, to.Z_yz, to.Z_zz,
-        to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.K, to.D, to.eta, to.etad,
-        to.motion, to.S, to.S_rf, to.A, to.S_ff, to.e, to.e_f);
+    return mstmm_sweep_modal_residual(to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz,
+      to.Z_yy, to.Z_yz, to.Z_zz, to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.K, to.D,
+      to.eta, to.etad, to.motion, to.S, to.S_rf, to.A, to.S_ff, to.e, to.e_f);
 }
-#define mstmm_modal_residual(...) mstmm_modal_residual_by((struct mstmm_modal_residual){__VA_ARGS__})
+#define mstmm_modal_residual(...) MSTMM_NAMED(mstmm_modal_residual, __VA_ARGS__)
 
 struct mstmm_modal_momentum {
     int n;
-    const real *p;
-    const real *C;
-    const real *P;
-    const real *B;
-    const real *Z_xx;
-    const real *Z_xy;
-    const real *Z_xz;
-    const real *Z_yy;
-    const real *Z_yz;
-    const real *Z_zz;
-    const real *Y_x;
-    const real *Y_y;
-    const real *Y_z;
-    const real *G_x;
-    const real *G_y;
-    const real *G_z;
-    const real *M;
-    const real *eta;
-    const real *etad;
-    const real *v;
-    const real *w;
-    real *S;
-    real *S_rf;
-    real *A;
-    real *h;
-    real *h_f;
-    real *T;
+    const real *p, *C, *P, *B, *Z_xx, *Z_xy, *Z_xz, *Z_yy, *Z_yz, *Z_zz, *Y_x, *Y_y, *Y_z, *G_x,
+      *G_y, *G_z, *M, *eta, *etad, *v, *w;
+    real *S, *S_rf, *A, *h, *h_f, *T;
 };
 static inline int mstmm_modal_momentum_by(struct mstmm_modal_momentum to)
 {
-    return mstmm_sweep_modal_momentum(
-        to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz, to.Z_yy, to.Z_yz, to.Z_zz,
-        to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.eta, to.etad, to.v, to.w, to.S,
-        to.S_rf, to.A, to.h, to.h_f, to.T);
+    return mstmm_sweep_modal_momentum(to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz,
+      to.Z_yy, to.Z_yz, to.Z_zz, to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.eta,
+      to.etad, to.v, to.w, to.S, to.S_rf, to.A, to.h, to.h_f, to.T);
 }
-#define mstmm_modal_momentum(...) mstmm_modal_momentum_by((struct mstmm_modal_momentum){__VA_ARGS__})
+#define mstmm_modal_momentum(...) MSTMM_NAMED(mstmm_modal_momentum, __VA_ARGS__)
 
 struct mstmm_modal_strain_energy {
     int n;
-    const real *K;
-    const real *D;
-    const real *eta;
-    const real *etad;
-    real *V;
-    real *W_d;
+    const real *K, *D, *eta, *etad;
+    real *V, *W_d;
 };
 static inline int mstmm_modal_strain_energy_by(struct mstmm_modal_strain_energy to)
 {
-    return mstmm_sweep_modal_strain_energy(
-        to.n, to.K, to.D, to.eta, to.etad, to.V, to.W_d);
+    return mstmm_sweep_modal_strain_energy(to.n, to.K, to.D, to.eta, to.etad, to.V, to.W_d);
 }
-#define mstmm_modal_strain_energy(...) mstmm_modal_strain_energy_by((struct mstmm_modal_strain_energy){__VA_ARGS__})
+#define mstmm_modal_strain_energy(...) MSTMM_NAMED(mstmm_modal_strain_energy, __VA_ARGS__)
 
 struct mstmm_modal_section {
     int n;
-    const real *r;
-    const real *phi;
-    const real *theta;
-    const real *g_x;
-    const real *g_y;
-    const real *g_z;
-    const real *h_x;
-    const real *h_y;
-    const real *h_z;
-    const real *eta;
-    const real *etad;
-    real *Phi;
-    real *x;
-    real *Psi;
-    real *xd;
-    real *Psid;
-    real *xdd;
-    real *Psidd;
+    const real *r, *phi, *theta, *g_x, *g_y, *g_z, *h_x, *h_y, *h_z, *eta, *etad;
+    real *Phi, *x, *Psi, *xd, *Psid, *xdd, *Psidd;
 };
 static inline int mstmm_modal_section_by(struct mstmm_modal_section to)
 {
-    return mstmm_sweep_modal_section(
-        to.n, to.r, to.phi, to.theta, to.g_x, to.g_y, to.g_z, to.h_x, to.h_y, to.h_z, to.eta,
-        to.etad, to.Phi, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd);
+    return mstmm_sweep_modal_section(to.n, to.r, to.phi, to.theta, to.g_x, to.g_y, to.g_z, to.h_x,
+      to.h_y, to.h_z, to.eta, to.etad, to.Phi, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd);
 }
-#define mstmm_modal_section(...) mstmm_modal_section_by((struct mstmm_modal_section){__VA_ARGS__})
+#define mstmm_modal_section(...) MSTMM_NAMED(mstmm_modal_section, __VA_ARGS__)
 
 struct mstmm_modal_end_motion {
-    const real *R_end;
-    const real *x;
-    const real *Psi;
-    const real *xd;
-    const real *Psid;
-    const real *xdd;
-    const real *Psidd;
-    real *R;
-    real *d;
-    real *H6;
-    real *v;
-    real *w;
-    real *c;
+    const real *R_end, *x, *Psi, *xd, *Psid, *xdd, *Psidd;
+    real *R, *d, *H6, *v, *w, *c;
 };
 static inline int mstmm_modal_end_motion_by(struct mstmm_modal_end_motion to)
 {
-    return mstmm_sweep_modal_end_motion(
-        to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.R, to.d, to.H6, to.v, to.w,
-        to.c);
+    return mstmm_sweep_modal_end_motion(to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd,
+      to.R, to.d, to.H6, to.v, to.w, to.c);
 }
-#define mstmm_modal_end_motion(...) mstmm_modal_end_motion_by((struct mstmm_modal_end_motion){__VA_ARGS__})
+#define mstmm_modal_end_motion(...) MSTMM_NAMED(mstmm_modal_end_motion, __VA_ARGS__)
 
 struct mstmm_modal_frame_motion {
-    const real *R_end;
-    const real *x;
-    const real *Psi;
-    const real *xd;
-    const real *Psid;
-    const real *xdd;
-    const real *Psidd;
-    real *R;
-    real *d;
-    real *H6;
-    real *v;
-    real *w;
-    real *c;
+    const real *R_end, *x, *Psi, *xd, *Psid, *xdd, *Psidd;
+    real *R, *d, *H6, *v, *w, *c;
 };
 static inline int mstmm_modal_frame_motion_by(struct mstmm_modal_frame_motion to)
 {
-    return mstmm_sweep_modal_frame_motion(
-        to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.R, to.d, to.H6, to.v, to.w,
-        to.c);
+    return mstmm_sweep_modal_frame_motion(to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd,
+      to.R, to.d, to.H6, to.v, to.w, to.c);
 }
-#define mstmm_modal_frame_motion(...) mstmm_modal_frame_motion_by((struct mstmm_modal_frame_motion){__VA_ARGS__})
+#define mstmm_modal_frame_motion(...) MSTMM_NAMED(mstmm_modal_frame_motion, __VA_ARGS__)
 
 struct mstmm_modal_subspace {
     int n;
-    const real *H6;
-    const real *Phi;
+    const real *H6, *Phi;
     real *H;
 };
 static inline int mstmm_modal_subspace_by(struct mstmm_modal_subspace to)
 {
-    return mstmm_sweep_modal_subspace(
-        to.n, to.H6, to.Phi, to.H);
+    return mstmm_sweep_modal_subspace(to.n, to.H6, to.Phi, to.H);
 }
-#define mstmm_modal_subspace(...) mstmm_modal_subspace_by((struct mstmm_modal_subspace){__VA_ARGS__})
+#define mstmm_modal_subspace(...) MSTMM_NAMED(mstmm_modal_subspace, __VA_ARGS__)
 
 struct mstmm_modal_prescribed_bias {
     int n;
-    const real *H;
-    const real *s;
-    const real *c;
+    const real *H, *s, *c;
     real *c_s;
 };
 static inline int mstmm_modal_prescribed_bias_by(struct mstmm_modal_prescribed_bias to)
 {
-    return mstmm_sweep_modal_prescribed_bias(
-        to.n, to.H, to.s, to.c, to.c_s);
+    return mstmm_sweep_modal_prescribed_bias(to.n, to.H, to.s, to.c, to.c_s);
 }
-#define mstmm_modal_prescribed_bias(...) mstmm_modal_prescribed_bias_by((struct mstmm_modal_prescribed_bias){__VA_ARGS__})
+#define mstmm_modal_prescribed_bias(...) MSTMM_NAMED(mstmm_modal_prescribed_bias, __VA_ARGS__)
 
 struct mstmm_modal_assemble_port {
     int n;
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *S;
-    const real *e;
-    real *U;
-    real *S_rf;
-    real *S_ff;
-    real *e_f;
+    const real *Rc, *r, *H, *S, *e;
+    real *U, *S_rf, *S_ff, *e_f;
 };
 static inline int mstmm_modal_assemble_port_by(struct mstmm_modal_assemble_port to)
 {
-    return mstmm_sweep_modal_assemble_port(
-        to.n, to.Rc, to.r, to.H, to.S, to.e, to.U, to.S_rf, to.S_ff, to.e_f);
+    return mstmm_sweep_modal_assemble_port(to.n, to.Rc, to.r, to.H, to.S, to.e, to.U, to.S_rf,
+      to.S_ff, to.e_f);
 }
-#define mstmm_modal_assemble_port(...) mstmm_modal_assemble_port_by((struct mstmm_modal_assemble_port){__VA_ARGS__})
+#define mstmm_modal_assemble_port(...) MSTMM_NAMED(mstmm_modal_assemble_port, __VA_ARGS__)
 
 struct mstmm_modal_rebase {
     int n;
-    const real *H;
-    const real *S;
-    const real *e;
-    const real *S_rf;
-    real *S_rf_I;
-    real *S_ff;
-    real *e_f;
+    const real *H, *S, *e, *S_rf;
+    real *S_rf_I, *S_ff, *e_f;
 };
 static inline int mstmm_modal_rebase_by(struct mstmm_modal_rebase to)
 {
-    return mstmm_sweep_modal_rebase(
-        to.n, to.H, to.S, to.e, to.S_rf, to.S_rf_I, to.S_ff, to.e_f);
+    return mstmm_sweep_modal_rebase(to.n, to.H, to.S, to.e, to.S_rf, to.S_rf_I, to.S_ff, to.e_f);
 }
-#define mstmm_modal_rebase(...) mstmm_modal_rebase_by((struct mstmm_modal_rebase){__VA_ARGS__})
+#define mstmm_modal_rebase(...) MSTMM_NAMED(mstmm_modal_rebase, __VA_ARGS__)
 
 struct mstmm_modal_condense {
     int n;
-    const real *S;
-    const real *e;
-    const real *S_rf;
-    const real *S_ff;
-    const real *e_f;
-    real *right;
-    real *Gg;
-    real *S_c;
-    real *e_c;
-    real *work;
+    const real *S, *e, *S_rf, *S_ff, *e_f;
+    real *right, *Gg, *S_c, *e_c, *work;
 };
 static inline int mstmm_modal_condense_by(struct mstmm_modal_condense to)
 {
-    return mstmm_sweep_modal_condense(
-        to.n, to.S, to.e, to.S_rf, to.S_ff, to.e_f, to.right, to.Gg, to.S_c, to.e_c, to.work);
+    return mstmm_sweep_modal_condense(to.n, to.S, to.e, to.S_rf, to.S_ff, to.e_f, to.right, to.Gg,
+      to.S_c, to.e_c, to.work);
 }
-#define mstmm_modal_condense(...) mstmm_modal_condense_by((struct mstmm_modal_condense){__VA_ARGS__})
+#define mstmm_modal_condense(...) MSTMM_NAMED(mstmm_modal_condense, __VA_ARGS__)
 
 struct mstmm_modal_recover {
     int n;
-    const real *Gg;
-    const real *delta_I;
+    const real *Gg, *delta_I;
     real *etadd;
 };
 static inline int mstmm_modal_recover_by(struct mstmm_modal_recover to)
 {
-    return mstmm_sweep_modal_recover(
-        to.n, to.Gg, to.delta_I, to.etadd);
+    return mstmm_sweep_modal_recover(to.n, to.Gg, to.delta_I, to.etadd);
 }
-#define mstmm_modal_recover(...) mstmm_modal_recover_by((struct mstmm_modal_recover){__VA_ARGS__})
+#define mstmm_modal_recover(...) MSTMM_NAMED(mstmm_modal_recover, __VA_ARGS__)
 
 struct mstmm_modal_port_deviation {
     int n;
-    const real *H;
-    const real *etadd;
-    const real *delta_I;
+    const real *H, *etadd, *delta_I;
     real *delta;
 };
 static inline int mstmm_modal_port_deviation_by(struct mstmm_modal_port_deviation to)
 {
-    return mstmm_sweep_modal_port_deviation(
-        to.n, to.H, to.etadd, to.delta_I, to.delta);
+    return mstmm_sweep_modal_port_deviation(to.n, to.H, to.etadd, to.delta_I, to.delta);
 }
-#define mstmm_modal_port_deviation(...) mstmm_modal_port_deviation_by((struct mstmm_modal_port_deviation){__VA_ARGS__})
+#define mstmm_modal_port_deviation(...) MSTMM_NAMED(mstmm_modal_port_deviation, __VA_ARGS__)
 
 struct mstmm_modal_prescribed_load {
     int n;
-    const real *S_rf;
-    const real *S_ff;
-    const real *s;
-    real *e;
-    real *e_f;
+    const real *S_rf, *S_ff, *s;
+    real *e, *e_f;
 };
 static inline int mstmm_modal_prescribed_load_by(struct mstmm_modal_prescribed_load to)
 {
-    return mstmm_sweep_modal_prescribed_load(
-        to.n, to.S_rf, to.S_ff, to.s, to.e, to.e_f);
+    return mstmm_sweep_modal_prescribed_load(to.n, to.S_rf, to.S_ff, to.s, to.e, to.e_f);
 }
-#define mstmm_modal_prescribed_load(...) mstmm_modal_prescribed_load_by((struct mstmm_modal_prescribed_load){__VA_ARGS__})
+#define mstmm_modal_prescribed_load(...) MSTMM_NAMED(mstmm_modal_prescribed_load, __VA_ARGS__)
 
 struct mstmm_modal_modal_effort {
     int n;
-    const real *H;
-    const real *e;
-    const real *e_f;
+    const real *H, *e, *e_f;
     real *tau;
 };
 static inline int mstmm_modal_modal_effort_by(struct mstmm_modal_modal_effort to)
 {
-    return mstmm_sweep_modal_modal_effort(
-        to.n, to.H, to.e, to.e_f, to.tau);
+    return mstmm_sweep_modal_modal_effort(to.n, to.H, to.e, to.e_f, to.tau);
 }
-#define mstmm_modal_modal_effort(...) mstmm_modal_modal_effort_by((struct mstmm_modal_modal_effort){__VA_ARGS__})
+#define mstmm_modal_modal_effort(...) MSTMM_NAMED(mstmm_modal_modal_effort, __VA_ARGS__)
 
 struct mstmm_modal_column_load {
     int n;
-    const real *Gg;
-    const real *e;
-    const real *e_f;
+    const real *Gg, *e, *e_f;
     real *e_c;
 };
 static inline int mstmm_modal_column_load_by(struct mstmm_modal_column_load to)
 {
-    return mstmm_sweep_modal_column_load(
-        to.n, to.Gg, to.e, to.e_f, to.e_c);
+    return mstmm_sweep_modal_column_load(to.n, to.Gg, to.e, to.e_f, to.e_c);
 }
-#define mstmm_modal_column_load(...) mstmm_modal_column_load_by((struct mstmm_modal_column_load){__VA_ARGS__})
+#define mstmm_modal_column_load(...) MSTMM_NAMED(mstmm_modal_column_load, __VA_ARGS__)
 
 struct mstmm_modal_column_acceleration {
     int n;
-    const real *S_ff;
-    const real *e_f;
-    const real *Gg;
-    const real *delta_I;
-    real *y;
-    real *etadd;
-    real *work;
+    const real *S_ff, *e_f, *Gg, *delta_I;
+    real *y, *etadd, *work;
 };
 static inline int mstmm_modal_column_acceleration_by(struct mstmm_modal_column_acceleration to)
 {
-    return mstmm_sweep_modal_column_acceleration(
-        to.n, to.S_ff, to.e_f, to.Gg, to.delta_I, to.y, to.etadd, to.work);
+    return mstmm_sweep_modal_column_acceleration(to.n, to.S_ff, to.e_f, to.Gg, to.delta_I, to.y,
+      to.etadd, to.work);
 }
-#define mstmm_modal_column_acceleration(...) mstmm_modal_column_acceleration_by((struct mstmm_modal_column_acceleration){__VA_ARGS__})
+#define mstmm_modal_column_acceleration(...) MSTMM_NAMED(mstmm_modal_column_acceleration, __VA_ARGS__)
 
 struct mstmm_modal_step_stiffness {
     int n;
-    const real *K;
-    const real *D;
-    const real *rate;
-    const real *sq;
+    const real *K, *D, *rate, *sq;
     real *S_ff;
 };
 static inline int mstmm_modal_step_stiffness_by(struct mstmm_modal_step_stiffness to)
 {
-    return mstmm_sweep_modal_step_stiffness(
-        to.n, to.K, to.D, to.rate, to.sq, to.S_ff);
+    return mstmm_sweep_modal_step_stiffness(to.n, to.K, to.D, to.rate, to.sq, to.S_ff);
 }
-#define mstmm_modal_step_stiffness(...) mstmm_modal_step_stiffness_by((struct mstmm_modal_step_stiffness){__VA_ARGS__})
+#define mstmm_modal_step_stiffness(...) MSTMM_NAMED(mstmm_modal_step_stiffness, __VA_ARGS__)
 
 struct mstmm_modal_strain_load {
     int n;
-    const real *K;
-    const real *D;
-    const real *eta;
-    const real *etad;
+    const real *K, *D, *eta, *etad;
     real *e_f;
 };
 static inline int mstmm_modal_strain_load_by(struct mstmm_modal_strain_load to)
 {
-    return mstmm_sweep_modal_strain_load(
-        to.n, to.K, to.D, to.eta, to.etad, to.e_f);
+    return mstmm_sweep_modal_strain_load(to.n, to.K, to.D, to.eta, to.etad, to.e_f);
 }
-#define mstmm_modal_strain_load(...) mstmm_modal_strain_load_by((struct mstmm_modal_strain_load){__VA_ARGS__})
+#define mstmm_modal_strain_load(...) MSTMM_NAMED(mstmm_modal_strain_load, __VA_ARGS__)
 
 struct mstmm_modal_modal_column {
     int n;
-    const real *H;
-    const real *K;
+    const real *H, *K;
     real *K_f;
 };
 static inline int mstmm_modal_modal_column_by(struct mstmm_modal_modal_column to)
 {
-    return mstmm_sweep_modal_modal_column(
-        to.n, to.H, to.K, to.K_f);
+    return mstmm_sweep_modal_modal_column(to.n, to.H, to.K, to.K_f);
 }
-#define mstmm_modal_modal_column(...) mstmm_modal_modal_column_by((struct mstmm_modal_modal_column){__VA_ARGS__})
+#define mstmm_modal_modal_column(...) MSTMM_NAMED(mstmm_modal_modal_column, __VA_ARGS__)
 
 struct mstmm_modal_condense_row {
     int n;
-    const real *S_ff;
-    const real *K_f;
-    const real *Gg;
-    real *Y;
-    real *K;
-    real *l_;
-    real *work;
+    const real *S_ff, *K_f, *Gg;
+    real *Y, *K, *l_, *work;
 };
 static inline int mstmm_modal_condense_row_by(struct mstmm_modal_condense_row to)
 {
-    return mstmm_sweep_modal_condense_row(
-        to.n, to.S_ff, to.K_f, to.Gg, to.Y, to.K, to.l_, to.work);
+    return mstmm_sweep_modal_condense_row(to.n, to.S_ff, to.K_f, to.Gg, to.Y, to.K, to.l_, to.work);
 }
-#define mstmm_modal_condense_row(...) mstmm_modal_condense_row_by((struct mstmm_modal_condense_row){__VA_ARGS__})
+#define mstmm_modal_condense_row(...) MSTMM_NAMED(mstmm_modal_condense_row, __VA_ARGS__)
 
 struct mstmm_modal_row_coupling {
     int n;
-    const real *K_f;
-    const real *Y;
+    const real *K_f, *Y;
     real *L_ij;
 };
 static inline int mstmm_modal_row_coupling_by(struct mstmm_modal_row_coupling to)
 {
-    return mstmm_sweep_modal_row_coupling(
-        to.n, to.K_f, to.Y, to.L_ij);
+    return mstmm_sweep_modal_row_coupling(to.n, to.K_f, to.Y, to.L_ij);
 }
-#define mstmm_modal_row_coupling(...) mstmm_modal_row_coupling_by((struct mstmm_modal_row_coupling){__VA_ARGS__})
+#define mstmm_modal_row_coupling(...) MSTMM_NAMED(mstmm_modal_row_coupling, __VA_ARGS__)
 
 struct mstmm_modal_multiplier_acceleration {
     int n;
-    const real *Y;
-    const real *x;
+    const real *Y, *x;
     real *etadd;
 };
 static inline int mstmm_modal_multiplier_acceleration_by(struct mstmm_modal_multiplier_acceleration to)
 {
-    return mstmm_sweep_modal_multiplier_acceleration(
-        to.n, to.Y, to.x, to.etadd);
+    return mstmm_sweep_modal_multiplier_acceleration(to.n, to.Y, to.x, to.etadd);
 }
-#define mstmm_modal_multiplier_acceleration(...) mstmm_modal_multiplier_acceleration_by((struct mstmm_modal_multiplier_acceleration){__VA_ARGS__})
+#define mstmm_modal_multiplier_acceleration(...) MSTMM_NAMED(mstmm_modal_multiplier_acceleration, __VA_ARGS__)
 
 struct mstmm_modal_residual_slope {
     int n;
-    const real *p;
-    const real *C;
-    const real *P;
-    const real *B;
-    const real *Z_xx;
-    const real *Z_xy;
-    const real *Z_xz;
-    const real *Z_yy;
-    const real *Z_yz;
-    const real *Z_zz;
-    const real *Y_x;
-    const real *Y_y;
-    const real *Y_z;
-    const real *G_x;
-    const real *G_y;
-    const real *G_z;
-    const real *M;
-    const real *K;
-    const real *D;
-    const real *eta;
-    const real *etad;
-    const real *motion;
-    const real *S_rf;
-    const real *A;
-    const real *d_eta;
-    const real *d_etad;
-    const real *d_motion;
-    real *d_S_rf;
-    real *d_A;
-    real *d_e;
-    real *d_e_f;
+    const real *p, *C, *P, *B, *Z_xx, *Z_xy, *Z_xz, *Z_yy, *Z_yz, *Z_zz, *Y_x, *Y_y, *Y_z, *G_x,
+      *G_y, *G_z, *M, *K, *D, *eta, *etad, *motion, *S_rf, *A, *d_eta, *d_etad, *d_motion;
+    real *d_S_rf, *d_A, *d_e, *d_e_f;
 };
 static inline int mstmm_modal_residual_slope_by(struct mstmm_modal_residual_slope to)
 {
-    return mstmm_sweep_modal_residual_slope(
-        to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz, to.Z_yy, to.Z_yz, to.Z_zz,
-        to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.K, to.D, to.eta, to.etad,
-        to.motion, to.S_rf, to.A, to.d_eta, to.d_etad, to.d_motion, to.d_S_rf, to.d_A, to.d_e,
-        to.d_e_f);
+    return mstmm_sweep_modal_residual_slope(to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz,
+      to.Z_yy, to.Z_yz, to.Z_zz, to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.K, to.D,
+      to.eta, to.etad, to.motion, to.S_rf, to.A, to.d_eta, to.d_etad, to.d_motion, to.d_S_rf,
+      to.d_A, to.d_e, to.d_e_f);
 }
-#define mstmm_modal_residual_slope(...) mstmm_modal_residual_slope_by((struct mstmm_modal_residual_slope){__VA_ARGS__})
+#define mstmm_modal_residual_slope(...) MSTMM_NAMED(mstmm_modal_residual_slope, __VA_ARGS__)
 
 struct mstmm_modal_momentum_slope {
     int n;
-    const real *p;
-    const real *C;
-    const real *P;
-    const real *B;
-    const real *Z_xx;
-    const real *Z_xy;
-    const real *Z_xz;
-    const real *Z_yy;
-    const real *Z_yz;
-    const real *Z_zz;
-    const real *Y_x;
-    const real *Y_y;
-    const real *Y_z;
-    const real *G_x;
-    const real *G_y;
-    const real *G_z;
-    const real *M;
-    const real *eta;
-    const real *etad;
-    const real *v;
-    const real *w;
-    const real *S_rf;
-    const real *A;
-    const real *h_f;
-    const real *d_eta;
-    const real *d_etad;
-    const real *d_v;
-    const real *d_w;
-    real *d_S_rf;
-    real *d_A;
-    real *d_h;
-    real *d_h_f;
+    const real *p, *C, *P, *B, *Z_xx, *Z_xy, *Z_xz, *Z_yy, *Z_yz, *Z_zz, *Y_x, *Y_y, *Y_z, *G_x,
+      *G_y, *G_z, *M, *eta, *etad, *v, *w, *S_rf, *A, *h_f, *d_eta, *d_etad, *d_v, *d_w;
+    real *d_S_rf, *d_A, *d_h, *d_h_f;
 };
 static inline int mstmm_modal_momentum_slope_by(struct mstmm_modal_momentum_slope to)
 {
-    return mstmm_sweep_modal_momentum_slope(
-        to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz, to.Z_yy, to.Z_yz, to.Z_zz,
-        to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.eta, to.etad, to.v, to.w,
-        to.S_rf, to.A, to.h_f, to.d_eta, to.d_etad, to.d_v, to.d_w, to.d_S_rf, to.d_A, to.d_h,
-        to.d_h_f);
+    return mstmm_sweep_modal_momentum_slope(to.n, to.p, to.C, to.P, to.B, to.Z_xx, to.Z_xy, to.Z_xz,
+      to.Z_yy, to.Z_yz, to.Z_zz, to.Y_x, to.Y_y, to.Y_z, to.G_x, to.G_y, to.G_z, to.M, to.eta,
+      to.etad, to.v, to.w, to.S_rf, to.A, to.h_f, to.d_eta, to.d_etad, to.d_v, to.d_w, to.d_S_rf,
+      to.d_A, to.d_h, to.d_h_f);
 }
-#define mstmm_modal_momentum_slope(...) mstmm_modal_momentum_slope_by((struct mstmm_modal_momentum_slope){__VA_ARGS__})
+#define mstmm_modal_momentum_slope(...) MSTMM_NAMED(mstmm_modal_momentum_slope, __VA_ARGS__)
 
 struct mstmm_modal_section_slope {
     int n;
-    const real *r;
-    const real *phi;
-    const real *theta;
-    const real *g_x;
-    const real *g_y;
-    const real *g_z;
-    const real *h_x;
-    const real *h_y;
-    const real *h_z;
-    const real *eta;
-    const real *etad;
-    const real *Phi;
-    const real *d_eta;
-    const real *d_etad;
-    real *d_Phi;
-    real *d_x;
-    real *d_Psi;
-    real *d_xd;
-    real *d_Psid;
-    real *d_xdd;
-    real *d_Psidd;
+    const real *r, *phi, *theta, *g_x, *g_y, *g_z, *h_x, *h_y, *h_z, *eta, *etad, *Phi, *d_eta,
+      *d_etad;
+    real *d_Phi, *d_x, *d_Psi, *d_xd, *d_Psid, *d_xdd, *d_Psidd;
 };
 static inline int mstmm_modal_section_slope_by(struct mstmm_modal_section_slope to)
 {
-    return mstmm_sweep_modal_section_slope(
-        to.n, to.r, to.phi, to.theta, to.g_x, to.g_y, to.g_z, to.h_x, to.h_y, to.h_z, to.eta,
-        to.etad, to.Phi, to.d_eta, to.d_etad, to.d_Phi, to.d_x, to.d_Psi, to.d_xd, to.d_Psid,
-        to.d_xdd, to.d_Psidd);
+    return mstmm_sweep_modal_section_slope(to.n, to.r, to.phi, to.theta, to.g_x, to.g_y, to.g_z,
+      to.h_x, to.h_y, to.h_z, to.eta, to.etad, to.Phi, to.d_eta, to.d_etad, to.d_Phi, to.d_x,
+      to.d_Psi, to.d_xd, to.d_Psid, to.d_xdd, to.d_Psidd);
 }
-#define mstmm_modal_section_slope(...) mstmm_modal_section_slope_by((struct mstmm_modal_section_slope){__VA_ARGS__})
+#define mstmm_modal_section_slope(...) MSTMM_NAMED(mstmm_modal_section_slope, __VA_ARGS__)
 
 struct mstmm_modal_end_motion_slope {
-    const real *R_end;
-    const real *x;
-    const real *Psi;
-    const real *xd;
-    const real *Psid;
-    const real *xdd;
-    const real *Psidd;
-    const real *d_x;
-    const real *d_Psi;
-    const real *d_xd;
-    const real *d_Psid;
-    const real *d_xdd;
-    const real *d_Psidd;
-    real *d_R;
-    real *d_d;
-    real *d_H6;
-    real *d_v;
-    real *d_w;
-    real *d_c;
+    const real *R_end, *x, *Psi, *xd, *Psid, *xdd, *Psidd, *d_x, *d_Psi, *d_xd, *d_Psid, *d_xdd,
+      *d_Psidd;
+    real *d_R, *d_d, *d_H6, *d_v, *d_w, *d_c;
 };
 static inline int mstmm_modal_end_motion_slope_by(struct mstmm_modal_end_motion_slope to)
 {
-    return mstmm_sweep_modal_end_motion_slope(
-        to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.d_x, to.d_Psi, to.d_xd,
-        to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
+    return mstmm_sweep_modal_end_motion_slope(to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd,
+      to.Psidd, to.d_x, to.d_Psi, to.d_xd, to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6,
+      to.d_v, to.d_w, to.d_c);
 }
-#define mstmm_modal_end_motion_slope(...) mstmm_modal_end_motion_slope_by((struct mstmm_modal_end_motion_slope){__VA_ARGS__})
+#define mstmm_modal_end_motion_slope(...) MSTMM_NAMED(mstmm_modal_end_motion_slope, __VA_ARGS__)
 
 struct mstmm_modal_frame_motion_slope {
-    const real *R_end;
-    const real *x;
-    const real *Psi;
-    const real *xd;
-    const real *Psid;
-    const real *xdd;
-    const real *Psidd;
-    const real *d_x;
-    const real *d_Psi;
-    const real *d_xd;
-    const real *d_Psid;
-    const real *d_xdd;
-    const real *d_Psidd;
-    real *d_R;
-    real *d_d;
-    real *d_H6;
-    real *d_v;
-    real *d_w;
-    real *d_c;
+    const real *R_end, *x, *Psi, *xd, *Psid, *xdd, *Psidd, *d_x, *d_Psi, *d_xd, *d_Psid, *d_xdd,
+      *d_Psidd;
+    real *d_R, *d_d, *d_H6, *d_v, *d_w, *d_c;
 };
 static inline int mstmm_modal_frame_motion_slope_by(struct mstmm_modal_frame_motion_slope to)
 {
-    return mstmm_sweep_modal_frame_motion_slope(
-        to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd, to.Psidd, to.d_x, to.d_Psi, to.d_xd,
-        to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
+    return mstmm_sweep_modal_frame_motion_slope(to.R_end, to.x, to.Psi, to.xd, to.Psid, to.xdd,
+      to.Psidd, to.d_x, to.d_Psi, to.d_xd, to.d_Psid, to.d_xdd, to.d_Psidd, to.d_R, to.d_d, to.d_H6,
+      to.d_v, to.d_w, to.d_c);
 }
-#define mstmm_modal_frame_motion_slope(...) mstmm_modal_frame_motion_slope_by((struct mstmm_modal_frame_motion_slope){__VA_ARGS__})
+#define mstmm_modal_frame_motion_slope(...) MSTMM_NAMED(mstmm_modal_frame_motion_slope, __VA_ARGS__)
 
 struct mstmm_modal_subspace_slope {
     int n;
-    const real *H6;
-    const real *Phi;
-    const real *d_H6;
-    const real *d_Phi;
+    const real *H6, *Phi, *d_H6, *d_Phi;
     real *d_H;
 };
 static inline int mstmm_modal_subspace_slope_by(struct mstmm_modal_subspace_slope to)
 {
-    return mstmm_sweep_modal_subspace_slope(
-        to.n, to.H6, to.Phi, to.d_H6, to.d_Phi, to.d_H);
+    return mstmm_sweep_modal_subspace_slope(to.n, to.H6, to.Phi, to.d_H6, to.d_Phi, to.d_H);
 }
-#define mstmm_modal_subspace_slope(...) mstmm_modal_subspace_slope_by((struct mstmm_modal_subspace_slope){__VA_ARGS__})
+#define mstmm_modal_subspace_slope(...) MSTMM_NAMED(mstmm_modal_subspace_slope, __VA_ARGS__)
 
 struct mstmm_modal_prescribed_bias_slope {
     int n;
-    const real *H;
-    const real *s;
-    const real *c;
-    const real *d_H;
-    const real *d_s;
-    const real *d_c;
+    const real *H, *s, *c, *d_H, *d_s, *d_c;
     real *d_c_s;
 };
 static inline int mstmm_modal_prescribed_bias_slope_by(struct mstmm_modal_prescribed_bias_slope to)
 {
-    return mstmm_sweep_modal_prescribed_bias_slope(
-        to.n, to.H, to.s, to.c, to.d_H, to.d_s, to.d_c, to.d_c_s);
+    return mstmm_sweep_modal_prescribed_bias_slope(to.n, to.H, to.s, to.c, to.d_H, to.d_s, to.d_c,
+      to.d_c_s);
 }
-#define mstmm_modal_prescribed_bias_slope(...) mstmm_modal_prescribed_bias_slope_by((struct mstmm_modal_prescribed_bias_slope){__VA_ARGS__})
+#define mstmm_modal_prescribed_bias_slope(...) MSTMM_NAMED(mstmm_modal_prescribed_bias_slope, __VA_ARGS__)
 
 struct mstmm_modal_prescribed_load_slope {
     int n;
-    const real *S_rf;
-    const real *S_ff;
-    const real *s;
-    const real *d_S_rf;
-    const real *d_s;
-    real *d_e;
-    real *d_e_f;
+    const real *S_rf, *S_ff, *s, *d_S_rf, *d_s;
+    real *d_e, *d_e_f;
 };
 static inline int mstmm_modal_prescribed_load_slope_by(struct mstmm_modal_prescribed_load_slope to)
 {
-    return mstmm_sweep_modal_prescribed_load_slope(
-        to.n, to.S_rf, to.S_ff, to.s, to.d_S_rf, to.d_s, to.d_e, to.d_e_f);
+    return mstmm_sweep_modal_prescribed_load_slope(to.n, to.S_rf, to.S_ff, to.s, to.d_S_rf, to.d_s,
+      to.d_e, to.d_e_f);
 }
-#define mstmm_modal_prescribed_load_slope(...) mstmm_modal_prescribed_load_slope_by((struct mstmm_modal_prescribed_load_slope){__VA_ARGS__})
+#define mstmm_modal_prescribed_load_slope(...) MSTMM_NAMED(mstmm_modal_prescribed_load_slope, __VA_ARGS__)
 
 struct mstmm_modal_modal_effort_slope {
     int n;
-    const real *H;
-    const real *e;
-    const real *e_f;
-    const real *d_H;
-    const real *d_e;
-    const real *d_e_f;
+    const real *H, *e, *e_f, *d_H, *d_e, *d_e_f;
     real *d_tau;
 };
 static inline int mstmm_modal_modal_effort_slope_by(struct mstmm_modal_modal_effort_slope to)
 {
-    return mstmm_sweep_modal_modal_effort_slope(
-        to.n, to.H, to.e, to.e_f, to.d_H, to.d_e, to.d_e_f, to.d_tau);
+    return mstmm_sweep_modal_modal_effort_slope(to.n, to.H, to.e, to.e_f, to.d_H, to.d_e, to.d_e_f,
+      to.d_tau);
 }
-#define mstmm_modal_modal_effort_slope(...) mstmm_modal_modal_effort_slope_by((struct mstmm_modal_modal_effort_slope){__VA_ARGS__})
+#define mstmm_modal_modal_effort_slope(...) MSTMM_NAMED(mstmm_modal_modal_effort_slope, __VA_ARGS__)
 
 struct mstmm_tangent_invert {
     int n;
-    const real *D;
-    const real *one;
-    real *inverse;
-    real *work;
+    const real *D, *one;
+    real *inverse, *work;
 };
 static inline int mstmm_tangent_invert_by(struct mstmm_tangent_invert to)
 {
-    return mstmm_sweep_tangent_invert(
-        to.n, to.D, to.one, to.inverse, to.work);
+    return mstmm_sweep_tangent_invert(to.n, to.D, to.one, to.inverse, to.work);
 }
-#define mstmm_tangent_invert(...) mstmm_tangent_invert_by((struct mstmm_tangent_invert){__VA_ARGS__})
+#define mstmm_tangent_invert(...) MSTMM_NAMED(mstmm_tangent_invert, __VA_ARGS__)
 
 struct mstmm_tangent_node {
     int n;
-    const real *H;
-    const real *B;
-    const real *G;
-    const real *W;
-    const real *S;
-    const real *K;
-    const real *Z_z;
-    const real *Z_x;
-    real *V;
-    real *D;
-    real *right;
-    real *gain;
-    real *S_c;
-    real *work;
+    const real *H, *B, *G, *W, *S, *K, *Z_z, *Z_x;
+    real *V, *D, *right, *gain, *S_c, *work;
 };
 static inline int mstmm_tangent_node_by(struct mstmm_tangent_node to)
 {
-    return mstmm_sweep_tangent_node(
-        to.n, to.H, to.B, to.G, to.W, to.S, to.K, to.Z_z, to.Z_x, to.V, to.D, to.right, to.gain,
-        to.S_c, to.work);
+    return mstmm_sweep_tangent_node(to.n, to.H, to.B, to.G, to.W, to.S, to.K, to.Z_z, to.Z_x, to.V,
+      to.D, to.right, to.gain, to.S_c, to.work);
 }
-#define mstmm_tangent_node(...) mstmm_tangent_node_by((struct mstmm_tangent_node){__VA_ARGS__})
+#define mstmm_tangent_node(...) MSTMM_NAMED(mstmm_tangent_node, __VA_ARGS__)
 
 struct mstmm_tangent_assemble_port {
     int n;
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *B;
-    const real *G;
-    const real *W;
-    const real *S;
-    const real *T;
-    real *K_x;
-    real *K;
-    real *Z_z;
-    real *Z_x;
+    const real *Rc, *r, *H, *B, *G, *W, *S, *T;
+    real *K_x, *K, *Z_z, *Z_x;
 };
 static inline int mstmm_tangent_assemble_port_by(struct mstmm_tangent_assemble_port to)
 {
-    return mstmm_sweep_tangent_assemble_port(
-        to.n, to.Rc, to.r, to.H, to.B, to.G, to.W, to.S, to.T, to.K_x, to.K, to.Z_z, to.Z_x);
+    return mstmm_sweep_tangent_assemble_port(to.n, to.Rc, to.r, to.H, to.B, to.G, to.W, to.S, to.T,
+      to.K_x, to.K, to.Z_z, to.Z_x);
 }
-#define mstmm_tangent_assemble_port(...) mstmm_tangent_assemble_port_by((struct mstmm_tangent_assemble_port){__VA_ARGS__})
+#define mstmm_tangent_assemble_port(...) MSTMM_NAMED(mstmm_tangent_assemble_port, __VA_ARGS__)
 
 struct mstmm_tangent_column_load {
     int n;
-    const real *H;
-    const real *V;
-    const real *D;
-    const real *e;
-    const real *e_f;
-    real *rest;
-    real *y;
-    real *e_c;
-    real *work;
+    const real *H, *V, *D, *e, *e_f;
+    real *rest, *y, *e_c, *work;
 };
 static inline int mstmm_tangent_column_load_by(struct mstmm_tangent_column_load to)
 {
-    return mstmm_sweep_tangent_column_load(
-        to.n, to.H, to.V, to.D, to.e, to.e_f, to.rest, to.y, to.e_c, to.work);
+    return mstmm_sweep_tangent_column_load(to.n, to.H, to.V, to.D, to.e, to.e_f, to.rest, to.y,
+      to.e_c, to.work);
 }
-#define mstmm_tangent_column_load(...) mstmm_tangent_column_load_by((struct mstmm_tangent_column_load){__VA_ARGS__})
+#define mstmm_tangent_column_load(...) MSTMM_NAMED(mstmm_tangent_column_load, __VA_ARGS__)
 
 struct mstmm_tangent_column_solution {
     int n;
-    const real *B;
-    const real *gain;
-    const real *y;
-    const real *z_c;
-    real *x;
-    real *z;
+    const real *B, *gain, *y, *z_c;
+    real *x, *z;
 };
 static inline int mstmm_tangent_column_solution_by(struct mstmm_tangent_column_solution to)
 {
-    return mstmm_sweep_tangent_column_solution(
-        to.n, to.B, to.gain, to.y, to.z_c, to.x, to.z);
+    return mstmm_sweep_tangent_column_solution(to.n, to.B, to.gain, to.y, to.z_c, to.x, to.z);
 }
-#define mstmm_tangent_column_solution(...) mstmm_tangent_column_solution_by((struct mstmm_tangent_column_solution){__VA_ARGS__})
+#define mstmm_tangent_column_solution(...) MSTMM_NAMED(mstmm_tangent_column_solution, __VA_ARGS__)
 
 struct mstmm_tangent_port_motion {
     int n;
-    const real *B;
-    const real *x;
-    const real *z_c;
+    const real *B, *x, *z_c;
     real *z;
 };
 static inline int mstmm_tangent_port_motion_by(struct mstmm_tangent_port_motion to)
 {
-    return mstmm_sweep_tangent_port_motion(
-        to.n, to.B, to.x, to.z_c, to.z);
+    return mstmm_sweep_tangent_port_motion(to.n, to.B, to.x, to.z_c, to.z);
 }
-#define mstmm_tangent_port_motion(...) mstmm_tangent_port_motion_by((struct mstmm_tangent_port_motion){__VA_ARGS__})
+#define mstmm_tangent_port_motion(...) MSTMM_NAMED(mstmm_tangent_port_motion, __VA_ARGS__)
 
 struct mstmm_tangent_increment_matrix {
     int n;
-    const real *sq;
-    const real *kappa;
-    const real *one;
-    const real *g_q;
-    real *A;
-    real *Q;
-    real *work;
+    const real *sq, *kappa, *one, *g_q;
+    real *A, *Q, *work;
 };
 static inline int mstmm_tangent_increment_matrix_by(struct mstmm_tangent_increment_matrix to)
 {
-    return mstmm_sweep_tangent_increment_matrix(
-        to.n, to.sq, to.kappa, to.one, to.g_q, to.A, to.Q, to.work);
+    return mstmm_sweep_tangent_increment_matrix(to.n, to.sq, to.kappa, to.one, to.g_q, to.A, to.Q,
+      to.work);
 }
-#define mstmm_tangent_increment_matrix(...) mstmm_tangent_increment_matrix_by((struct mstmm_tangent_increment_matrix){__VA_ARGS__})
+#define mstmm_tangent_increment_matrix(...) MSTMM_NAMED(mstmm_tangent_increment_matrix, __VA_ARGS__)
 
 struct mstmm_tangent_coordinate_increment {
     int n;
-    const real *Q;
-    const real *rate;
+    const real *Q, *rate;
     real *dq;
 };
 static inline int mstmm_tangent_coordinate_increment_by(struct mstmm_tangent_coordinate_increment to)
 {
-    return mstmm_sweep_tangent_coordinate_increment(
-        to.n, to.Q, to.rate, to.dq);
+    return mstmm_sweep_tangent_coordinate_increment(to.n, to.Q, to.rate, to.dq);
 }
-#define mstmm_tangent_coordinate_increment(...) mstmm_tangent_coordinate_increment_by((struct mstmm_tangent_coordinate_increment){__VA_ARGS__})
+#define mstmm_tangent_coordinate_increment(...) MSTMM_NAMED(mstmm_tangent_coordinate_increment, __VA_ARGS__)
 
 struct mstmm_tangent_placed_rows {
     int n;
-    const real *H;
-    const real *S_p;
+    const real *H, *S_p;
     real *Z_p;
 };
 static inline int mstmm_tangent_placed_rows_by(struct mstmm_tangent_placed_rows to)
 {
-    return mstmm_sweep_tangent_placed_rows(
-        to.n, to.H, to.S_p, to.Z_p);
+    return mstmm_sweep_tangent_placed_rows(to.n, to.H, to.S_p, to.Z_p);
 }
-#define mstmm_tangent_placed_rows(...) mstmm_tangent_placed_rows_by((struct mstmm_tangent_placed_rows){__VA_ARGS__})
+#define mstmm_tangent_placed_rows(...) MSTMM_NAMED(mstmm_tangent_placed_rows, __VA_ARGS__)
 
 struct mstmm_tangent_placed_own {
     int n;
-    const real *B_p;
-    const real *S_p;
-    const real *Z_p;
-    real *K;
-    real *Z_x;
+    const real *B_p, *S_p, *Z_p;
+    real *K, *Z_x;
 };
 static inline int mstmm_tangent_placed_own_by(struct mstmm_tangent_placed_own to)
 {
-    return mstmm_sweep_tangent_placed_own(
-        to.n, to.B_p, to.S_p, to.Z_p, to.K, to.Z_x);
+    return mstmm_sweep_tangent_placed_own(to.n, to.B_p, to.S_p, to.Z_p, to.K, to.Z_x);
 }
-#define mstmm_tangent_placed_own(...) mstmm_tangent_placed_own_by((struct mstmm_tangent_placed_own){__VA_ARGS__})
+#define mstmm_tangent_placed_own(...) MSTMM_NAMED(mstmm_tangent_placed_own, __VA_ARGS__)
 
 struct mstmm_tangent_placed_reduce {
     int n;
-    const real *inverse;
-    const real *Z_p;
-    const real *V;
-    real *gain;
-    real *S_p;
+    const real *inverse, *Z_p, *V;
+    real *gain, *S_p;
 };
 static inline int mstmm_tangent_placed_reduce_by(struct mstmm_tangent_placed_reduce to)
 {
-    return mstmm_sweep_tangent_placed_reduce(
-        to.n, to.inverse, to.Z_p, to.V, to.gain, to.S_p);
+    return mstmm_sweep_tangent_placed_reduce(to.n, to.inverse, to.Z_p, to.V, to.gain, to.S_p);
 }
-#define mstmm_tangent_placed_reduce(...) mstmm_tangent_placed_reduce_by((struct mstmm_tangent_placed_reduce){__VA_ARGS__})
+#define mstmm_tangent_placed_reduce(...) MSTMM_NAMED(mstmm_tangent_placed_reduce, __VA_ARGS__)
 
 struct mstmm_tangent_placed_node {
     int n;
-    const real *H;
-    const real *V;
-    const real *D;
-    const real *S_p;
-    const real *Z_p;
-    real *right;
-    real *gain;
-    real *S_c;
-    real *work;
+    const real *H, *V, *D, *S_p, *Z_p;
+    real *right, *gain, *S_c, *work;
 };
 static inline int mstmm_tangent_placed_node_by(struct mstmm_tangent_placed_node to)
 {
-    return mstmm_sweep_tangent_placed_node(
-        to.n, to.H, to.V, to.D, to.S_p, to.Z_p, to.right, to.gain, to.S_c, to.work);
+    return mstmm_sweep_tangent_placed_node(to.n, to.H, to.V, to.D, to.S_p, to.Z_p, to.right,
+      to.gain, to.S_c, to.work);
 }
-#define mstmm_tangent_placed_node(...) mstmm_tangent_placed_node_by((struct mstmm_tangent_placed_node){__VA_ARGS__})
+#define mstmm_tangent_placed_node(...) MSTMM_NAMED(mstmm_tangent_placed_node, __VA_ARGS__)
 
 struct mstmm_tangent_placed_port {
     int n;
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *B_p;
-    const real *S_p;
-    const real *T_p;
-    real *K;
-    real *Z_p;
-    real *Z_x;
+    const real *Rc, *r, *H, *B_p, *S_p, *T_p;
+    real *K, *Z_p, *Z_x;
 };
 static inline int mstmm_tangent_placed_port_by(struct mstmm_tangent_placed_port to)
 {
-    return mstmm_sweep_tangent_placed_port(
-        to.n, to.Rc, to.r, to.H, to.B_p, to.S_p, to.T_p, to.K, to.Z_p, to.Z_x);
+    return mstmm_sweep_tangent_placed_port(to.n, to.Rc, to.r, to.H, to.B_p, to.S_p, to.T_p, to.K,
+      to.Z_p, to.Z_x);
 }
-#define mstmm_tangent_placed_port(...) mstmm_tangent_placed_port_by((struct mstmm_tangent_placed_port){__VA_ARGS__})
+#define mstmm_tangent_placed_port(...) MSTMM_NAMED(mstmm_tangent_placed_port, __VA_ARGS__)
 
 struct mstmm_tangent_placed_remainder {
     int n;
-    const real *gain;
-    const real *p;
+    const real *gain, *p;
     real *y;
 };
 static inline int mstmm_tangent_placed_remainder_by(struct mstmm_tangent_placed_remainder to)
 {
-    return mstmm_sweep_tangent_placed_remainder(
-        to.n, to.gain, to.p, to.y);
+    return mstmm_sweep_tangent_placed_remainder(to.n, to.gain, to.p, to.y);
 }
-#define mstmm_tangent_placed_remainder(...) mstmm_tangent_placed_remainder_by((struct mstmm_tangent_placed_remainder){__VA_ARGS__})
+#define mstmm_tangent_placed_remainder(...) MSTMM_NAMED(mstmm_tangent_placed_remainder, __VA_ARGS__)
 
 struct mstmm_qr_factor {
     const real *S;
@@ -1549,604 +973,419 @@ struct mstmm_qr_factor {
 };
 static inline int mstmm_qr_factor_by(struct mstmm_qr_factor to)
 {
-    return mstmm_sweep_qr_factor(
-        to.S, to.U);
+    return mstmm_sweep_qr_factor(to.S, to.U);
 }
-#define mstmm_qr_factor(...) mstmm_qr_factor_by((struct mstmm_qr_factor){__VA_ARGS__})
+#define mstmm_qr_factor(...) MSTMM_NAMED(mstmm_qr_factor, __VA_ARGS__)
 
 struct mstmm_qr_bias {
-    const real *U;
-    const real *motion;
-    real *d;
-    real *e;
+    const real *U, *motion;
+    real *d, *e;
 };
 static inline int mstmm_qr_bias_by(struct mstmm_qr_bias to)
 {
-    return mstmm_sweep_qr_bias(
-        to.U, to.motion, to.d, to.e);
+    return mstmm_sweep_qr_bias(to.U, to.motion, to.d, to.e);
 }
-#define mstmm_qr_bias(...) mstmm_qr_bias_by((struct mstmm_qr_bias){__VA_ARGS__})
+#define mstmm_qr_bias(...) MSTMM_NAMED(mstmm_qr_bias, __VA_ARGS__)
 
 struct mstmm_qr_merge {
-    const real *Rc;
-    const real *r;
-    const real *V;
-    const real *d_V;
-    const real *e_Q;
-    const real *U_P;
-    const real *d_P;
-    real *U;
-    real *d;
-    real *e_I;
+    const real *Rc, *r, *V, *d_V, *e_Q, *U_P, *d_P;
+    real *U, *d, *e_I;
 };
 static inline int mstmm_qr_merge_by(struct mstmm_qr_merge to)
 {
-    return mstmm_sweep_qr_merge(
-        to.Rc, to.r, to.V, to.d_V, to.e_Q, to.U_P, to.d_P, to.U, to.d, to.e_I);
+    return mstmm_sweep_qr_merge(to.Rc, to.r, to.V, to.d_V, to.e_Q, to.U_P, to.d_P, to.U, to.d,
+      to.e_I);
 }
-#define mstmm_qr_merge(...) mstmm_qr_merge_by((struct mstmm_qr_merge){__VA_ARGS__})
+#define mstmm_qr_merge(...) MSTMM_NAMED(mstmm_qr_merge, __VA_ARGS__)
 
 struct mstmm_qr_rows_to_riccati {
-    const real *U;
-    const real *d;
-    const real *e;
-    real *S;
-    real *e_S;
+    const real *U, *d, *e;
+    real *S, *e_S;
 };
 static inline int mstmm_qr_rows_to_riccati_by(struct mstmm_qr_rows_to_riccati to)
 {
-    return mstmm_sweep_qr_rows_to_riccati(
-        to.U, to.d, to.e, to.S, to.e_S);
+    return mstmm_sweep_qr_rows_to_riccati(to.U, to.d, to.e, to.S, to.e_S);
 }
-#define mstmm_qr_rows_to_riccati(...) mstmm_qr_rows_to_riccati_by((struct mstmm_qr_rows_to_riccati){__VA_ARGS__})
+#define mstmm_qr_rows_to_riccati(...) MSTMM_NAMED(mstmm_qr_rows_to_riccati, __VA_ARGS__)
 
 struct mstmm_loops_relative_pose {
-    const real *A_C;
-    const real *x_C;
-    const real *A_B;
-    const real *x_B;
-    const real *r_e;
-    const real *Rc;
-    const real *r;
-    real *R_C;
-    real *r_A;
-    real *d;
+    const real *A_C, *x_C, *A_B, *x_B, *r_e, *Rc, *r;
+    real *R_C, *r_A, *d;
 };
 static inline int mstmm_loops_relative_pose_by(struct mstmm_loops_relative_pose to)
 {
-    return mstmm_sweep_loops_relative_pose(
-        to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d);
+    return mstmm_sweep_loops_relative_pose(to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r,
+      to.R_C, to.r_A, to.d);
 }
-#define mstmm_loops_relative_pose(...) mstmm_loops_relative_pose_by((struct mstmm_loops_relative_pose){__VA_ARGS__})
+#define mstmm_loops_relative_pose(...) MSTMM_NAMED(mstmm_loops_relative_pose, __VA_ARGS__)
 
 struct mstmm_loops_gap {
-    const real *R_e;
-    const real *R_C;
-    const real *d;
+    const real *R_e, *R_C, *d;
     real *gap;
 };
 static inline int mstmm_loops_gap_by(struct mstmm_loops_gap to)
 {
-    return mstmm_sweep_loops_gap(
-        to.R_e, to.R_C, to.d, to.gap);
+    return mstmm_sweep_loops_gap(to.R_e, to.R_C, to.d, to.gap);
 }
-#define mstmm_loops_gap(...) mstmm_loops_gap_by((struct mstmm_loops_gap){__VA_ARGS__})
+#define mstmm_loops_gap(...) MSTMM_NAMED(mstmm_loops_gap, __VA_ARGS__)
 
 struct mstmm_loops_slip {
-    const real *R_C;
-    const real *r_e;
-    const real *d;
-    const real *v_C;
-    const real *w_C;
-    const real *v_B;
-    const real *w_B;
+    const real *R_C, *r_e, *d, *v_C, *w_C, *v_B, *w_B;
     real *slip;
 };
 static inline int mstmm_loops_slip_by(struct mstmm_loops_slip to)
 {
-    return mstmm_sweep_loops_slip(
-        to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.slip);
+    return mstmm_sweep_loops_slip(to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.slip);
 }
-#define mstmm_loops_slip(...) mstmm_loops_slip_by((struct mstmm_loops_slip){__VA_ARGS__})
+#define mstmm_loops_slip(...) MSTMM_NAMED(mstmm_loops_slip, __VA_ARGS__)
 
 struct mstmm_loops_drift {
-    const real *R_C;
-    const real *r_e;
-    const real *d;
-    const real *slip;
-    const real *motion_C;
-    const real *motion_B;
+    const real *R_C, *r_e, *d, *slip, *motion_C, *motion_B;
     real *drift;
 };
 static inline int mstmm_loops_drift_by(struct mstmm_loops_drift to)
 {
-    return mstmm_sweep_loops_drift(
-        to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B, to.drift);
+    return mstmm_sweep_loops_drift(to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B,
+      to.drift);
 }
-#define mstmm_loops_drift(...) mstmm_loops_drift_by((struct mstmm_loops_drift){__VA_ARGS__})
+#define mstmm_loops_drift(...) MSTMM_NAMED(mstmm_loops_drift, __VA_ARGS__)
 
 struct mstmm_loops_required_acceleration {
-    const real *gap;
-    const real *rate;
+    const real *gap, *rate;
     real *relative;
 };
 static inline int mstmm_loops_required_acceleration_by(struct mstmm_loops_required_acceleration to)
 {
-    return mstmm_sweep_loops_required_acceleration(
-        to.gap, to.rate, to.relative);
+    return mstmm_sweep_loops_required_acceleration(to.gap, to.rate, to.relative);
 }
-#define mstmm_loops_required_acceleration(...) mstmm_loops_required_acceleration_by((struct mstmm_loops_required_acceleration){__VA_ARGS__})
+#define mstmm_loops_required_acceleration(...) MSTMM_NAMED(mstmm_loops_required_acceleration, __VA_ARGS__)
 
 struct mstmm_loops_row {
-    const real *w;
-    const real *R_C;
-    const real *r_e;
-    const real *Rc;
-    const real *r_A;
-    real *J_A;
-    real *J_B;
+    const real *w, *R_C, *r_e, *Rc, *r_A;
+    real *J_A, *J_B;
 };
 static inline int mstmm_loops_row_by(struct mstmm_loops_row to)
 {
-    return mstmm_sweep_loops_row(
-        to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.J_A, to.J_B);
+    return mstmm_sweep_loops_row(to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.J_A, to.J_B);
 }
-#define mstmm_loops_row(...) mstmm_loops_row_by((struct mstmm_loops_row){__VA_ARGS__})
+#define mstmm_loops_row(...) MSTMM_NAMED(mstmm_loops_row, __VA_ARGS__)
 
 struct mstmm_loops_known_parts {
-    const real *W;
-    const real *relative;
+    const real *W, *relative;
     real *l;
 };
 static inline int mstmm_loops_known_parts_by(struct mstmm_loops_known_parts to)
 {
-    return mstmm_sweep_loops_known_parts(
-        to.W, to.relative, to.l);
+    return mstmm_sweep_loops_known_parts(to.W, to.relative, to.l);
 }
-#define mstmm_loops_known_parts(...) mstmm_loops_known_parts_by((struct mstmm_loops_known_parts){__VA_ARGS__})
+#define mstmm_loops_known_parts(...) MSTMM_NAMED(mstmm_loops_known_parts, __VA_ARGS__)
 
 struct mstmm_loops_row_acceleration {
-    const real *J_A;
-    const real *J_B;
-    const real *l;
-    const real *delta_A;
-    const real *delta_B;
+    const real *J_A, *J_B, *l, *delta_A, *delta_B;
     real *c;
 };
 static inline int mstmm_loops_row_acceleration_by(struct mstmm_loops_row_acceleration to)
 {
-    return mstmm_sweep_loops_row_acceleration(
-        to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
+    return mstmm_sweep_loops_row_acceleration(to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
 }
-#define mstmm_loops_row_acceleration(...) mstmm_loops_row_acceleration_by((struct mstmm_loops_row_acceleration){__VA_ARGS__})
+#define mstmm_loops_row_acceleration(...) MSTMM_NAMED(mstmm_loops_row_acceleration, __VA_ARGS__)
 
 struct mstmm_loops_apply_effort {
-    const real *J;
-    const real *tau;
+    const real *J, *tau;
     real *e;
 };
 static inline int mstmm_loops_apply_effort_by(struct mstmm_loops_apply_effort to)
 {
-    return mstmm_sweep_loops_apply_effort(
-        to.J, to.tau, to.e);
+    return mstmm_sweep_loops_apply_effort(to.J, to.tau, to.e);
 }
-#define mstmm_loops_apply_effort(...) mstmm_loops_apply_effort_by((struct mstmm_loops_apply_effort){__VA_ARGS__})
+#define mstmm_loops_apply_effort(...) MSTMM_NAMED(mstmm_loops_apply_effort, __VA_ARGS__)
 
 struct mstmm_loops_pivot_inverse {
-    const real *L;
-    const real *floor_;
+    const real *L, *floor_;
     real *inverse;
 };
 static inline int mstmm_loops_pivot_inverse_by(struct mstmm_loops_pivot_inverse to)
 {
-    return mstmm_sweep_loops_pivot_inverse(
-        to.L, to.floor_, to.inverse);
+    return mstmm_sweep_loops_pivot_inverse(to.L, to.floor_, to.inverse);
 }
-#define mstmm_loops_pivot_inverse(...) mstmm_loops_pivot_inverse_by((struct mstmm_loops_pivot_inverse){__VA_ARGS__})
+#define mstmm_loops_pivot_inverse(...) MSTMM_NAMED(mstmm_loops_pivot_inverse, __VA_ARGS__)
 
 struct mstmm_loops_eliminate_row {
-    const real *inverse;
-    const real *K;
-    const real *l;
-    real *S;
-    real *e;
+    const real *inverse, *K, *l;
+    real *S, *e;
 };
 static inline int mstmm_loops_eliminate_row_by(struct mstmm_loops_eliminate_row to)
 {
-    return mstmm_sweep_loops_eliminate_row(
-        to.inverse, to.K, to.l, to.S, to.e);
+    return mstmm_sweep_loops_eliminate_row(to.inverse, to.K, to.l, to.S, to.e);
 }
-#define mstmm_loops_eliminate_row(...) mstmm_loops_eliminate_row_by((struct mstmm_loops_eliminate_row){__VA_ARGS__})
+#define mstmm_loops_eliminate_row(...) MSTMM_NAMED(mstmm_loops_eliminate_row, __VA_ARGS__)
 
 struct mstmm_loops_update_column {
-    const real *inverse;
-    const real *K;
-    const real *L_p;
+    const real *inverse, *K, *L_p;
     real *K_p;
 };
 static inline int mstmm_loops_update_column_by(struct mstmm_loops_update_column to)
 {
-    return mstmm_sweep_loops_update_column(
-        to.inverse, to.K, to.L_p, to.K_p);
+    return mstmm_sweep_loops_update_column(to.inverse, to.K, to.L_p, to.K_p);
 }
-#define mstmm_loops_update_column(...) mstmm_loops_update_column_by((struct mstmm_loops_update_column){__VA_ARGS__})
+#define mstmm_loops_update_column(...) MSTMM_NAMED(mstmm_loops_update_column, __VA_ARGS__)
 
 struct mstmm_loops_update_known_part {
-    const real *inverse;
-    const real *l;
-    const real *L_p;
+    const real *inverse, *l, *L_p;
     real *l_p;
 };
 static inline int mstmm_loops_update_known_part_by(struct mstmm_loops_update_known_part to)
 {
-    return mstmm_sweep_loops_update_known_part(
-        to.inverse, to.l, to.L_p, to.l_p);
+    return mstmm_sweep_loops_update_known_part(to.inverse, to.l, to.L_p, to.l_p);
 }
-#define mstmm_loops_update_known_part(...) mstmm_loops_update_known_part_by((struct mstmm_loops_update_known_part){__VA_ARGS__})
+#define mstmm_loops_update_known_part(...) MSTMM_NAMED(mstmm_loops_update_known_part, __VA_ARGS__)
 
 struct mstmm_loops_update_coupling {
-    const real *inverse;
-    const real *L_p;
-    const real *L_q;
+    const real *inverse, *L_p, *L_q;
     real *L_pq;
 };
 static inline int mstmm_loops_update_coupling_by(struct mstmm_loops_update_coupling to)
 {
-    return mstmm_sweep_loops_update_coupling(
-        to.inverse, to.L_p, to.L_q, to.L_pq);
+    return mstmm_sweep_loops_update_coupling(to.inverse, to.L_p, to.L_q, to.L_pq);
 }
-#define mstmm_loops_update_coupling(...) mstmm_loops_update_coupling_by((struct mstmm_loops_update_coupling){__VA_ARGS__})
+#define mstmm_loops_update_coupling(...) MSTMM_NAMED(mstmm_loops_update_coupling, __VA_ARGS__)
 
 struct mstmm_loops_multiplier {
-    const real *inverse;
-    const real *l;
+    const real *inverse, *l;
     real *x;
 };
 static inline int mstmm_loops_multiplier_by(struct mstmm_loops_multiplier to)
 {
-    return mstmm_sweep_loops_multiplier(
-        to.inverse, to.l, to.x);
+    return mstmm_sweep_loops_multiplier(to.inverse, to.l, to.x);
 }
-#define mstmm_loops_multiplier(...) mstmm_loops_multiplier_by((struct mstmm_loops_multiplier){__VA_ARGS__})
+#define mstmm_loops_multiplier(...) MSTMM_NAMED(mstmm_loops_multiplier, __VA_ARGS__)
 
 struct mstmm_loops_multiplier_of_motion {
-    const real *inverse;
-    const real *K;
-    const real *delta;
+    const real *inverse, *K, *delta;
     real *x;
 };
 static inline int mstmm_loops_multiplier_of_motion_by(struct mstmm_loops_multiplier_of_motion to)
 {
-    return mstmm_sweep_loops_multiplier_of_motion(
-        to.inverse, to.K, to.delta, to.x);
+    return mstmm_sweep_loops_multiplier_of_motion(to.inverse, to.K, to.delta, to.x);
 }
-#define mstmm_loops_multiplier_of_motion(...) mstmm_loops_multiplier_of_motion_by((struct mstmm_loops_multiplier_of_motion){__VA_ARGS__})
+#define mstmm_loops_multiplier_of_motion(...) MSTMM_NAMED(mstmm_loops_multiplier_of_motion, __VA_ARGS__)
 
 struct mstmm_loops_multiplier_of_row {
-    const real *inverse;
-    const real *L_p;
-    const real *x_p;
+    const real *inverse, *L_p, *x_p;
     real *x;
 };
 static inline int mstmm_loops_multiplier_of_row_by(struct mstmm_loops_multiplier_of_row to)
 {
-    return mstmm_sweep_loops_multiplier_of_row(
-        to.inverse, to.L_p, to.x_p, to.x);
+    return mstmm_sweep_loops_multiplier_of_row(to.inverse, to.L_p, to.x_p, to.x);
 }
-#define mstmm_loops_multiplier_of_row(...) mstmm_loops_multiplier_of_row_by((struct mstmm_loops_multiplier_of_row){__VA_ARGS__})
+#define mstmm_loops_multiplier_of_row(...) MSTMM_NAMED(mstmm_loops_multiplier_of_row, __VA_ARGS__)
 
 struct mstmm_loops_rotor_row_residual {
-    const real *softness;
-    const real *s;
-    const real *x;
+    const real *softness, *s, *x;
     real *l;
 };
 static inline int mstmm_loops_rotor_row_residual_by(struct mstmm_loops_rotor_row_residual to)
 {
-    return mstmm_sweep_loops_rotor_row_residual(
-        to.softness, to.s, to.x, to.l);
+    return mstmm_sweep_loops_rotor_row_residual(to.softness, to.s, to.x, to.l);
 }
-#define mstmm_loops_rotor_row_residual(...) mstmm_loops_rotor_row_residual_by((struct mstmm_loops_rotor_row_residual){__VA_ARGS__})
+#define mstmm_loops_rotor_row_residual(...) MSTMM_NAMED(mstmm_loops_rotor_row_residual, __VA_ARGS__)
 
 struct mstmm_loops_apply_multiplier {
-    const real *K;
-    const real *x;
+    const real *K, *x;
     real *e;
 };
 static inline int mstmm_loops_apply_multiplier_by(struct mstmm_loops_apply_multiplier to)
 {
-    return mstmm_sweep_loops_apply_multiplier(
-        to.K, to.x, to.e);
+    return mstmm_sweep_loops_apply_multiplier(to.K, to.x, to.e);
 }
-#define mstmm_loops_apply_multiplier(...) mstmm_loops_apply_multiplier_by((struct mstmm_loops_apply_multiplier){__VA_ARGS__})
+#define mstmm_loops_apply_multiplier(...) MSTMM_NAMED(mstmm_loops_apply_multiplier, __VA_ARGS__)
 
 struct mstmm_loops_distance {
-    const real *p;
-    const real *d;
-    real *W;
-    real *gap;
+    const real *p, *d;
+    real *W, *gap;
 };
 static inline int mstmm_loops_distance_by(struct mstmm_loops_distance to)
 {
-    return mstmm_sweep_loops_distance(
-        to.p, to.d, to.W, to.gap);
+    return mstmm_sweep_loops_distance(to.p, to.d, to.W, to.gap);
 }
-#define mstmm_loops_distance(...) mstmm_loops_distance_by((struct mstmm_loops_distance){__VA_ARGS__})
+#define mstmm_loops_distance(...) MSTMM_NAMED(mstmm_loops_distance, __VA_ARGS__)
 
 struct mstmm_loops_distance_drift {
-    const real *d;
-    const real *slip;
+    const real *d, *slip;
     real *drift;
 };
 static inline int mstmm_loops_distance_drift_by(struct mstmm_loops_distance_drift to)
 {
-    return mstmm_sweep_loops_distance_drift(
-        to.d, to.slip, to.drift);
+    return mstmm_sweep_loops_distance_drift(to.d, to.slip, to.drift);
 }
-#define mstmm_loops_distance_drift(...) mstmm_loops_distance_drift_by((struct mstmm_loops_distance_drift){__VA_ARGS__})
+#define mstmm_loops_distance_drift(...) MSTMM_NAMED(mstmm_loops_distance_drift, __VA_ARGS__)
 
 struct mstmm_loops_plane {
-    const real *p;
-    const real *d;
-    real *W;
-    real *gap;
+    const real *p, *d;
+    real *W, *gap;
 };
 static inline int mstmm_loops_plane_by(struct mstmm_loops_plane to)
 {
-    return mstmm_sweep_loops_plane(
-        to.p, to.d, to.W, to.gap);
+    return mstmm_sweep_loops_plane(to.p, to.d, to.W, to.gap);
 }
-#define mstmm_loops_plane(...) mstmm_loops_plane_by((struct mstmm_loops_plane){__VA_ARGS__})
+#define mstmm_loops_plane(...) MSTMM_NAMED(mstmm_loops_plane, __VA_ARGS__)
 
 struct mstmm_loops_rolling {
-    const real *p;
-    const real *R_C;
-    const real *d;
-    real *W;
-    real *gap;
+    const real *p, *R_C, *d;
+    real *W, *gap;
 };
 static inline int mstmm_loops_rolling_by(struct mstmm_loops_rolling to)
 {
-    return mstmm_sweep_loops_rolling(
-        to.p, to.R_C, to.d, to.W, to.gap);
+    return mstmm_sweep_loops_rolling(to.p, to.R_C, to.d, to.W, to.gap);
 }
-#define mstmm_loops_rolling(...) mstmm_loops_rolling_by((struct mstmm_loops_rolling){__VA_ARGS__})
+#define mstmm_loops_rolling(...) MSTMM_NAMED(mstmm_loops_rolling, __VA_ARGS__)
 
 struct mstmm_loops_rolling_drift {
-    const real *p;
-    const real *R_C;
-    const real *slip;
+    const real *p, *R_C, *slip;
     real *drift;
 };
 static inline int mstmm_loops_rolling_drift_by(struct mstmm_loops_rolling_drift to)
 {
-    return mstmm_sweep_loops_rolling_drift(
-        to.p, to.R_C, to.slip, to.drift);
+    return mstmm_sweep_loops_rolling_drift(to.p, to.R_C, to.slip, to.drift);
 }
-#define mstmm_loops_rolling_drift(...) mstmm_loops_rolling_drift_by((struct mstmm_loops_rolling_drift){__VA_ARGS__})
+#define mstmm_loops_rolling_drift(...) MSTMM_NAMED(mstmm_loops_rolling_drift, __VA_ARGS__)
 
 struct mstmm_loops_relative_pose_slope {
-    const real *A_C;
-    const real *x_C;
-    const real *A_B;
-    const real *x_B;
-    const real *r_e;
-    const real *Rc;
-    const real *r;
-    const real *d_A_C;
-    const real *d_x_C;
-    const real *d_A_B;
-    const real *d_x_B;
-    const real *d_Rc;
-    const real *d_r;
-    real *d_R_C;
-    real *d_r_A;
-    real *d_d;
+    const real *A_C, *x_C, *A_B, *x_B, *r_e, *Rc, *r, *d_A_C, *d_x_C, *d_A_B, *d_x_B, *d_Rc, *d_r;
+    real *d_R_C, *d_r_A, *d_d;
 };
 static inline int mstmm_loops_relative_pose_slope_by(struct mstmm_loops_relative_pose_slope to)
 {
-    return mstmm_sweep_loops_relative_pose_slope(
-        to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.d_A_C, to.d_x_C, to.d_A_B,
-        to.d_x_B, to.d_Rc, to.d_r, to.d_R_C, to.d_r_A, to.d_d);
+    return mstmm_sweep_loops_relative_pose_slope(to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc,
+      to.r, to.d_A_C, to.d_x_C, to.d_A_B, to.d_x_B, to.d_Rc, to.d_r, to.d_R_C, to.d_r_A, to.d_d);
 }
-#define mstmm_loops_relative_pose_slope(...) mstmm_loops_relative_pose_slope_by((struct mstmm_loops_relative_pose_slope){__VA_ARGS__})
+#define mstmm_loops_relative_pose_slope(...) MSTMM_NAMED(mstmm_loops_relative_pose_slope, __VA_ARGS__)
 
 struct mstmm_loops_slip_slope {
-    const real *R_C;
-    const real *r_e;
-    const real *d;
-    const real *v_C;
-    const real *w_C;
-    const real *v_B;
-    const real *w_B;
-    const real *d_R_C;
-    const real *d_d;
-    const real *d_v_C;
-    const real *d_w_C;
-    const real *d_v_B;
-    const real *d_w_B;
+    const real *R_C, *r_e, *d, *v_C, *w_C, *v_B, *w_B, *d_R_C, *d_d, *d_v_C, *d_w_C, *d_v_B, *d_w_B;
     real *d_slip;
 };
 static inline int mstmm_loops_slip_slope_by(struct mstmm_loops_slip_slope to)
 {
-    return mstmm_sweep_loops_slip_slope(
-        to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.d_R_C, to.d_d, to.d_v_C,
-        to.d_w_C, to.d_v_B, to.d_w_B, to.d_slip);
+    return mstmm_sweep_loops_slip_slope(to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B,
+      to.d_R_C, to.d_d, to.d_v_C, to.d_w_C, to.d_v_B, to.d_w_B, to.d_slip);
 }
-#define mstmm_loops_slip_slope(...) mstmm_loops_slip_slope_by((struct mstmm_loops_slip_slope){__VA_ARGS__})
+#define mstmm_loops_slip_slope(...) MSTMM_NAMED(mstmm_loops_slip_slope, __VA_ARGS__)
 
 struct mstmm_loops_drift_slope {
-    const real *R_C;
-    const real *r_e;
-    const real *d;
-    const real *slip;
-    const real *motion_C;
-    const real *motion_B;
-    const real *d_R_C;
-    const real *d_d;
-    const real *d_slip;
-    const real *d_motion_C;
-    const real *d_motion_B;
+    const real *R_C, *r_e, *d, *slip, *motion_C, *motion_B, *d_R_C, *d_d, *d_slip, *d_motion_C,
+      *d_motion_B;
     real *d_drift;
 };
 static inline int mstmm_loops_drift_slope_by(struct mstmm_loops_drift_slope to)
 {
-    return mstmm_sweep_loops_drift_slope(
-        to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B, to.d_R_C, to.d_d, to.d_slip,
-        to.d_motion_C, to.d_motion_B, to.d_drift);
+    return mstmm_sweep_loops_drift_slope(to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B,
+      to.d_R_C, to.d_d, to.d_slip, to.d_motion_C, to.d_motion_B, to.d_drift);
 }
-#define mstmm_loops_drift_slope(...) mstmm_loops_drift_slope_by((struct mstmm_loops_drift_slope){__VA_ARGS__})
+#define mstmm_loops_drift_slope(...) MSTMM_NAMED(mstmm_loops_drift_slope, __VA_ARGS__)
 
 struct mstmm_loops_row_slope {
-    const real *w;
-    const real *R_C;
-    const real *r_e;
-    const real *Rc;
-    const real *r_A;
-    const real *d_w;
-    const real *d_R_C;
-    const real *d_Rc;
-    const real *d_r_A;
-    real *d_J_A;
-    real *d_J_B;
+    const real *w, *R_C, *r_e, *Rc, *r_A, *d_w, *d_R_C, *d_Rc, *d_r_A;
+    real *d_J_A, *d_J_B;
 };
 static inline int mstmm_loops_row_slope_by(struct mstmm_loops_row_slope to)
 {
-    return mstmm_sweep_loops_row_slope(
-        to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.d_w, to.d_R_C, to.d_Rc, to.d_r_A, to.d_J_A,
-        to.d_J_B);
+    return mstmm_sweep_loops_row_slope(to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.d_w, to.d_R_C,
+      to.d_Rc, to.d_r_A, to.d_J_A, to.d_J_B);
 }
-#define mstmm_loops_row_slope(...) mstmm_loops_row_slope_by((struct mstmm_loops_row_slope){__VA_ARGS__})
+#define mstmm_loops_row_slope(...) MSTMM_NAMED(mstmm_loops_row_slope, __VA_ARGS__)
 
 struct mstmm_loops_known_parts_slope {
-    const real *W;
-    const real *relative;
-    const real *d_W;
-    const real *d_relative;
+    const real *W, *relative, *d_W, *d_relative;
     real *d_l;
 };
 static inline int mstmm_loops_known_parts_slope_by(struct mstmm_loops_known_parts_slope to)
 {
-    return mstmm_sweep_loops_known_parts_slope(
-        to.W, to.relative, to.d_W, to.d_relative, to.d_l);
+    return mstmm_sweep_loops_known_parts_slope(to.W, to.relative, to.d_W, to.d_relative, to.d_l);
 }
-#define mstmm_loops_known_parts_slope(...) mstmm_loops_known_parts_slope_by((struct mstmm_loops_known_parts_slope){__VA_ARGS__})
+#define mstmm_loops_known_parts_slope(...) MSTMM_NAMED(mstmm_loops_known_parts_slope, __VA_ARGS__)
 
 struct mstmm_loops_apply_effort_slope {
-    const real *J;
-    const real *tau;
-    const real *d_J;
-    const real *d_tau;
+    const real *J, *tau, *d_J, *d_tau;
     real *d_e;
 };
 static inline int mstmm_loops_apply_effort_slope_by(struct mstmm_loops_apply_effort_slope to)
 {
-    return mstmm_sweep_loops_apply_effort_slope(
-        to.J, to.tau, to.d_J, to.d_tau, to.d_e);
+    return mstmm_sweep_loops_apply_effort_slope(to.J, to.tau, to.d_J, to.d_tau, to.d_e);
 }
-#define mstmm_loops_apply_effort_slope(...) mstmm_loops_apply_effort_slope_by((struct mstmm_loops_apply_effort_slope){__VA_ARGS__})
+#define mstmm_loops_apply_effort_slope(...) MSTMM_NAMED(mstmm_loops_apply_effort_slope, __VA_ARGS__)
 
 struct mstmm_loops_apply_multiplier_slope {
-    const real *K;
-    const real *x;
-    const real *d_K;
-    const real *d_x;
+    const real *K, *x, *d_K, *d_x;
     real *d_e;
 };
 static inline int mstmm_loops_apply_multiplier_slope_by(struct mstmm_loops_apply_multiplier_slope to)
 {
-    return mstmm_sweep_loops_apply_multiplier_slope(
-        to.K, to.x, to.d_K, to.d_x, to.d_e);
+    return mstmm_sweep_loops_apply_multiplier_slope(to.K, to.x, to.d_K, to.d_x, to.d_e);
 }
-#define mstmm_loops_apply_multiplier_slope(...) mstmm_loops_apply_multiplier_slope_by((struct mstmm_loops_apply_multiplier_slope){__VA_ARGS__})
+#define mstmm_loops_apply_multiplier_slope(...) MSTMM_NAMED(mstmm_loops_apply_multiplier_slope, __VA_ARGS__)
 
 struct mstmm_loops_distance_slope {
-    const real *p;
-    const real *d;
-    const real *d_d;
+    const real *p, *d, *d_d;
     real *d_W;
 };
 static inline int mstmm_loops_distance_slope_by(struct mstmm_loops_distance_slope to)
 {
-    return mstmm_sweep_loops_distance_slope(
-        to.p, to.d, to.d_d, to.d_W);
+    return mstmm_sweep_loops_distance_slope(to.p, to.d, to.d_d, to.d_W);
 }
-#define mstmm_loops_distance_slope(...) mstmm_loops_distance_slope_by((struct mstmm_loops_distance_slope){__VA_ARGS__})
+#define mstmm_loops_distance_slope(...) MSTMM_NAMED(mstmm_loops_distance_slope, __VA_ARGS__)
 
 struct mstmm_loops_distance_drift_slope {
-    const real *d;
-    const real *slip;
-    const real *d_d;
-    const real *d_slip;
+    const real *d, *slip, *d_d, *d_slip;
     real *d_drift;
 };
 static inline int mstmm_loops_distance_drift_slope_by(struct mstmm_loops_distance_drift_slope to)
 {
-    return mstmm_sweep_loops_distance_drift_slope(
-        to.d, to.slip, to.d_d, to.d_slip, to.d_drift);
+    return mstmm_sweep_loops_distance_drift_slope(to.d, to.slip, to.d_d, to.d_slip, to.d_drift);
 }
-#define mstmm_loops_distance_drift_slope(...) mstmm_loops_distance_drift_slope_by((struct mstmm_loops_distance_drift_slope){__VA_ARGS__})
+#define mstmm_loops_distance_drift_slope(...) MSTMM_NAMED(mstmm_loops_distance_drift_slope, __VA_ARGS__)
 
 struct mstmm_loops_plane_slope {
-    const real *p;
-    const real *d;
-    const real *d_d;
+    const real *p, *d, *d_d;
     real *d_W;
 };
 static inline int mstmm_loops_plane_slope_by(struct mstmm_loops_plane_slope to)
 {
-    return mstmm_sweep_loops_plane_slope(
-        to.p, to.d, to.d_d, to.d_W);
+    return mstmm_sweep_loops_plane_slope(to.p, to.d, to.d_d, to.d_W);
 }
-#define mstmm_loops_plane_slope(...) mstmm_loops_plane_slope_by((struct mstmm_loops_plane_slope){__VA_ARGS__})
+#define mstmm_loops_plane_slope(...) MSTMM_NAMED(mstmm_loops_plane_slope, __VA_ARGS__)
 
 struct mstmm_loops_rolling_slope {
-    const real *p;
-    const real *R_C;
-    const real *d;
-    const real *d_R_C;
-    const real *d_d;
+    const real *p, *R_C, *d, *d_R_C, *d_d;
     real *d_W;
 };
 static inline int mstmm_loops_rolling_slope_by(struct mstmm_loops_rolling_slope to)
 {
-    return mstmm_sweep_loops_rolling_slope(
-        to.p, to.R_C, to.d, to.d_R_C, to.d_d, to.d_W);
+    return mstmm_sweep_loops_rolling_slope(to.p, to.R_C, to.d, to.d_R_C, to.d_d, to.d_W);
 }
-#define mstmm_loops_rolling_slope(...) mstmm_loops_rolling_slope_by((struct mstmm_loops_rolling_slope){__VA_ARGS__})
+#define mstmm_loops_rolling_slope(...) MSTMM_NAMED(mstmm_loops_rolling_slope, __VA_ARGS__)
 
 struct mstmm_loops_rolling_drift_slope {
-    const real *p;
-    const real *R_C;
-    const real *slip;
-    const real *d_R_C;
-    const real *d_slip;
+    const real *p, *R_C, *slip, *d_R_C, *d_slip;
     real *d_drift;
 };
 static inline int mstmm_loops_rolling_drift_slope_by(struct mstmm_loops_rolling_drift_slope to)
 {
-    return mstmm_sweep_loops_rolling_drift_slope(
-        to.p, to.R_C, to.slip, to.d_R_C, to.d_slip, to.d_drift);
+    return mstmm_sweep_loops_rolling_drift_slope(to.p, to.R_C, to.slip, to.d_R_C, to.d_slip,
+      to.d_drift);
 }
-#define mstmm_loops_rolling_drift_slope(...) mstmm_loops_rolling_drift_slope_by((struct mstmm_loops_rolling_drift_slope){__VA_ARGS__})
+#define mstmm_loops_rolling_drift_slope(...) MSTMM_NAMED(mstmm_loops_rolling_drift_slope, __VA_ARGS__)
 
 struct mstmm_planar_forward {
-    const real *Rt;
-    const real *ro;
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *motion_I;
-    real *Rc;
-    real *motion;
-    real *qdot;
+    const real *Rt, *ro, *p, *q, *u, *motion_I;
+    real *Rc, *motion, *qdot;
 };
 static inline int mstmm_planar_forward_by(struct mstmm_planar_forward to)
 {
-    return mstmm_sweep_planar_pin_forward(
-        to.Rt, to.ro, to.p, to.q, to.u, to.motion_I, to.Rc, to.motion, to.qdot);
+    return mstmm_sweep_planar_pin_forward(to.Rt, to.ro, to.p, to.q, to.u, to.motion_I, to.Rc,
+      to.motion, to.qdot);
 }
-#define mstmm_planar_forward(...) mstmm_planar_forward_by((struct mstmm_planar_forward){__VA_ARGS__})
+#define mstmm_planar_forward(...) MSTMM_NAMED(mstmm_planar_forward, __VA_ARGS__)
 
 struct mstmm_planar_inertia {
     const real *p;
@@ -2154,566 +1393,360 @@ struct mstmm_planar_inertia {
 };
 static inline int mstmm_planar_inertia_by(struct mstmm_planar_inertia to)
 {
-    return mstmm_sweep_planar_pin_inertia(
-        to.p, to.S);
+    return mstmm_sweep_planar_pin_inertia(to.p, to.S);
 }
-#define mstmm_planar_inertia(...) mstmm_planar_inertia_by((struct mstmm_planar_inertia){__VA_ARGS__})
+#define mstmm_planar_inertia(...) MSTMM_NAMED(mstmm_planar_inertia, __VA_ARGS__)
 
 struct mstmm_planar_bias_load {
-    const real *p;
-    const real *motion;
+    const real *p, *motion;
     real *e;
 };
 static inline int mstmm_planar_bias_load_by(struct mstmm_planar_bias_load to)
 {
-    return mstmm_sweep_planar_pin_bias_load(
-        to.p, to.motion, to.e);
+    return mstmm_sweep_planar_pin_bias_load(to.p, to.motion, to.e);
 }
-#define mstmm_planar_bias_load(...) mstmm_planar_bias_load_by((struct mstmm_planar_bias_load){__VA_ARGS__})
+#define mstmm_planar_bias_load(...) MSTMM_NAMED(mstmm_planar_bias_load, __VA_ARGS__)
 
 struct mstmm_planar_pose {
-    const real *A_I;
-    const real *x_I;
-    const real *Rc;
-    const real *r;
-    real *A;
-    real *x;
+    const real *A_I, *x_I, *Rc, *r;
+    real *A, *x;
 };
 static inline int mstmm_planar_pose_by(struct mstmm_planar_pose to)
 {
-    return mstmm_sweep_planar_pin_pose(
-        to.A_I, to.x_I, to.Rc, to.r, to.A, to.x);
+    return mstmm_sweep_planar_pin_pose(to.A_I, to.x_I, to.Rc, to.r, to.A, to.x);
 }
-#define mstmm_planar_pose(...) mstmm_planar_pose_by((struct mstmm_planar_pose){__VA_ARGS__})
+#define mstmm_planar_pose(...) MSTMM_NAMED(mstmm_planar_pose, __VA_ARGS__)
 
 struct mstmm_planar_velocity {
-    const real *Rc;
-    const real *r;
-    const real *v_I;
-    const real *w_I;
+    const real *Rc, *r, *v_I, *w_I;
     real *v;
 };
 static inline int mstmm_planar_velocity_by(struct mstmm_planar_velocity to)
 {
-    return mstmm_sweep_planar_pin_velocity(
-        to.Rc, to.r, to.v_I, to.w_I, to.v);
+    return mstmm_sweep_planar_pin_velocity(to.Rc, to.r, to.v_I, to.w_I, to.v);
 }
-#define mstmm_planar_velocity(...) mstmm_planar_velocity_by((struct mstmm_planar_velocity){__VA_ARGS__})
+#define mstmm_planar_velocity(...) MSTMM_NAMED(mstmm_planar_velocity, __VA_ARGS__)
 
 struct mstmm_planar_point {
-    const real *A;
-    const real *x;
-    const real *v;
-    const real *motion;
-    const real *offset;
-    real *x_K;
-    real *v_K;
+    const real *A, *x, *v, *motion, *offset;
+    real *x_K, *v_K;
 };
 static inline int mstmm_planar_point_by(struct mstmm_planar_point to)
 {
-    return mstmm_sweep_planar_pin_point(
-        to.A, to.x, to.v, to.motion, to.offset, to.x_K, to.v_K);
+    return mstmm_sweep_planar_pin_point(to.A, to.x, to.v, to.motion, to.offset, to.x_K, to.v_K);
 }
-#define mstmm_planar_point(...) mstmm_planar_point_by((struct mstmm_planar_point){__VA_ARGS__})
+#define mstmm_planar_point(...) MSTMM_NAMED(mstmm_planar_point, __VA_ARGS__)
 
 struct mstmm_planar_angular_motion {
-    const real *A;
-    const real *motion;
+    const real *A, *motion;
     real *w_K;
 };
 static inline int mstmm_planar_angular_motion_by(struct mstmm_planar_angular_motion to)
 {
-    return mstmm_sweep_planar_pin_angular_motion(
-        to.A, to.motion, to.w_K);
+    return mstmm_sweep_planar_pin_angular_motion(to.A, to.motion, to.w_K);
 }
-#define mstmm_planar_angular_motion(...) mstmm_planar_angular_motion_by((struct mstmm_planar_angular_motion){__VA_ARGS__})
+#define mstmm_planar_angular_motion(...) MSTMM_NAMED(mstmm_planar_angular_motion, __VA_ARGS__)
 
 struct mstmm_planar_end_frame {
-    const real *A;
-    const real *R_end;
+    const real *A, *R_end;
     real *A_end;
 };
 static inline int mstmm_planar_end_frame_by(struct mstmm_planar_end_frame to)
 {
-    return mstmm_sweep_planar_pin_end_frame(
-        to.A, to.R_end, to.A_end);
+    return mstmm_sweep_planar_pin_end_frame(to.A, to.R_end, to.A_end);
 }
-#define mstmm_planar_end_frame(...) mstmm_planar_end_frame_by((struct mstmm_planar_end_frame){__VA_ARGS__})
+#define mstmm_planar_end_frame(...) MSTMM_NAMED(mstmm_planar_end_frame, __VA_ARGS__)
 
 struct mstmm_planar_applied_load {
-    const real *A;
-    const real *A_F;
-    const real *offset;
-    const real *F;
-    const real *M;
+    const real *A, *A_F, *offset, *F, *M;
     real *e;
 };
 static inline int mstmm_planar_applied_load_by(struct mstmm_planar_applied_load to)
 {
-    return mstmm_sweep_planar_pin_applied_load(
-        to.A, to.A_F, to.offset, to.F, to.M, to.e);
+    return mstmm_sweep_planar_pin_applied_load(to.A, to.A_F, to.offset, to.F, to.M, to.e);
 }
-#define mstmm_planar_applied_load(...) mstmm_planar_applied_load_by((struct mstmm_planar_applied_load){__VA_ARGS__})
+#define mstmm_planar_applied_load(...) MSTMM_NAMED(mstmm_planar_applied_load, __VA_ARGS__)
 
 struct mstmm_planar_factor {
-    const real *Rc;
-    const real *r;
-    const real *J;
-    const real *floor_;
-    const real *S;
-    real *F;
-    real *G;
-    real *S_I;
+    const real *Rc, *r, *J, *floor_, *S;
+    real *F, *G, *S_I;
 };
 static inline int mstmm_planar_factor_by(struct mstmm_planar_factor to)
 {
-    return mstmm_sweep_planar_pin_factor(
-        to.Rc, to.r, to.J, to.floor_, to.S, to.F, to.G, to.S_I);
+    return mstmm_sweep_planar_pin_factor(to.Rc, to.r, to.J, to.floor_, to.S, to.F, to.G, to.S_I);
 }
-#define mstmm_planar_factor(...) mstmm_planar_factor_by((struct mstmm_planar_factor){__VA_ARGS__})
+#define mstmm_planar_factor(...) MSTMM_NAMED(mstmm_planar_factor, __VA_ARGS__)
 
 struct mstmm_planar_column_load {
-    const real *Rc;
-    const real *r;
-    const real *G;
-    const real *e;
-    const real *tau;
-    real *y;
-    real *e_I;
+    const real *Rc, *r, *G, *e, *tau;
+    real *y, *e_I;
 };
 static inline int mstmm_planar_column_load_by(struct mstmm_planar_column_load to)
 {
-    return mstmm_sweep_planar_pin_column_load(
-        to.Rc, to.r, to.G, to.e, to.tau, to.y, to.e_I);
+    return mstmm_sweep_planar_pin_column_load(to.Rc, to.r, to.G, to.e, to.tau, to.y, to.e_I);
 }
-#define mstmm_planar_column_load(...) mstmm_planar_column_load_by((struct mstmm_planar_column_load){__VA_ARGS__})
+#define mstmm_planar_column_load(...) MSTMM_NAMED(mstmm_planar_column_load, __VA_ARGS__)
 
 struct mstmm_planar_column_acceleration {
-    const real *Rc;
-    const real *r;
-    const real *F;
-    const real *G;
-    const real *y;
-    const real *delta_I;
-    real *udot;
-    real *delta;
+    const real *Rc, *r, *F, *G, *y, *delta_I;
+    real *udot, *delta;
 };
 static inline int mstmm_planar_column_acceleration_by(struct mstmm_planar_column_acceleration to)
 {
-    return mstmm_sweep_planar_pin_column_acceleration(
-        to.Rc, to.r, to.F, to.G, to.y, to.delta_I, to.udot, to.delta);
+    return mstmm_sweep_planar_pin_column_acceleration(to.Rc, to.r, to.F, to.G, to.y, to.delta_I,
+      to.udot, to.delta);
 }
-#define mstmm_planar_column_acceleration(...) mstmm_planar_column_acceleration_by((struct mstmm_planar_column_acceleration){__VA_ARGS__})
+#define mstmm_planar_column_acceleration(...) MSTMM_NAMED(mstmm_planar_column_acceleration, __VA_ARGS__)
 
 struct mstmm_planar_divide {
-    const real *F;
-    const real *y;
+    const real *F, *y;
     real *z;
 };
 static inline int mstmm_planar_divide_by(struct mstmm_planar_divide to)
 {
-    return mstmm_sweep_planar_pin_divide(
-        to.F, to.y, to.z);
+    return mstmm_sweep_planar_pin_divide(to.F, to.y, to.z);
 }
-#define mstmm_planar_divide(...) mstmm_planar_divide_by((struct mstmm_planar_divide){__VA_ARGS__})
+#define mstmm_planar_divide(...) MSTMM_NAMED(mstmm_planar_divide, __VA_ARGS__)
 
 struct mstmm_planar_couple {
-    const real *y;
-    const real *z;
+    const real *y, *z;
     real *L_ij;
 };
 static inline int mstmm_planar_couple_by(struct mstmm_planar_couple to)
 {
-    return mstmm_sweep_planar_pin_couple(
-        to.y, to.z, to.L_ij);
+    return mstmm_sweep_planar_pin_couple(to.y, to.z, to.L_ij);
 }
-#define mstmm_planar_couple(...) mstmm_planar_couple_by((struct mstmm_planar_couple){__VA_ARGS__})
+#define mstmm_planar_couple(...) MSTMM_NAMED(mstmm_planar_couple, __VA_ARGS__)
 
 struct mstmm_planar_add_known_part {
-    const real *y;
-    const real *z;
+    const real *y, *z;
     real *l;
 };
 static inline int mstmm_planar_add_known_part_by(struct mstmm_planar_add_known_part to)
 {
-    return mstmm_sweep_planar_pin_add_known_part(
-        to.y, to.z, to.l);
+    return mstmm_sweep_planar_pin_add_known_part(to.y, to.z, to.l);
 }
-#define mstmm_planar_add_known_part(...) mstmm_planar_add_known_part_by((struct mstmm_planar_add_known_part){__VA_ARGS__})
+#define mstmm_planar_add_known_part(...) MSTMM_NAMED(mstmm_planar_add_known_part, __VA_ARGS__)
 
 struct mstmm_planar_add_multiplier_effort {
-    const real *y;
-    const real *x;
+    const real *y, *x;
     real *y_0;
 };
 static inline int mstmm_planar_add_multiplier_effort_by(struct mstmm_planar_add_multiplier_effort to)
 {
-    return mstmm_sweep_planar_pin_add_multiplier_effort(
-        to.y, to.x, to.y_0);
+    return mstmm_sweep_planar_pin_add_multiplier_effort(to.y, to.x, to.y_0);
 }
-#define mstmm_planar_add_multiplier_effort(...) mstmm_planar_add_multiplier_effort_by((struct mstmm_planar_add_multiplier_effort){__VA_ARGS__})
+#define mstmm_planar_add_multiplier_effort(...) MSTMM_NAMED(mstmm_planar_add_multiplier_effort, __VA_ARGS__)
 
 struct mstmm_planar_ground_column_load {
-    const real *e;
-    const real *tau;
+    const real *e, *tau;
     real *y;
 };
 static inline int mstmm_planar_ground_column_load_by(struct mstmm_planar_ground_column_load to)
 {
-    return mstmm_sweep_planar_pin_ground_column_load(
-        to.e, to.tau, to.y);
+    return mstmm_sweep_planar_pin_ground_column_load(to.e, to.tau, to.y);
 }
-#define mstmm_planar_ground_column_load(...) mstmm_planar_ground_column_load_by((struct mstmm_planar_ground_column_load){__VA_ARGS__})
+#define mstmm_planar_ground_column_load(...) MSTMM_NAMED(mstmm_planar_ground_column_load, __VA_ARGS__)
 
 struct mstmm_planar_relative_pose {
-    const real *A_C;
-    const real *x_C;
-    const real *A_B;
-    const real *x_B;
-    const real *r_e;
-    const real *Rc;
-    const real *r;
-    real *R_C;
-    real *r_A;
-    real *d;
+    const real *A_C, *x_C, *A_B, *x_B, *r_e, *Rc, *r;
+    real *R_C, *r_A, *d;
 };
 static inline int mstmm_planar_relative_pose_by(struct mstmm_planar_relative_pose to)
 {
-    return mstmm_sweep_planar_pin_relative_pose(
-        to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r, to.R_C, to.r_A, to.d);
+    return mstmm_sweep_planar_pin_relative_pose(to.A_C, to.x_C, to.A_B, to.x_B, to.r_e, to.Rc, to.r,
+      to.R_C, to.r_A, to.d);
 }
-#define mstmm_planar_relative_pose(...) mstmm_planar_relative_pose_by((struct mstmm_planar_relative_pose){__VA_ARGS__})
+#define mstmm_planar_relative_pose(...) MSTMM_NAMED(mstmm_planar_relative_pose, __VA_ARGS__)
 
 struct mstmm_planar_slip {
-    const real *R_C;
-    const real *r_e;
-    const real *d;
-    const real *v_C;
-    const real *w_C;
-    const real *v_B;
-    const real *w_B;
+    const real *R_C, *r_e, *d, *v_C, *w_C, *v_B, *w_B;
     real *slip;
 };
 static inline int mstmm_planar_slip_by(struct mstmm_planar_slip to)
 {
-    return mstmm_sweep_planar_pin_slip(
-        to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B, to.slip);
+    return mstmm_sweep_planar_pin_slip(to.R_C, to.r_e, to.d, to.v_C, to.w_C, to.v_B, to.w_B,
+      to.slip);
 }
-#define mstmm_planar_slip(...) mstmm_planar_slip_by((struct mstmm_planar_slip){__VA_ARGS__})
+#define mstmm_planar_slip(...) MSTMM_NAMED(mstmm_planar_slip, __VA_ARGS__)
 
 struct mstmm_planar_drift {
-    const real *R_C;
-    const real *r_e;
-    const real *d;
-    const real *slip;
-    const real *motion_C;
-    const real *motion_B;
+    const real *R_C, *r_e, *d, *slip, *motion_C, *motion_B;
     real *drift;
 };
 static inline int mstmm_planar_drift_by(struct mstmm_planar_drift to)
 {
-    return mstmm_sweep_planar_pin_drift(
-        to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B, to.drift);
+    return mstmm_sweep_planar_pin_drift(to.R_C, to.r_e, to.d, to.slip, to.motion_C, to.motion_B,
+      to.drift);
 }
-#define mstmm_planar_drift(...) mstmm_planar_drift_by((struct mstmm_planar_drift){__VA_ARGS__})
+#define mstmm_planar_drift(...) MSTMM_NAMED(mstmm_planar_drift, __VA_ARGS__)
 
 struct mstmm_planar_row {
-    const real *w;
-    const real *R_C;
-    const real *r_e;
-    const real *Rc;
-    const real *r_A;
-    real *J_A;
-    real *J_B;
+    const real *w, *R_C, *r_e, *Rc, *r_A;
+    real *J_A, *J_B;
 };
 static inline int mstmm_planar_row_by(struct mstmm_planar_row to)
 {
-    return mstmm_sweep_planar_pin_row(
-        to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.J_A, to.J_B);
+    return mstmm_sweep_planar_pin_row(to.w, to.R_C, to.r_e, to.Rc, to.r_A, to.J_A, to.J_B);
 }
-#define mstmm_planar_row(...) mstmm_planar_row_by((struct mstmm_planar_row){__VA_ARGS__})
+#define mstmm_planar_row(...) MSTMM_NAMED(mstmm_planar_row, __VA_ARGS__)
 
 struct mstmm_planar_known_parts {
-    const real *W;
-    const real *relative;
+    const real *W, *relative;
     real *l;
 };
 static inline int mstmm_planar_known_parts_by(struct mstmm_planar_known_parts to)
 {
-    return mstmm_sweep_planar_pin_known_parts(
-        to.W, to.relative, to.l);
+    return mstmm_sweep_planar_pin_known_parts(to.W, to.relative, to.l);
 }
-#define mstmm_planar_known_parts(...) mstmm_planar_known_parts_by((struct mstmm_planar_known_parts){__VA_ARGS__})
+#define mstmm_planar_known_parts(...) MSTMM_NAMED(mstmm_planar_known_parts, __VA_ARGS__)
 
 struct mstmm_planar_row_acceleration {
-    const real *J_A;
-    const real *J_B;
-    const real *l;
-    const real *delta_A;
-    const real *delta_B;
+    const real *J_A, *J_B, *l, *delta_A, *delta_B;
     real *c;
 };
 static inline int mstmm_planar_row_acceleration_by(struct mstmm_planar_row_acceleration to)
 {
-    return mstmm_sweep_planar_pin_row_acceleration(
-        to.J_A, to.J_B, to.l, to.delta_A, to.delta_B, to.c);
+    return mstmm_sweep_planar_pin_row_acceleration(to.J_A, to.J_B, to.l, to.delta_A, to.delta_B,
+      to.c);
 }
-#define mstmm_planar_row_acceleration(...) mstmm_planar_row_acceleration_by((struct mstmm_planar_row_acceleration){__VA_ARGS__})
+#define mstmm_planar_row_acceleration(...) MSTMM_NAMED(mstmm_planar_row_acceleration, __VA_ARGS__)
 
 struct mstmm_planar_apply_effort {
-    const real *J;
-    const real *tau;
+    const real *J, *tau;
     real *e;
 };
 static inline int mstmm_planar_apply_effort_by(struct mstmm_planar_apply_effort to)
 {
-    return mstmm_sweep_planar_pin_apply_effort(
-        to.J, to.tau, to.e);
+    return mstmm_sweep_planar_pin_apply_effort(to.J, to.tau, to.e);
 }
-#define mstmm_planar_apply_effort(...) mstmm_planar_apply_effort_by((struct mstmm_planar_apply_effort){__VA_ARGS__})
+#define mstmm_planar_apply_effort(...) MSTMM_NAMED(mstmm_planar_apply_effort, __VA_ARGS__)
 
 struct mstmm_planar_eliminate_row {
-    const real *inverse;
-    const real *K;
-    const real *l;
-    real *S;
-    real *e;
+    const real *inverse, *K, *l;
+    real *S, *e;
 };
 static inline int mstmm_planar_eliminate_row_by(struct mstmm_planar_eliminate_row to)
 {
-    return mstmm_sweep_planar_pin_eliminate_row(
-        to.inverse, to.K, to.l, to.S, to.e);
+    return mstmm_sweep_planar_pin_eliminate_row(to.inverse, to.K, to.l, to.S, to.e);
 }
-#define mstmm_planar_eliminate_row(...) mstmm_planar_eliminate_row_by((struct mstmm_planar_eliminate_row){__VA_ARGS__})
+#define mstmm_planar_eliminate_row(...) MSTMM_NAMED(mstmm_planar_eliminate_row, __VA_ARGS__)
 
 struct mstmm_planar_update_column {
-    const real *inverse;
-    const real *K;
-    const real *L_p;
+    const real *inverse, *K, *L_p;
     real *K_p;
 };
 static inline int mstmm_planar_update_column_by(struct mstmm_planar_update_column to)
 {
-    return mstmm_sweep_planar_pin_update_column(
-        to.inverse, to.K, to.L_p, to.K_p);
+    return mstmm_sweep_planar_pin_update_column(to.inverse, to.K, to.L_p, to.K_p);
 }
-#define mstmm_planar_update_column(...) mstmm_planar_update_column_by((struct mstmm_planar_update_column){__VA_ARGS__})
+#define mstmm_planar_update_column(...) MSTMM_NAMED(mstmm_planar_update_column, __VA_ARGS__)
 
 struct mstmm_planar_multiplier_of_motion {
-    const real *inverse;
-    const real *K;
-    const real *delta;
+    const real *inverse, *K, *delta;
     real *x;
 };
 static inline int mstmm_planar_multiplier_of_motion_by(struct mstmm_planar_multiplier_of_motion to)
 {
-    return mstmm_sweep_planar_pin_multiplier_of_motion(
-        to.inverse, to.K, to.delta, to.x);
+    return mstmm_sweep_planar_pin_multiplier_of_motion(to.inverse, to.K, to.delta, to.x);
 }
-#define mstmm_planar_multiplier_of_motion(...) mstmm_planar_multiplier_of_motion_by((struct mstmm_planar_multiplier_of_motion){__VA_ARGS__})
+#define mstmm_planar_multiplier_of_motion(...) MSTMM_NAMED(mstmm_planar_multiplier_of_motion, __VA_ARGS__)
 
 struct mstmm_classical_body_transfer {
-    const real *M;
-    const real *r_IO;
-    const real *r_IC;
-    const real *J_I;
-    const real *omega;
-    const real *f_C;
-    const real *m_C;
-    real *U;
-    real *F_scale;
+    const real *M, *r_IO, *r_IC, *J_I, *omega, *f_C, *m_C;
+    real *U, *F_scale;
 };
 static inline int mstmm_classical_body_transfer_by(struct mstmm_classical_body_transfer to)
 {
-    return mstmm_classical_body_spatial_transfer(
-        to.M, to.r_IO, to.r_IC, to.J_I, to.omega, to.f_C, to.m_C, to.U, to.F_scale);
+    return mstmm_classical_body_spatial_transfer(to.M, to.r_IO, to.r_IC, to.J_I, to.omega, to.f_C,
+      to.m_C, to.U, to.F_scale);
 }
-#define mstmm_classical_body_transfer(...) mstmm_classical_body_transfer_by((struct mstmm_classical_body_transfer){__VA_ARGS__})
+#define mstmm_classical_body_transfer(...) MSTMM_NAMED(mstmm_classical_body_transfer, __VA_ARGS__)
 
 struct mstmm_classical_pin_transfer {
-    const real *U;
-    const real *F_scale;
-    const real *a;
-    const real *u;
-    const real *omega_I;
-    const real *a_n;
-    const real *tau_n;
-    real *U_h;
-    real *margin;
+    const real *U, *F_scale, *a, *u, *omega_I, *a_n, *tau_n;
+    real *U_h, *margin;
 };
 static inline int mstmm_classical_pin_transfer_by(struct mstmm_classical_pin_transfer to)
 {
-    return mstmm_classical_pin_spatial_transfer(
-        to.U, to.F_scale, to.a, to.u, to.omega_I, to.a_n, to.tau_n, to.U_h, to.margin);
+    return mstmm_classical_pin_spatial_transfer(to.U, to.F_scale, to.a, to.u, to.omega_I, to.a_n,
+      to.tau_n, to.U_h, to.margin);
 }
-#define mstmm_classical_pin_transfer(...) mstmm_classical_pin_transfer_by((struct mstmm_classical_pin_transfer){__VA_ARGS__})
+#define mstmm_classical_pin_transfer(...) MSTMM_NAMED(mstmm_classical_pin_transfer, __VA_ARGS__)
 
 struct mstmm_classical_ball_transfer {
-    const real *U;
-    const real *F_scale;
-    const real *tau_n;
-    real *U_h;
-    real *margin;
+    const real *U, *F_scale, *tau_n;
+    real *U_h, *margin;
 };
 static inline int mstmm_classical_ball_transfer_by(struct mstmm_classical_ball_transfer to)
 {
-    return mstmm_classical_ball_transfer(
-        to.U, to.F_scale, to.tau_n, to.U_h, to.margin);
+    return mstmm_classical_ball_transfer(to.U, to.F_scale, to.tau_n, to.U_h, to.margin);
 }
-#define mstmm_classical_ball_transfer(...) mstmm_classical_ball_transfer_by((struct mstmm_classical_ball_transfer){__VA_ARGS__})
+#define mstmm_classical_ball_transfer(...) MSTMM_NAMED(mstmm_classical_ball_transfer, __VA_ARGS__)
 
 struct mstmm_classical_acceleration_transfer {
-    const real *U;
-    const real *F_scale;
-    const real *d;
-    const real *d_n;
-    const real *tau_n;
-    real *U_h;
-    real *margin;
+    const real *U, *F_scale, *d, *d_n, *tau_n;
+    real *U_h, *margin;
 };
 static inline int mstmm_classical_acceleration_transfer_by(struct mstmm_classical_acceleration_transfer to)
 {
-    return mstmm_classical_acceleration_transfer(
-        to.U, to.F_scale, to.d, to.d_n, to.tau_n, to.U_h, to.margin);
+    return mstmm_classical_acceleration_transfer(to.U, to.F_scale, to.d, to.d_n, to.tau_n, to.U_h,
+      to.margin);
 }
-#define mstmm_classical_acceleration_transfer(...) mstmm_classical_acceleration_transfer_by((struct mstmm_classical_acceleration_transfer){__VA_ARGS__})
+#define mstmm_classical_acceleration_transfer(...) MSTMM_NAMED(mstmm_classical_acceleration_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_body_planar_transfer {
-    const real *m;
-    const real *S_0;
-    const real *I_0;
-    const real *r_e;
-    const real *A;
-    const real *C;
-    const real *B_r;
-    const real *B_theta;
-    const real *D_theta;
-    const real *r_p;
-    const real *theta_p;
-    const real *q_p;
-    const real *g;
-    const real *f_r;
-    const real *f_m;
+    const real *m, *S_0, *I_0, *r_e, *A, *C, *B_r, *B_theta, *D_theta, *r_p, *theta_p, *q_p, *g,
+      *f_r, *f_m;
     real *U;
 };
 static inline int mstmm_discrete_body_planar_transfer_by(struct mstmm_discrete_body_planar_transfer to)
 {
-    return mstmm_classical_body_planar_discrete_transfer(
-        to.m, to.S_0, to.I_0, to.r_e, to.A, to.C, to.B_r, to.B_theta, to.D_theta, to.r_p,
-        to.theta_p, to.q_p, to.g, to.f_r, to.f_m, to.U);
+    return mstmm_classical_body_planar_discrete_transfer(to.m, to.S_0, to.I_0, to.r_e, to.A, to.C,
+      to.B_r, to.B_theta, to.D_theta, to.r_p, to.theta_p, to.q_p, to.g, to.f_r, to.f_m, to.U);
 }
-#define mstmm_discrete_body_planar_transfer(...) mstmm_discrete_body_planar_transfer_by((struct mstmm_discrete_body_planar_transfer){__VA_ARGS__})
+#define mstmm_discrete_body_planar_transfer(...) MSTMM_NAMED(mstmm_discrete_body_planar_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_beam_planar_transfer {
-    const real *m;
-    const real *S_0;
-    const real *I_0;
-    const real *s;
-    const real *S_c;
-    const real *M_f;
-    const real *K_f;
-    const real *D_f;
-    const real *L;
-    const real *phi_O;
-    const real *Theta_O;
-    const real *Theta_I;
-    const real *A;
-    const real *C;
-    const real *B_r;
-    const real *B_theta;
-    const real *D_theta;
-    const real *B_eta;
-    const real *D_eta;
-    const real *r_p;
-    const real *theta_p;
-    const real *eta_p;
-    const real *q_p;
-    const real *g;
-    const real *f_r;
-    const real *f_m;
-    const real *f_eta;
-    real *U;
-    real *W;
+    const real *m, *S_0, *I_0, *s, *S_c, *M_f, *K_f, *D_f, *L, *phi_O, *Theta_O, *Theta_I, *A, *C,
+      *B_r, *B_theta, *D_theta, *B_eta, *D_eta, *r_p, *theta_p, *eta_p, *q_p, *g, *f_r, *f_m,
+      *f_eta;
+    real *U, *W;
 };
 static inline int mstmm_discrete_beam_planar_transfer_by(struct mstmm_discrete_beam_planar_transfer to)
 {
-    return mstmm_classical_beam_planar_discrete_transfer(
-        to.m, to.S_0, to.I_0, to.s, to.S_c, to.M_f, to.K_f, to.D_f, to.L, to.phi_O, to.Theta_O,
-        to.Theta_I, to.A, to.C, to.B_r, to.B_theta, to.D_theta, to.B_eta, to.D_eta, to.r_p,
-        to.theta_p, to.eta_p, to.q_p, to.g, to.f_r, to.f_m, to.f_eta, to.U, to.W);
+    return mstmm_classical_beam_planar_discrete_transfer(to.m, to.S_0, to.I_0, to.s, to.S_c, to.M_f,
+      to.K_f, to.D_f, to.L, to.phi_O, to.Theta_O, to.Theta_I, to.A, to.C, to.B_r, to.B_theta,
+      to.D_theta, to.B_eta, to.D_eta, to.r_p, to.theta_p, to.eta_p, to.q_p, to.g, to.f_r, to.f_m,
+      to.f_eta, to.U, to.W);
 }
-#define mstmm_discrete_beam_planar_transfer(...) mstmm_discrete_beam_planar_transfer_by((struct mstmm_discrete_beam_planar_transfer){__VA_ARGS__})
+#define mstmm_discrete_beam_planar_transfer(...) MSTMM_NAMED(mstmm_discrete_beam_planar_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_body_spatial_transfer {
-    const real *m;
-    const real *S_0;
-    const real *J_0;
-    const real *r_e;
-    const real *A;
-    const real *C;
-    const real *B_r;
-    const real *B_w;
-    const real *D_w;
-    const real *T;
-    const real *r_p;
-    const real *R_p;
-    const real *q_p;
-    const real *g;
-    const real *f_r;
-    const real *f_m;
+    const real *m, *S_0, *J_0, *r_e, *A, *C, *B_r, *B_w, *D_w, *T, *r_p, *R_p, *q_p, *g, *f_r, *f_m;
     real *U;
 };
 static inline int mstmm_discrete_body_spatial_transfer_by(struct mstmm_discrete_body_spatial_transfer to)
 {
-    return mstmm_classical_body_spatial_discrete_transfer(
-        to.m, to.S_0, to.J_0, to.r_e, to.A, to.C, to.B_r, to.B_w, to.D_w, to.T, to.r_p, to.R_p,
-        to.q_p, to.g, to.f_r, to.f_m, to.U);
+    return mstmm_classical_body_spatial_discrete_transfer(to.m, to.S_0, to.J_0, to.r_e, to.A, to.C,
+      to.B_r, to.B_w, to.D_w, to.T, to.r_p, to.R_p, to.q_p, to.g, to.f_r, to.f_m, to.U);
 }
-#define mstmm_discrete_body_spatial_transfer(...) mstmm_discrete_body_spatial_transfer_by((struct mstmm_discrete_body_spatial_transfer){__VA_ARGS__})
+#define mstmm_discrete_body_spatial_transfer(...) MSTMM_NAMED(mstmm_discrete_body_spatial_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_beam_spatial_transfer {
-    const real *m;
-    const real *S_0;
-    const real *J_0;
-    const real *s;
-    const real *e;
-    const real *M_phi;
-    const real *K_f;
-    const real *D_f;
-    const real *r_e;
-    const real *Phi_O;
-    const real *Theta_O;
-    const real *Theta_I;
-    const real *A;
-    const real *C;
-    const real *B_r;
-    const real *B_w;
-    const real *D_w;
-    const real *T;
-    const real *B_eta;
-    const real *D_eta;
-    const real *r_p;
-    const real *R_p;
-    const real *eta_p;
-    const real *q_p;
-    const real *m_p;
-    const real *m_pI;
-    const real *K_g;
-    const real *g;
-    const real *f_r;
-    const real *f_m;
-    const real *f_eta;
-    real *U;
-    real *W;
+    const real *m, *S_0, *J_0, *s, *e, *M_phi, *K_f, *D_f, *r_e, *Phi_O, *Theta_O, *Theta_I, *A, *C,
+      *B_r, *B_w, *D_w, *T, *B_eta, *D_eta, *r_p, *R_p, *eta_p, *q_p, *m_p, *m_pI, *K_g, *g, *f_r,
+      *f_m, *f_eta;
+    real *U, *W;
 };
 static inline int mstmm_discrete_beam_spatial_transfer_by(struct mstmm_discrete_beam_spatial_transfer to)
 {
-    return mstmm_classical_beam_spatial_discrete_transfer(
-        to.m, to.S_0, to.J_0, to.s, to.e, to.M_phi, to.K_f, to.D_f, to.r_e, to.Phi_O, to.Theta_O,
-        to.Theta_I, to.A, to.C, to.B_r, to.B_w, to.D_w, to.T, to.B_eta, to.D_eta, to.r_p, to.R_p,
-        to.eta_p, to.q_p, to.m_p, to.m_pI, to.K_g, to.g, to.f_r, to.f_m, to.f_eta, to.U, to.W);
+    return mstmm_classical_beam_spatial_discrete_transfer(to.m, to.S_0, to.J_0, to.s, to.e,
+      to.M_phi, to.K_f, to.D_f, to.r_e, to.Phi_O, to.Theta_O, to.Theta_I, to.A, to.C, to.B_r,
+      to.B_w, to.D_w, to.T, to.B_eta, to.D_eta, to.r_p, to.R_p, to.eta_p, to.q_p, to.m_p, to.m_pI,
+      to.K_g, to.g, to.f_r, to.f_m, to.f_eta, to.U, to.W);
 }
-#define mstmm_discrete_beam_spatial_transfer(...) mstmm_discrete_beam_spatial_transfer_by((struct mstmm_discrete_beam_spatial_transfer){__VA_ARGS__})
+#define mstmm_discrete_beam_spatial_transfer(...) MSTMM_NAMED(mstmm_discrete_beam_spatial_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_planar_rigid_rigid_transfer {
     const real *gamma;
@@ -2721,197 +1754,131 @@ struct mstmm_discrete_fixed_planar_rigid_rigid_transfer {
 };
 static inline int mstmm_discrete_fixed_planar_rigid_rigid_transfer_by(struct mstmm_discrete_fixed_planar_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(
-        to.gamma, to.U_h);
+    return mstmm_classical_hinge_fixed_planar_rigid_rigid_transfer(to.gamma, to.U_h);
 }
-#define mstmm_discrete_fixed_planar_rigid_rigid_transfer(...) mstmm_discrete_fixed_planar_rigid_rigid_transfer_by((struct mstmm_discrete_fixed_planar_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_planar_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_planar_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_planar_rigid_beam_transfer {
-    const real *W;
-    const real *Theta_O;
-    const real *gamma;
+    const real *W, *Theta_O, *gamma;
     real *U_h;
 };
 static inline int mstmm_discrete_fixed_planar_rigid_beam_transfer_by(struct mstmm_discrete_fixed_planar_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(
-        to.W, to.Theta_O, to.gamma, to.U_h);
+    return mstmm_classical_hinge_fixed_planar_rigid_beam_transfer(to.W, to.Theta_O, to.gamma,
+      to.U_h);
 }
-#define mstmm_discrete_fixed_planar_rigid_beam_transfer(...) mstmm_discrete_fixed_planar_rigid_beam_transfer_by((struct mstmm_discrete_fixed_planar_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_planar_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_planar_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_planar_beam_beam_transfer {
-    const real *W;
-    const real *Theta_I;
-    const real *Theta_O;
-    const real *gamma;
+    const real *W, *Theta_I, *Theta_O, *gamma;
     real *U_h;
 };
 static inline int mstmm_discrete_fixed_planar_beam_beam_transfer_by(struct mstmm_discrete_fixed_planar_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_fixed_planar_beam_beam_transfer(
-        to.W, to.Theta_I, to.Theta_O, to.gamma, to.U_h);
+    return mstmm_classical_hinge_fixed_planar_beam_beam_transfer(to.W, to.Theta_I, to.Theta_O,
+      to.gamma, to.U_h);
 }
-#define mstmm_discrete_fixed_planar_beam_beam_transfer(...) mstmm_discrete_fixed_planar_beam_beam_transfer_by((struct mstmm_discrete_fixed_planar_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_planar_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_planar_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_planar_beam_rigid_transfer {
-    const real *Theta_I;
-    const real *gamma;
+    const real *Theta_I, *gamma;
     real *U_h;
 };
 static inline int mstmm_discrete_fixed_planar_beam_rigid_transfer_by(struct mstmm_discrete_fixed_planar_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(
-        to.Theta_I, to.gamma, to.U_h);
+    return mstmm_classical_hinge_fixed_planar_beam_rigid_transfer(to.Theta_I, to.gamma, to.U_h);
 }
-#define mstmm_discrete_fixed_planar_beam_rigid_transfer(...) mstmm_discrete_fixed_planar_beam_rigid_transfer_by((struct mstmm_discrete_fixed_planar_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_planar_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_planar_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_smooth_planar_rigid_rigid_transfer {
-    const real *U;
-    const real *tau_n;
+    const real *U, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_smooth_planar_rigid_rigid_transfer_by(struct mstmm_discrete_smooth_planar_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_smooth_planar_rigid_rigid_transfer(
-        to.U, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_smooth_planar_rigid_rigid_transfer(to.U, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_smooth_planar_rigid_rigid_transfer(...) mstmm_discrete_smooth_planar_rigid_rigid_transfer_by((struct mstmm_discrete_smooth_planar_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_smooth_planar_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_smooth_planar_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_smooth_planar_rigid_beam_transfer {
-    const real *U;
-    const real *W;
-    const real *tau_n;
+    const real *U, *W, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_smooth_planar_rigid_beam_transfer_by(struct mstmm_discrete_smooth_planar_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_smooth_planar_rigid_beam_transfer(
-        to.U, to.W, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_smooth_planar_rigid_beam_transfer(to.U, to.W, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_smooth_planar_rigid_beam_transfer(...) mstmm_discrete_smooth_planar_rigid_beam_transfer_by((struct mstmm_discrete_smooth_planar_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_smooth_planar_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_smooth_planar_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_smooth_planar_beam_beam_transfer {
-    const real *U;
-    const real *W;
-    const real *tau_n;
+    const real *U, *W, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_smooth_planar_beam_beam_transfer_by(struct mstmm_discrete_smooth_planar_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_smooth_planar_beam_beam_transfer(
-        to.U, to.W, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_smooth_planar_beam_beam_transfer(to.U, to.W, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_smooth_planar_beam_beam_transfer(...) mstmm_discrete_smooth_planar_beam_beam_transfer_by((struct mstmm_discrete_smooth_planar_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_smooth_planar_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_smooth_planar_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_smooth_planar_beam_rigid_transfer {
-    const real *U;
-    const real *tau_n;
+    const real *U, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_smooth_planar_beam_rigid_transfer_by(struct mstmm_discrete_smooth_planar_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(
-        to.U, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_smooth_planar_beam_rigid_transfer(to.U, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_smooth_planar_beam_rigid_transfer(...) mstmm_discrete_smooth_planar_beam_rigid_transfer_by((struct mstmm_discrete_smooth_planar_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_smooth_planar_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_smooth_planar_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_spring_planar_rigid_rigid_transfer {
-    const real *k_t;
-    const real *c_t;
-    const real *k_1;
-    const real *k_3;
-    const real *c_r;
-    const real *C;
-    const real *D_phi;
-    const real *phi_0;
-    const real *phi_s;
-    const real *theta_s;
-    const real *d_s;
-    const real *q_s;
+    const real *k_t, *c_t, *k_1, *k_3, *c_r, *C, *D_phi, *phi_0, *phi_s, *theta_s, *d_s, *q_s;
     real *U_h;
 };
 static inline int mstmm_discrete_spring_planar_rigid_rigid_transfer_by(struct mstmm_discrete_spring_planar_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(
-        to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s, to.theta_s,
-        to.d_s, to.q_s, to.U_h);
+    return mstmm_classical_hinge_spring_planar_rigid_rigid_transfer(to.k_t, to.c_t, to.k_1, to.k_3,
+      to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s, to.theta_s, to.d_s, to.q_s, to.U_h);
 }
-#define mstmm_discrete_spring_planar_rigid_rigid_transfer(...) mstmm_discrete_spring_planar_rigid_rigid_transfer_by((struct mstmm_discrete_spring_planar_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_spring_planar_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_spring_planar_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_spring_planar_rigid_beam_transfer {
-    const real *W;
-    const real *Theta_O;
-    const real *k_t;
-    const real *c_t;
-    const real *k_1;
-    const real *k_3;
-    const real *c_r;
-    const real *C;
-    const real *D_phi;
-    const real *phi_0;
-    const real *phi_s;
-    const real *theta_s;
-    const real *d_s;
-    const real *q_s;
+    const real *W, *Theta_O, *k_t, *c_t, *k_1, *k_3, *c_r, *C, *D_phi, *phi_0, *phi_s, *theta_s,
+      *d_s, *q_s;
     real *U_h;
 };
 static inline int mstmm_discrete_spring_planar_rigid_beam_transfer_by(struct mstmm_discrete_spring_planar_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_spring_planar_rigid_beam_transfer(
-        to.W, to.Theta_O, to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0,
-        to.phi_s, to.theta_s, to.d_s, to.q_s, to.U_h);
+    return mstmm_classical_hinge_spring_planar_rigid_beam_transfer(to.W, to.Theta_O, to.k_t, to.c_t,
+      to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s, to.theta_s, to.d_s, to.q_s,
+      to.U_h);
 }
-#define mstmm_discrete_spring_planar_rigid_beam_transfer(...) mstmm_discrete_spring_planar_rigid_beam_transfer_by((struct mstmm_discrete_spring_planar_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_spring_planar_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_spring_planar_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_spring_planar_beam_beam_transfer {
-    const real *W;
-    const real *Theta_I;
-    const real *Theta_O;
-    const real *k_t;
-    const real *c_t;
-    const real *k_1;
-    const real *k_3;
-    const real *c_r;
-    const real *C;
-    const real *D_phi;
-    const real *phi_0;
-    const real *phi_s;
-    const real *theta_s;
-    const real *d_s;
-    const real *q_s;
+    const real *W, *Theta_I, *Theta_O, *k_t, *c_t, *k_1, *k_3, *c_r, *C, *D_phi, *phi_0, *phi_s,
+      *theta_s, *d_s, *q_s;
     real *U_h;
 };
 static inline int mstmm_discrete_spring_planar_beam_beam_transfer_by(struct mstmm_discrete_spring_planar_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_spring_planar_beam_beam_transfer(
-        to.W, to.Theta_I, to.Theta_O, to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi,
-        to.phi_0, to.phi_s, to.theta_s, to.d_s, to.q_s, to.U_h);
+    return mstmm_classical_hinge_spring_planar_beam_beam_transfer(to.W, to.Theta_I, to.Theta_O,
+      to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s, to.theta_s,
+      to.d_s, to.q_s, to.U_h);
 }
-#define mstmm_discrete_spring_planar_beam_beam_transfer(...) mstmm_discrete_spring_planar_beam_beam_transfer_by((struct mstmm_discrete_spring_planar_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_spring_planar_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_spring_planar_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_spring_planar_beam_rigid_transfer {
-    const real *Theta_I;
-    const real *k_t;
-    const real *c_t;
-    const real *k_1;
-    const real *k_3;
-    const real *c_r;
-    const real *C;
-    const real *D_phi;
-    const real *phi_0;
-    const real *phi_s;
-    const real *theta_s;
-    const real *d_s;
-    const real *q_s;
+    const real *Theta_I, *k_t, *c_t, *k_1, *k_3, *c_r, *C, *D_phi, *phi_0, *phi_s, *theta_s, *d_s,
+      *q_s;
     real *U_h;
 };
 static inline int mstmm_discrete_spring_planar_beam_rigid_transfer_by(struct mstmm_discrete_spring_planar_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_spring_planar_beam_rigid_transfer(
-        to.Theta_I, to.k_t, to.c_t, to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s,
-        to.theta_s, to.d_s, to.q_s, to.U_h);
+    return mstmm_classical_hinge_spring_planar_beam_rigid_transfer(to.Theta_I, to.k_t, to.c_t,
+      to.k_1, to.k_3, to.c_r, to.C, to.D_phi, to.phi_0, to.phi_s, to.theta_s, to.d_s, to.q_s,
+      to.U_h);
 }
-#define mstmm_discrete_spring_planar_beam_rigid_transfer(...) mstmm_discrete_spring_planar_beam_rigid_transfer_by((struct mstmm_discrete_spring_planar_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_spring_planar_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_spring_planar_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer {
     const real *beta;
@@ -2919,968 +1886,601 @@ struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer {
 };
 static inline int mstmm_discrete_fixed_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(
-        to.beta, to.U_h);
+    return mstmm_classical_hinge_fixed_spatial_rigid_rigid_transfer(to.beta, to.U_h);
 }
-#define mstmm_discrete_fixed_spatial_rigid_rigid_transfer(...) mstmm_discrete_fixed_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_fixed_spatial_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_spatial_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_spatial_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_spatial_rigid_beam_transfer {
-    const real *W;
-    const real *S_O;
-    const real *eta_pO;
-    const real *beta;
+    const real *W, *S_O, *eta_pO, *beta;
     real *U_h;
 };
 static inline int mstmm_discrete_fixed_spatial_rigid_beam_transfer_by(struct mstmm_discrete_fixed_spatial_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(
-        to.W, to.S_O, to.eta_pO, to.beta, to.U_h);
+    return mstmm_classical_hinge_fixed_spatial_rigid_beam_transfer(to.W, to.S_O, to.eta_pO, to.beta,
+      to.U_h);
 }
-#define mstmm_discrete_fixed_spatial_rigid_beam_transfer(...) mstmm_discrete_fixed_spatial_rigid_beam_transfer_by((struct mstmm_discrete_fixed_spatial_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_spatial_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_spatial_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_spatial_beam_beam_transfer {
-    const real *W;
-    const real *S_I;
-    const real *eta_pI;
-    const real *S_O;
-    const real *eta_pO;
-    const real *beta;
+    const real *W, *S_I, *eta_pI, *S_O, *eta_pO, *beta;
     real *U_h;
 };
 static inline int mstmm_discrete_fixed_spatial_beam_beam_transfer_by(struct mstmm_discrete_fixed_spatial_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(
-        to.W, to.S_I, to.eta_pI, to.S_O, to.eta_pO, to.beta, to.U_h);
+    return mstmm_classical_hinge_fixed_spatial_beam_beam_transfer(to.W, to.S_I, to.eta_pI, to.S_O,
+      to.eta_pO, to.beta, to.U_h);
 }
-#define mstmm_discrete_fixed_spatial_beam_beam_transfer(...) mstmm_discrete_fixed_spatial_beam_beam_transfer_by((struct mstmm_discrete_fixed_spatial_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_spatial_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_spatial_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_fixed_spatial_beam_rigid_transfer {
-    const real *S_I;
-    const real *eta_pI;
-    const real *beta;
+    const real *S_I, *eta_pI, *beta;
     real *U_h;
 };
 static inline int mstmm_discrete_fixed_spatial_beam_rigid_transfer_by(struct mstmm_discrete_fixed_spatial_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(
-        to.S_I, to.eta_pI, to.beta, to.U_h);
+    return mstmm_classical_hinge_fixed_spatial_beam_rigid_transfer(to.S_I, to.eta_pI, to.beta,
+      to.U_h);
 }
-#define mstmm_discrete_fixed_spatial_beam_rigid_transfer(...) mstmm_discrete_fixed_spatial_beam_rigid_transfer_by((struct mstmm_discrete_fixed_spatial_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_fixed_spatial_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_fixed_spatial_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_ball_spatial_rigid_rigid_transfer {
-    const real *U;
-    const real *tau_n;
+    const real *U, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_ball_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_ball_spatial_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_ball_spatial_rigid_rigid_transfer(
-        to.U, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_ball_spatial_rigid_rigid_transfer(to.U, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_ball_spatial_rigid_rigid_transfer(...) mstmm_discrete_ball_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_ball_spatial_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_ball_spatial_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_ball_spatial_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_ball_spatial_rigid_beam_transfer {
-    const real *U;
-    const real *W;
-    const real *tau_n;
+    const real *U, *W, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_ball_spatial_rigid_beam_transfer_by(struct mstmm_discrete_ball_spatial_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_ball_spatial_rigid_beam_transfer(
-        to.U, to.W, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_ball_spatial_rigid_beam_transfer(to.U, to.W, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_ball_spatial_rigid_beam_transfer(...) mstmm_discrete_ball_spatial_rigid_beam_transfer_by((struct mstmm_discrete_ball_spatial_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_ball_spatial_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_ball_spatial_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_ball_spatial_beam_beam_transfer {
-    const real *U;
-    const real *W;
-    const real *tau_n;
+    const real *U, *W, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_ball_spatial_beam_beam_transfer_by(struct mstmm_discrete_ball_spatial_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_ball_spatial_beam_beam_transfer(
-        to.U, to.W, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_ball_spatial_beam_beam_transfer(to.U, to.W, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_ball_spatial_beam_beam_transfer(...) mstmm_discrete_ball_spatial_beam_beam_transfer_by((struct mstmm_discrete_ball_spatial_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_ball_spatial_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_ball_spatial_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_ball_spatial_beam_rigid_transfer {
-    const real *U;
-    const real *tau_n;
+    const real *U, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_ball_spatial_beam_rigid_transfer_by(struct mstmm_discrete_ball_spatial_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_ball_spatial_beam_rigid_transfer(
-        to.U, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_ball_spatial_beam_rigid_transfer(to.U, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_ball_spatial_beam_rigid_transfer(...) mstmm_discrete_ball_spatial_beam_rigid_transfer_by((struct mstmm_discrete_ball_spatial_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_ball_spatial_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_ball_spatial_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_pin_spatial_rigid_rigid_transfer {
-    const real *U;
-    const real *a;
-    const real *beta;
-    const real *a_n;
-    const real *m_n;
-    const real *tau_n;
+    const real *U, *a, *beta, *a_n, *m_n, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_pin_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_pin_spatial_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(
-        to.U, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_pin_spatial_rigid_rigid_transfer(to.U, to.a, to.beta, to.a_n,
+      to.m_n, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_pin_spatial_rigid_rigid_transfer(...) mstmm_discrete_pin_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_pin_spatial_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_pin_spatial_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_pin_spatial_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_pin_spatial_rigid_beam_transfer {
-    const real *U;
-    const real *W;
-    const real *S_O;
-    const real *eta_pO;
-    const real *a;
-    const real *beta;
-    const real *a_n;
-    const real *m_n;
-    const real *tau_n;
-    const real *S_N;
+    const real *U, *W, *S_O, *eta_pO, *a, *beta, *a_n, *m_n, *tau_n, *S_N;
     real *U_h;
 };
 static inline int mstmm_discrete_pin_spatial_rigid_beam_transfer_by(struct mstmm_discrete_pin_spatial_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_pin_spatial_rigid_beam_transfer(
-        to.U, to.W, to.S_O, to.eta_pO, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.S_N, to.U_h);
+    return mstmm_classical_hinge_pin_spatial_rigid_beam_transfer(to.U, to.W, to.S_O, to.eta_pO,
+      to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.S_N, to.U_h);
 }
-#define mstmm_discrete_pin_spatial_rigid_beam_transfer(...) mstmm_discrete_pin_spatial_rigid_beam_transfer_by((struct mstmm_discrete_pin_spatial_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_pin_spatial_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_pin_spatial_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_pin_spatial_beam_beam_transfer {
-    const real *U;
-    const real *W;
-    const real *S_I;
-    const real *eta_pI;
-    const real *S_O;
-    const real *eta_pO;
-    const real *a;
-    const real *beta;
-    const real *a_n;
-    const real *m_n;
-    const real *tau_n;
-    const real *S_N;
+    const real *U, *W, *S_I, *eta_pI, *S_O, *eta_pO, *a, *beta, *a_n, *m_n, *tau_n, *S_N;
     real *U_h;
 };
 static inline int mstmm_discrete_pin_spatial_beam_beam_transfer_by(struct mstmm_discrete_pin_spatial_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_pin_spatial_beam_beam_transfer(
-        to.U, to.W, to.S_I, to.eta_pI, to.S_O, to.eta_pO, to.a, to.beta, to.a_n, to.m_n, to.tau_n,
-        to.S_N, to.U_h);
+    return mstmm_classical_hinge_pin_spatial_beam_beam_transfer(to.U, to.W, to.S_I, to.eta_pI,
+      to.S_O, to.eta_pO, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.S_N, to.U_h);
 }
-#define mstmm_discrete_pin_spatial_beam_beam_transfer(...) mstmm_discrete_pin_spatial_beam_beam_transfer_by((struct mstmm_discrete_pin_spatial_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_pin_spatial_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_pin_spatial_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_pin_spatial_beam_rigid_transfer {
-    const real *U;
-    const real *S_I;
-    const real *eta_pI;
-    const real *a;
-    const real *beta;
-    const real *a_n;
-    const real *m_n;
-    const real *tau_n;
+    const real *U, *S_I, *eta_pI, *a, *beta, *a_n, *m_n, *tau_n;
     real *U_h;
 };
 static inline int mstmm_discrete_pin_spatial_beam_rigid_transfer_by(struct mstmm_discrete_pin_spatial_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_pin_spatial_beam_rigid_transfer(
-        to.U, to.S_I, to.eta_pI, to.a, to.beta, to.a_n, to.m_n, to.tau_n, to.U_h);
+    return mstmm_classical_hinge_pin_spatial_beam_rigid_transfer(to.U, to.S_I, to.eta_pI, to.a,
+      to.beta, to.a_n, to.m_n, to.tau_n, to.U_h);
 }
-#define mstmm_discrete_pin_spatial_beam_rigid_transfer(...) mstmm_discrete_pin_spatial_beam_rigid_transfer_by((struct mstmm_discrete_pin_spatial_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_pin_spatial_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_pin_spatial_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_elastic_spatial_rigid_rigid_transfer {
-    const real *k_t;
-    const real *c_t;
-    const real *k_r;
-    const real *c_r;
-    const real *C;
-    const real *d_s;
-    const real *q_s;
-    const real *m_s;
+    const real *k_t, *c_t, *k_r, *c_r, *C, *d_s, *q_s, *m_s;
     real *U_h;
 };
 static inline int mstmm_discrete_elastic_spatial_rigid_rigid_transfer_by(struct mstmm_discrete_elastic_spatial_rigid_rigid_transfer to)
 {
-    return mstmm_classical_hinge_elastic_spatial_rigid_rigid_transfer(
-        to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
+    return mstmm_classical_hinge_elastic_spatial_rigid_rigid_transfer(to.k_t, to.c_t, to.k_r,
+      to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
 }
-#define mstmm_discrete_elastic_spatial_rigid_rigid_transfer(...) mstmm_discrete_elastic_spatial_rigid_rigid_transfer_by((struct mstmm_discrete_elastic_spatial_rigid_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_elastic_spatial_rigid_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_elastic_spatial_rigid_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_elastic_spatial_rigid_beam_transfer {
-    const real *W;
-    const real *S_O;
-    const real *eta_pO;
-    const real *k_t;
-    const real *c_t;
-    const real *k_r;
-    const real *c_r;
-    const real *C;
-    const real *d_s;
-    const real *q_s;
-    const real *m_s;
+    const real *W, *S_O, *eta_pO, *k_t, *c_t, *k_r, *c_r, *C, *d_s, *q_s, *m_s;
     real *U_h;
 };
 static inline int mstmm_discrete_elastic_spatial_rigid_beam_transfer_by(struct mstmm_discrete_elastic_spatial_rigid_beam_transfer to)
 {
-    return mstmm_classical_hinge_elastic_spatial_rigid_beam_transfer(
-        to.W, to.S_O, to.eta_pO, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s,
-        to.U_h);
+    return mstmm_classical_hinge_elastic_spatial_rigid_beam_transfer(to.W, to.S_O, to.eta_pO,
+      to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
 }
-#define mstmm_discrete_elastic_spatial_rigid_beam_transfer(...) mstmm_discrete_elastic_spatial_rigid_beam_transfer_by((struct mstmm_discrete_elastic_spatial_rigid_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_elastic_spatial_rigid_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_elastic_spatial_rigid_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_elastic_spatial_beam_beam_transfer {
-    const real *W;
-    const real *S_I;
-    const real *eta_pI;
-    const real *S_O;
-    const real *eta_pO;
-    const real *k_t;
-    const real *c_t;
-    const real *k_r;
-    const real *c_r;
-    const real *C;
-    const real *d_s;
-    const real *q_s;
-    const real *m_s;
+    const real *W, *S_I, *eta_pI, *S_O, *eta_pO, *k_t, *c_t, *k_r, *c_r, *C, *d_s, *q_s, *m_s;
     real *U_h;
 };
 static inline int mstmm_discrete_elastic_spatial_beam_beam_transfer_by(struct mstmm_discrete_elastic_spatial_beam_beam_transfer to)
 {
-    return mstmm_classical_hinge_elastic_spatial_beam_beam_transfer(
-        to.W, to.S_I, to.eta_pI, to.S_O, to.eta_pO, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s,
-        to.q_s, to.m_s, to.U_h);
+    return mstmm_classical_hinge_elastic_spatial_beam_beam_transfer(to.W, to.S_I, to.eta_pI, to.S_O,
+      to.eta_pO, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
 }
-#define mstmm_discrete_elastic_spatial_beam_beam_transfer(...) mstmm_discrete_elastic_spatial_beam_beam_transfer_by((struct mstmm_discrete_elastic_spatial_beam_beam_transfer){__VA_ARGS__})
+#define mstmm_discrete_elastic_spatial_beam_beam_transfer(...) MSTMM_NAMED(mstmm_discrete_elastic_spatial_beam_beam_transfer, __VA_ARGS__)
 
 struct mstmm_discrete_elastic_spatial_beam_rigid_transfer {
-    const real *S_I;
-    const real *eta_pI;
-    const real *k_t;
-    const real *c_t;
-    const real *k_r;
-    const real *c_r;
-    const real *C;
-    const real *d_s;
-    const real *q_s;
-    const real *m_s;
+    const real *S_I, *eta_pI, *k_t, *c_t, *k_r, *c_r, *C, *d_s, *q_s, *m_s;
     real *U_h;
 };
 static inline int mstmm_discrete_elastic_spatial_beam_rigid_transfer_by(struct mstmm_discrete_elastic_spatial_beam_rigid_transfer to)
 {
-    return mstmm_classical_hinge_elastic_spatial_beam_rigid_transfer(
-        to.S_I, to.eta_pI, to.k_t, to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
+    return mstmm_classical_hinge_elastic_spatial_beam_rigid_transfer(to.S_I, to.eta_pI, to.k_t,
+      to.c_t, to.k_r, to.c_r, to.C, to.d_s, to.q_s, to.m_s, to.U_h);
 }
-#define mstmm_discrete_elastic_spatial_beam_rigid_transfer(...) mstmm_discrete_elastic_spatial_beam_rigid_transfer_by((struct mstmm_discrete_elastic_spatial_beam_rigid_transfer){__VA_ARGS__})
+#define mstmm_discrete_elastic_spatial_beam_rigid_transfer(...) MSTMM_NAMED(mstmm_discrete_elastic_spatial_beam_rigid_transfer, __VA_ARGS__)
 
 struct mstmm_generic_forward {
-    const real *Rt;
-    const real *ro;
-    const real *R;
-    const real *d;
-    const real *H;
-    const real *v;
-    const real *w;
-    const real *c;
-    const real *s;
-    const real *motion_I;
-    real *Rc;
-    real *r;
-    real *motion;
+    const real *Rt, *ro, *R, *d, *H, *v, *w, *c, *s, *motion_I;
+    real *Rc, *r, *motion;
 };
-typedef int mstmm_generic_forward_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_forward_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  out_t, out_t, out_t);
 extern mstmm_generic_forward_kernel *const mstmm_generic_forward_table[];
 static inline int mstmm_generic_forward_by(int speeds, struct mstmm_generic_forward to)
 {
-    return mstmm_generic_forward_table[speeds](
-        to.Rt, to.ro, to.R, to.d, to.H, to.v, to.w, to.c, to.s, to.motion_I, to.Rc, to.r,
-        to.motion);
+    return mstmm_generic_forward_table[speeds](to.Rt, to.ro, to.R, to.d, to.H, to.v, to.w, to.c,
+      to.s, to.motion_I, to.Rc, to.r, to.motion);
 }
-#define mstmm_generic_forward(speeds, ...) mstmm_generic_forward_by(speeds, (struct mstmm_generic_forward){__VA_ARGS__})
+#define mstmm_generic_forward(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_forward, speeds, __VA_ARGS__)
 
 struct mstmm_generic_condense {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *J;
-    const real *floor_;
-    const real *S;
-    const real *e;
-    const real *tau;
-    real *G;
-    real *g;
-    real *S_I;
-    real *e_I;
+    const real *Rc, *r, *H, *J, *floor_, *S, *e, *tau;
+    real *G, *g, *S_I, *e_I;
 };
-typedef int mstmm_generic_condense_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_condense_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t,
+  out_t, out_t, out_t);
 extern mstmm_generic_condense_kernel *const mstmm_generic_condense_table[];
 static inline int mstmm_generic_condense_by(int speeds, struct mstmm_generic_condense to)
 {
-    return mstmm_generic_condense_table[speeds](
-        to.Rc, to.r, to.H, to.J, to.floor_, to.S, to.e, to.tau, to.G, to.g, to.S_I, to.e_I);
+    return mstmm_generic_condense_table[speeds](to.Rc, to.r, to.H, to.J, to.floor_, to.S, to.e,
+      to.tau, to.G, to.g, to.S_I, to.e_I);
 }
-#define mstmm_generic_condense(speeds, ...) mstmm_generic_condense_by(speeds, (struct mstmm_generic_condense){__VA_ARGS__})
+#define mstmm_generic_condense(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_condense, speeds, __VA_ARGS__)
 
 struct mstmm_generic_recover {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *G;
-    const real *g;
-    const real *delta_I;
-    real *udot;
-    real *delta;
+    const real *Rc, *r, *H, *G, *g, *delta_I;
+    real *udot, *delta;
 };
-typedef int mstmm_generic_recover_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_recover_kernel(in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t);
 extern mstmm_generic_recover_kernel *const mstmm_generic_recover_table[];
 static inline int mstmm_generic_recover_by(int speeds, struct mstmm_generic_recover to)
 {
-    return mstmm_generic_recover_table[speeds](
-        to.Rc, to.r, to.H, to.G, to.g, to.delta_I, to.udot, to.delta);
+    return mstmm_generic_recover_table[speeds](to.Rc, to.r, to.H, to.G, to.g, to.delta_I, to.udot,
+      to.delta);
 }
-#define mstmm_generic_recover(speeds, ...) mstmm_generic_recover_by(speeds, (struct mstmm_generic_recover){__VA_ARGS__})
+#define mstmm_generic_recover(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_recover, speeds, __VA_ARGS__)
 
 struct mstmm_generic_effort {
-    const real *H;
-    const real *f;
+    const real *H, *f;
     real *tau;
 };
-typedef int mstmm_generic_effort_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_effort_kernel(in_t, in_t, out_t);
 extern mstmm_generic_effort_kernel *const mstmm_generic_effort_table[];
 static inline int mstmm_generic_effort_by(int speeds, struct mstmm_generic_effort to)
 {
-    return mstmm_generic_effort_table[speeds](
-        to.H, to.f, to.tau);
+    return mstmm_generic_effort_table[speeds](to.H, to.f, to.tau);
 }
-#define mstmm_generic_effort(speeds, ...) mstmm_generic_effort_by(speeds, (struct mstmm_generic_effort){__VA_ARGS__})
+#define mstmm_generic_effort(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_effort, speeds, __VA_ARGS__)
 
 struct mstmm_generic_required_load {
-    const real *S;
-    const real *H;
-    const real *udot;
+    const real *S, *H, *udot;
     real *e;
 };
-typedef int mstmm_generic_required_load_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_required_load_kernel(in_t, in_t, in_t, out_t);
 extern mstmm_generic_required_load_kernel *const mstmm_generic_required_load_table[];
 static inline int mstmm_generic_required_load_by(int speeds, struct mstmm_generic_required_load to)
 {
-    return mstmm_generic_required_load_table[speeds](
-        to.S, to.H, to.udot, to.e);
+    return mstmm_generic_required_load_table[speeds](to.S, to.H, to.udot, to.e);
 }
-#define mstmm_generic_required_load(speeds, ...) mstmm_generic_required_load_by(speeds, (struct mstmm_generic_required_load){__VA_ARGS__})
+#define mstmm_generic_required_load(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_required_load, speeds, __VA_ARGS__)
 
 struct mstmm_generic_project {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *delta;
-    const real *delta_I;
+    const real *Rc, *r, *H, *delta, *delta_I;
     real *udot;
 };
-typedef int mstmm_generic_project_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict);
+typedef int mstmm_generic_project_kernel(in_t, in_t, in_t, in_t, in_t, out_t);
 extern mstmm_generic_project_kernel *const mstmm_generic_project_table[];
 static inline int mstmm_generic_project_by(int speeds, struct mstmm_generic_project to)
 {
-    return mstmm_generic_project_table[speeds](
-        to.Rc, to.r, to.H, to.delta, to.delta_I, to.udot);
+    return mstmm_generic_project_table[speeds](to.Rc, to.r, to.H, to.delta, to.delta_I, to.udot);
 }
-#define mstmm_generic_project(speeds, ...) mstmm_generic_project_by(speeds, (struct mstmm_generic_project){__VA_ARGS__})
+#define mstmm_generic_project(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_project, speeds, __VA_ARGS__)
 
 struct mstmm_generic_factor {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *J;
-    const real *W;
-    const real *floor_;
-    const real *S;
-    real *F;
-    real *G;
-    real *S_I;
+    const real *Rc, *r, *H, *J, *W, *floor_, *S;
+    real *F, *G, *S_I;
 };
-typedef int mstmm_generic_factor_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict);
+typedef int mstmm_generic_factor_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t,
+  out_t);
 extern mstmm_generic_factor_kernel *const mstmm_generic_factor_table[];
 static inline int mstmm_generic_factor_by(int speeds, struct mstmm_generic_factor to)
 {
-    return mstmm_generic_factor_table[speeds](
-        to.Rc, to.r, to.H, to.J, to.W, to.floor_, to.S, to.F, to.G, to.S_I);
+    return mstmm_generic_factor_table[speeds](to.Rc, to.r, to.H, to.J, to.W, to.floor_, to.S, to.F,
+      to.G, to.S_I);
 }
-#define mstmm_generic_factor(speeds, ...) mstmm_generic_factor_by(speeds, (struct mstmm_generic_factor){__VA_ARGS__})
+#define mstmm_generic_factor(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_factor, speeds, __VA_ARGS__)
 
 struct mstmm_generic_column_load {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *G;
-    const real *e;
-    const real *tau;
-    real *y;
-    real *e_I;
+    const real *Rc, *r, *H, *G, *e, *tau;
+    real *y, *e_I;
 };
-typedef int mstmm_generic_column_load_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_column_load_kernel(in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t);
 extern mstmm_generic_column_load_kernel *const mstmm_generic_column_load_table[];
 static inline int mstmm_generic_column_load_by(int speeds, struct mstmm_generic_column_load to)
 {
-    return mstmm_generic_column_load_table[speeds](
-        to.Rc, to.r, to.H, to.G, to.e, to.tau, to.y, to.e_I);
+    return mstmm_generic_column_load_table[speeds](to.Rc, to.r, to.H, to.G, to.e, to.tau, to.y,
+      to.e_I);
 }
-#define mstmm_generic_column_load(speeds, ...) mstmm_generic_column_load_by(speeds, (struct mstmm_generic_column_load){__VA_ARGS__})
+#define mstmm_generic_column_load(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_column_load, speeds, __VA_ARGS__)
 
 struct mstmm_generic_ground_column_load {
-    const real *H;
-    const real *e;
-    const real *tau;
+    const real *H, *e, *tau;
     real *y;
 };
-typedef int mstmm_generic_ground_column_load_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_ground_column_load_kernel(in_t, in_t, in_t, out_t);
 extern mstmm_generic_ground_column_load_kernel *const mstmm_generic_ground_column_load_table[];
 static inline int mstmm_generic_ground_column_load_by(int speeds, struct mstmm_generic_ground_column_load to)
 {
-    return mstmm_generic_ground_column_load_table[speeds](
-        to.H, to.e, to.tau, to.y);
+    return mstmm_generic_ground_column_load_table[speeds](to.H, to.e, to.tau, to.y);
 }
-#define mstmm_generic_ground_column_load(speeds, ...) mstmm_generic_ground_column_load_by(speeds, (struct mstmm_generic_ground_column_load){__VA_ARGS__})
+#define mstmm_generic_ground_column_load(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_ground_column_load, speeds, __VA_ARGS__)
 
 struct mstmm_generic_column_acceleration {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *F;
-    const real *G;
-    const real *y;
-    const real *delta_I;
-    real *udot;
-    real *delta;
+    const real *Rc, *r, *H, *F, *G, *y, *delta_I;
+    real *udot, *delta;
 };
-typedef int mstmm_generic_column_acceleration_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict);
+typedef int mstmm_generic_column_acceleration_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  out_t, out_t);
 extern mstmm_generic_column_acceleration_kernel *const mstmm_generic_column_acceleration_table[];
 static inline int mstmm_generic_column_acceleration_by(int speeds, struct mstmm_generic_column_acceleration to)
 {
-    return mstmm_generic_column_acceleration_table[speeds](
-        to.Rc, to.r, to.H, to.F, to.G, to.y, to.delta_I, to.udot, to.delta);
+    return mstmm_generic_column_acceleration_table[speeds](to.Rc, to.r, to.H, to.F, to.G, to.y,
+      to.delta_I, to.udot, to.delta);
 }
-#define mstmm_generic_column_acceleration(speeds, ...) mstmm_generic_column_acceleration_by(speeds, (struct mstmm_generic_column_acceleration){__VA_ARGS__})
+#define mstmm_generic_column_acceleration(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_column_acceleration, speeds, __VA_ARGS__)
 
 struct mstmm_generic_qr_eliminate {
-    const real *H;
-    const real *J;
-    const real *floor_;
-    const real *U;
-    const real *d;
-    const real *e;
-    const real *tau;
-    real *G;
-    real *g;
-    real *V;
-    real *d_V;
-    real *e_Q;
+    const real *H, *J, *floor_, *U, *d, *e, *tau;
+    real *G, *g, *V, *d_V, *e_Q;
 };
-typedef int mstmm_generic_qr_eliminate_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_qr_eliminate_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t,
+  out_t, out_t, out_t, out_t);
 extern mstmm_generic_qr_eliminate_kernel *const mstmm_generic_qr_eliminate_table[];
 static inline int mstmm_generic_qr_eliminate_by(int speeds, struct mstmm_generic_qr_eliminate to)
 {
-    return mstmm_generic_qr_eliminate_table[speeds](
-        to.H, to.J, to.floor_, to.U, to.d, to.e, to.tau, to.G, to.g, to.V, to.d_V, to.e_Q);
+    return mstmm_generic_qr_eliminate_table[speeds](to.H, to.J, to.floor_, to.U, to.d, to.e, to.tau,
+      to.G, to.g, to.V, to.d_V, to.e_Q);
 }
-#define mstmm_generic_qr_eliminate(speeds, ...) mstmm_generic_qr_eliminate_by(speeds, (struct mstmm_generic_qr_eliminate){__VA_ARGS__})
+#define mstmm_generic_qr_eliminate(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_qr_eliminate, speeds, __VA_ARGS__)
 
 struct mstmm_generic_complement {
     const real *H;
     real *W;
 };
-typedef int mstmm_generic_complement_kernel(
-    const real *restrict, real *restrict);
+typedef int mstmm_generic_complement_kernel(in_t, out_t);
 extern mstmm_generic_complement_kernel *const mstmm_generic_complement_table[];
 static inline int mstmm_generic_complement_by(int speeds, struct mstmm_generic_complement to)
 {
-    return mstmm_generic_complement_table[speeds](
-        to.H, to.W);
+    return mstmm_generic_complement_table[speeds](to.H, to.W);
 }
-#define mstmm_generic_complement(speeds, ...) mstmm_generic_complement_by(speeds, (struct mstmm_generic_complement){__VA_ARGS__})
+#define mstmm_generic_complement(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_complement, speeds, __VA_ARGS__)
 
 struct mstmm_generic_divide {
-    const real *F;
-    const real *y;
+    const real *F, *y;
     real *z;
 };
-typedef int mstmm_generic_divide_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_divide_kernel(in_t, in_t, out_t);
 extern mstmm_generic_divide_kernel *const mstmm_generic_divide_table[];
 static inline int mstmm_generic_divide_by(int speeds, struct mstmm_generic_divide to)
 {
-    return mstmm_generic_divide_table[speeds](
-        to.F, to.y, to.z);
+    return mstmm_generic_divide_table[speeds](to.F, to.y, to.z);
 }
-#define mstmm_generic_divide(speeds, ...) mstmm_generic_divide_by(speeds, (struct mstmm_generic_divide){__VA_ARGS__})
+#define mstmm_generic_divide(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_divide, speeds, __VA_ARGS__)
 
 struct mstmm_generic_couple {
-    const real *y;
-    const real *z;
+    const real *y, *z;
     real *L_ij;
 };
-typedef int mstmm_generic_couple_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_couple_kernel(in_t, in_t, out_t);
 extern mstmm_generic_couple_kernel *const mstmm_generic_couple_table[];
 static inline int mstmm_generic_couple_by(int speeds, struct mstmm_generic_couple to)
 {
-    return mstmm_generic_couple_table[speeds](
-        to.y, to.z, to.L_ij);
+    return mstmm_generic_couple_table[speeds](to.y, to.z, to.L_ij);
 }
-#define mstmm_generic_couple(speeds, ...) mstmm_generic_couple_by(speeds, (struct mstmm_generic_couple){__VA_ARGS__})
+#define mstmm_generic_couple(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_couple, speeds, __VA_ARGS__)
 
 struct mstmm_generic_add_known_part {
-    const real *y;
-    const real *z;
+    const real *y, *z;
     real *l;
 };
-typedef int mstmm_generic_add_known_part_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_add_known_part_kernel(in_t, in_t, out_t);
 extern mstmm_generic_add_known_part_kernel *const mstmm_generic_add_known_part_table[];
 static inline int mstmm_generic_add_known_part_by(int speeds, struct mstmm_generic_add_known_part to)
 {
-    return mstmm_generic_add_known_part_table[speeds](
-        to.y, to.z, to.l);
+    return mstmm_generic_add_known_part_table[speeds](to.y, to.z, to.l);
 }
-#define mstmm_generic_add_known_part(speeds, ...) mstmm_generic_add_known_part_by(speeds, (struct mstmm_generic_add_known_part){__VA_ARGS__})
+#define mstmm_generic_add_known_part(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_add_known_part, speeds, __VA_ARGS__)
 
 struct mstmm_generic_add_multiplier_effort {
-    const real *y;
-    const real *x;
+    const real *y, *x;
     real *y_0;
 };
-typedef int mstmm_generic_add_multiplier_effort_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_add_multiplier_effort_kernel(in_t, in_t, out_t);
 extern mstmm_generic_add_multiplier_effort_kernel *const mstmm_generic_add_multiplier_effort_table[];
 static inline int mstmm_generic_add_multiplier_effort_by(int speeds, struct mstmm_generic_add_multiplier_effort to)
 {
-    return mstmm_generic_add_multiplier_effort_table[speeds](
-        to.y, to.x, to.y_0);
+    return mstmm_generic_add_multiplier_effort_table[speeds](to.y, to.x, to.y_0);
 }
-#define mstmm_generic_add_multiplier_effort(speeds, ...) mstmm_generic_add_multiplier_effort_by(speeds, (struct mstmm_generic_add_multiplier_effort){__VA_ARGS__})
+#define mstmm_generic_add_multiplier_effort(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_add_multiplier_effort, speeds, __VA_ARGS__)
 
 struct mstmm_generic_forward_slope {
-    const real *Rt;
-    const real *ro;
-    const real *R;
-    const real *d;
-    const real *H;
-    const real *v;
-    const real *w;
-    const real *c;
-    const real *s;
-    const real *motion_I;
-    const real *d_R;
-    const real *d_d;
-    const real *d_H;
-    const real *d_v;
-    const real *d_w;
-    const real *d_c;
-    const real *d_s;
-    const real *d_motion_I;
-    real *d_Rc;
-    real *d_r;
-    real *d_motion;
+    const real *Rt, *ro, *R, *d, *H, *v, *w, *c, *s, *motion_I, *d_R, *d_d, *d_H, *d_v, *d_w, *d_c,
+      *d_s, *d_motion_I;
+    real *d_Rc, *d_r, *d_motion;
 };
-typedef int mstmm_generic_forward_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_forward_slope_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t, out_t);
 extern mstmm_generic_forward_slope_kernel *const mstmm_generic_forward_slope_table[];
 static inline int mstmm_generic_forward_slope_by(int speeds, struct mstmm_generic_forward_slope to)
 {
-    return mstmm_generic_forward_slope_table[speeds](
-        to.Rt, to.ro, to.R, to.d, to.H, to.v, to.w, to.c, to.s, to.motion_I, to.d_R, to.d_d,
-        to.d_H, to.d_v, to.d_w, to.d_c, to.d_s, to.d_motion_I, to.d_Rc, to.d_r, to.d_motion);
+    return mstmm_generic_forward_slope_table[speeds](to.Rt, to.ro, to.R, to.d, to.H, to.v, to.w,
+      to.c, to.s, to.motion_I, to.d_R, to.d_d, to.d_H, to.d_v, to.d_w, to.d_c, to.d_s,
+      to.d_motion_I, to.d_Rc, to.d_r, to.d_motion);
 }
-#define mstmm_generic_forward_slope(speeds, ...) mstmm_generic_forward_slope_by(speeds, (struct mstmm_generic_forward_slope){__VA_ARGS__})
+#define mstmm_generic_forward_slope(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_forward_slope, speeds, __VA_ARGS__)
 
 struct mstmm_generic_effort_slope {
-    const real *H;
-    const real *f;
-    const real *d_H;
-    const real *d_f;
+    const real *H, *f, *d_H, *d_f;
     real *d_tau;
 };
-typedef int mstmm_generic_effort_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict);
+typedef int mstmm_generic_effort_slope_kernel(in_t, in_t, in_t, in_t, out_t);
 extern mstmm_generic_effort_slope_kernel *const mstmm_generic_effort_slope_table[];
 static inline int mstmm_generic_effort_slope_by(int speeds, struct mstmm_generic_effort_slope to)
 {
-    return mstmm_generic_effort_slope_table[speeds](
-        to.H, to.f, to.d_H, to.d_f, to.d_tau);
+    return mstmm_generic_effort_slope_table[speeds](to.H, to.f, to.d_H, to.d_f, to.d_tau);
 }
-#define mstmm_generic_effort_slope(speeds, ...) mstmm_generic_effort_slope_by(speeds, (struct mstmm_generic_effort_slope){__VA_ARGS__})
+#define mstmm_generic_effort_slope(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_effort_slope, speeds, __VA_ARGS__)
 
 struct mstmm_generic_complement_slope {
-    const real *H;
-    const real *d_H;
+    const real *H, *d_H;
     real *d_W;
 };
-typedef int mstmm_generic_complement_slope_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_complement_slope_kernel(in_t, in_t, out_t);
 extern mstmm_generic_complement_slope_kernel *const mstmm_generic_complement_slope_table[];
 static inline int mstmm_generic_complement_slope_by(int speeds, struct mstmm_generic_complement_slope to)
 {
-    return mstmm_generic_complement_slope_table[speeds](
-        to.H, to.d_H, to.d_W);
+    return mstmm_generic_complement_slope_table[speeds](to.H, to.d_H, to.d_W);
 }
-#define mstmm_generic_complement_slope(speeds, ...) mstmm_generic_complement_slope_by(speeds, (struct mstmm_generic_complement_slope){__VA_ARGS__})
+#define mstmm_generic_complement_slope(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_complement_slope, speeds, __VA_ARGS__)
 
 struct mstmm_generic_add_known_part_slope {
-    const real *y;
-    const real *z;
-    const real *d_y;
-    const real *d_z;
+    const real *y, *z, *d_y, *d_z;
     real *d_l;
 };
-typedef int mstmm_generic_add_known_part_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict);
+typedef int mstmm_generic_add_known_part_slope_kernel(in_t, in_t, in_t, in_t, out_t);
 extern mstmm_generic_add_known_part_slope_kernel *const mstmm_generic_add_known_part_slope_table[];
 static inline int mstmm_generic_add_known_part_slope_by(int speeds, struct mstmm_generic_add_known_part_slope to)
 {
-    return mstmm_generic_add_known_part_slope_table[speeds](
-        to.y, to.z, to.d_y, to.d_z, to.d_l);
+    return mstmm_generic_add_known_part_slope_table[speeds](to.y, to.z, to.d_y, to.d_z, to.d_l);
 }
-#define mstmm_generic_add_known_part_slope(speeds, ...) mstmm_generic_add_known_part_slope_by(speeds, (struct mstmm_generic_add_known_part_slope){__VA_ARGS__})
+#define mstmm_generic_add_known_part_slope(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_add_known_part_slope, speeds, __VA_ARGS__)
 
 struct mstmm_generic_add_multiplier_effort_slope {
-    const real *y;
-    const real *x;
-    const real *d_y;
-    const real *d_x;
+    const real *y, *x, *d_y, *d_x;
     real *d_y_0;
 };
-typedef int mstmm_generic_add_multiplier_effort_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict);
+typedef int mstmm_generic_add_multiplier_effort_slope_kernel(in_t, in_t, in_t, in_t, out_t);
 extern mstmm_generic_add_multiplier_effort_slope_kernel *const mstmm_generic_add_multiplier_effort_slope_table[];
 static inline int mstmm_generic_add_multiplier_effort_slope_by(int speeds, struct mstmm_generic_add_multiplier_effort_slope to)
 {
-    return mstmm_generic_add_multiplier_effort_slope_table[speeds](
-        to.y, to.x, to.d_y, to.d_x, to.d_y_0);
+    return mstmm_generic_add_multiplier_effort_slope_table[speeds](to.y, to.x, to.d_y, to.d_x,
+      to.d_y_0);
 }
-#define mstmm_generic_add_multiplier_effort_slope(speeds, ...) mstmm_generic_add_multiplier_effort_slope_by(speeds, (struct mstmm_generic_add_multiplier_effort_slope){__VA_ARGS__})
+#define mstmm_generic_add_multiplier_effort_slope(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_add_multiplier_effort_slope, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_carrier {
-    const real *H;
-    const real *s;
-    const real *v;
-    const real *w;
-    const real *c;
-    const real *motion;
+    const real *H, *s, *v, *w, *c, *motion;
     real *Q;
 };
-typedef int mstmm_generic_tangent_carrier_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_carrier_kernel(in_t, in_t, in_t, in_t, in_t, in_t, out_t);
 extern mstmm_generic_tangent_carrier_kernel *const mstmm_generic_tangent_carrier_table[];
 static inline int mstmm_generic_tangent_carrier_by(int speeds, struct mstmm_generic_tangent_carrier to)
 {
-    return mstmm_generic_tangent_carrier_table[speeds](
-        to.H, to.s, to.v, to.w, to.c, to.motion, to.Q);
+    return mstmm_generic_tangent_carrier_table[speeds](to.H, to.s, to.v, to.w, to.c, to.motion,
+      to.Q);
 }
-#define mstmm_generic_tangent_carrier(speeds, ...) mstmm_generic_tangent_carrier_by(speeds, (struct mstmm_generic_tangent_carrier){__VA_ARGS__})
+#define mstmm_generic_tangent_carrier(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_carrier, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_column {
-    const real *theta;
-    const real *x;
-    const real *H;
-    const real *s;
-    const real *v;
-    const real *w;
-    const real *Q;
-    const real *f;
-    const real *d_H;
-    const real *d_v;
-    const real *d_w;
-    const real *d_c;
-    const real *d_s;
-    const real *J;
-    const real *laws;
-    real *B;
-    real *G;
-    real *row;
+    const real *theta, *x, *H, *s, *v, *w, *Q, *f, *d_H, *d_v, *d_w, *d_c, *d_s, *J, *laws;
+    real *B, *G, *row;
 };
-typedef int mstmm_generic_tangent_column_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_column_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t, out_t);
 extern mstmm_generic_tangent_column_kernel *const mstmm_generic_tangent_column_table[];
 static inline int mstmm_generic_tangent_column_by(int speeds, struct mstmm_generic_tangent_column to)
 {
-    return mstmm_generic_tangent_column_table[speeds](
-        to.theta, to.x, to.H, to.s, to.v, to.w, to.Q, to.f, to.d_H, to.d_v, to.d_w, to.d_c,
-        to.d_s, to.J, to.laws, to.B, to.G, to.row);
+    return mstmm_generic_tangent_column_table[speeds](to.theta, to.x, to.H, to.s, to.v, to.w, to.Q,
+      to.f, to.d_H, to.d_v, to.d_w, to.d_c, to.d_s, to.J, to.laws, to.B, to.G, to.row);
 }
-#define mstmm_generic_tangent_column(speeds, ...) mstmm_generic_tangent_column_by(speeds, (struct mstmm_generic_tangent_column){__VA_ARGS__})
+#define mstmm_generic_tangent_column(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_column, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_coordinate_change {
-    const real *H;
-    const real *d_q;
-    real *theta;
-    real *x;
+    const real *H, *d_q;
+    real *theta, *x;
 };
-typedef int mstmm_generic_tangent_coordinate_change_kernel(
-    const real *restrict, const real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_coordinate_change_kernel(in_t, in_t, out_t, out_t);
 extern mstmm_generic_tangent_coordinate_change_kernel *const mstmm_generic_tangent_coordinate_change_table[];
 static inline int mstmm_generic_tangent_coordinate_change_by(int speeds, struct mstmm_generic_tangent_coordinate_change to)
 {
-    return mstmm_generic_tangent_coordinate_change_table[speeds](
-        to.H, to.d_q, to.theta, to.x);
+    return mstmm_generic_tangent_coordinate_change_table[speeds](to.H, to.d_q, to.theta, to.x);
 }
-#define mstmm_generic_tangent_coordinate_change(speeds, ...) mstmm_generic_tangent_coordinate_change_by(speeds, (struct mstmm_generic_tangent_coordinate_change){__VA_ARGS__})
+#define mstmm_generic_tangent_coordinate_change(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_coordinate_change, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_steady {
-    const real *theta;
-    const real *x;
-    const real *H;
-    const real *v;
-    const real *w;
-    const real *Q;
-    const real *f;
-    const real *d_u;
-    const real *d_s;
-    const real *J;
-    const real *laws;
-    real *B;
-    real *G;
-    real *row;
+    const real *theta, *x, *H, *v, *w, *Q, *f, *d_u, *d_s, *J, *laws;
+    real *B, *G, *row;
 };
-typedef int mstmm_generic_tangent_steady_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_steady_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, in_t, out_t, out_t, out_t);
 extern mstmm_generic_tangent_steady_kernel *const mstmm_generic_tangent_steady_table[];
 static inline int mstmm_generic_tangent_steady_by(int speeds, struct mstmm_generic_tangent_steady to)
 {
-    return mstmm_generic_tangent_steady_table[speeds](
-        to.theta, to.x, to.H, to.v, to.w, to.Q, to.f, to.d_u, to.d_s, to.J, to.laws, to.B, to.G,
-        to.row);
+    return mstmm_generic_tangent_steady_table[speeds](to.theta, to.x, to.H, to.v, to.w, to.Q, to.f,
+      to.d_u, to.d_s, to.J, to.laws, to.B, to.G, to.row);
 }
-#define mstmm_generic_tangent_steady(speeds, ...) mstmm_generic_tangent_steady_by(speeds, (struct mstmm_generic_tangent_steady){__VA_ARGS__})
+#define mstmm_generic_tangent_steady(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_steady, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_rotational {
-    const real *theta;
-    const real *H;
-    const real *w;
-    const real *Q;
-    const real *f;
-    const real *d_u;
-    const real *d_s;
-    const real *J;
-    const real *laws;
-    real *B;
-    real *G;
-    real *row;
+    const real *theta, *H, *w, *Q, *f, *d_u, *d_s, *J, *laws;
+    real *B, *G, *row;
 };
-typedef int mstmm_generic_tangent_rotational_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_rotational_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, out_t, out_t, out_t);
 extern mstmm_generic_tangent_rotational_kernel *const mstmm_generic_tangent_rotational_table[];
 static inline int mstmm_generic_tangent_rotational_by(int speeds, struct mstmm_generic_tangent_rotational to)
 {
-    return mstmm_generic_tangent_rotational_table[speeds](
-        to.theta, to.H, to.w, to.Q, to.f, to.d_u, to.d_s, to.J, to.laws, to.B, to.G, to.row);
+    return mstmm_generic_tangent_rotational_table[speeds](to.theta, to.H, to.w, to.Q, to.f, to.d_u,
+      to.d_s, to.J, to.laws, to.B, to.G, to.row);
 }
-#define mstmm_generic_tangent_rotational(speeds, ...) mstmm_generic_tangent_rotational_by(speeds, (struct mstmm_generic_tangent_rotational){__VA_ARGS__})
+#define mstmm_generic_tangent_rotational(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_rotational, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_rows {
-    const real *H;
-    const real *B;
-    const real *W;
-    const real *S;
-    real *K;
-    real *right;
-    real *D;
-    real *one;
+    const real *H, *B, *W, *S;
+    real *K, *right, *D, *one;
 };
-typedef int mstmm_generic_tangent_rows_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_rows_kernel(in_t, in_t, in_t, in_t, out_t, out_t, out_t, out_t);
 extern mstmm_generic_tangent_rows_kernel *const mstmm_generic_tangent_rows_table[];
 static inline int mstmm_generic_tangent_rows_by(int speeds, struct mstmm_generic_tangent_rows to)
 {
-    return mstmm_generic_tangent_rows_table[speeds](
-        to.H, to.B, to.W, to.S, to.K, to.right, to.D, to.one);
+    return mstmm_generic_tangent_rows_table[speeds](to.H, to.B, to.W, to.S, to.K, to.right, to.D,
+      to.one);
 }
-#define mstmm_generic_tangent_rows(speeds, ...) mstmm_generic_tangent_rows_by(speeds, (struct mstmm_generic_tangent_rows){__VA_ARGS__})
+#define mstmm_generic_tangent_rows(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_rows, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_reduce {
-    const real *inverse;
-    const real *right;
-    const real *K;
-    const real *G;
-    real *gain;
-    real *V;
-    real *S;
+    const real *inverse, *right, *K, *G;
+    real *gain, *V, *S;
 };
-typedef int mstmm_generic_tangent_reduce_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_reduce_kernel(in_t, in_t, in_t, in_t, out_t, out_t, out_t);
 extern mstmm_generic_tangent_reduce_kernel *const mstmm_generic_tangent_reduce_table[];
 static inline int mstmm_generic_tangent_reduce_by(int speeds, struct mstmm_generic_tangent_reduce to)
 {
-    return mstmm_generic_tangent_reduce_table[speeds](
-        to.inverse, to.right, to.K, to.G, to.gain, to.V, to.S);
+    return mstmm_generic_tangent_reduce_table[speeds](to.inverse, to.right, to.K, to.G, to.gain,
+      to.V, to.S);
 }
-#define mstmm_generic_tangent_reduce(speeds, ...) mstmm_generic_tangent_reduce_by(speeds, (struct mstmm_generic_tangent_reduce){__VA_ARGS__})
+#define mstmm_generic_tangent_reduce(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_reduce, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_load {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *V;
-    const real *inverse;
-    const real *e;
-    const real *e_f;
-    real *y;
-    real *e_I;
+    const real *Rc, *r, *H, *V, *inverse, *e, *e_f;
+    real *y, *e_I;
 };
-typedef int mstmm_generic_tangent_load_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict);
+typedef int mstmm_generic_tangent_load_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t,
+  out_t);
 extern mstmm_generic_tangent_load_kernel *const mstmm_generic_tangent_load_table[];
 static inline int mstmm_generic_tangent_load_by(int speeds, struct mstmm_generic_tangent_load to)
 {
-    return mstmm_generic_tangent_load_table[speeds](
-        to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.y, to.e_I);
+    return mstmm_generic_tangent_load_table[speeds](to.Rc, to.r, to.H, to.V, to.inverse, to.e,
+      to.e_f, to.y, to.e_I);
 }
-#define mstmm_generic_tangent_load(speeds, ...) mstmm_generic_tangent_load_by(speeds, (struct mstmm_generic_tangent_load){__VA_ARGS__})
+#define mstmm_generic_tangent_load(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_load, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_solution {
-    const real *Rc;
-    const real *r;
-    const real *w_I;
-    const real *v;
-    const real *w;
-    const real *z_I;
-    const real *B;
-    const real *gain;
-    const real *y;
-    real *x;
-    real *z;
+    const real *Rc, *r, *w_I, *v, *w, *z_I, *B, *gain, *y;
+    real *x, *z;
 };
-typedef int mstmm_generic_tangent_solution_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_solution_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, out_t, out_t);
 extern mstmm_generic_tangent_solution_kernel *const mstmm_generic_tangent_solution_table[];
 static inline int mstmm_generic_tangent_solution_by(int speeds, struct mstmm_generic_tangent_solution to)
 {
-    return mstmm_generic_tangent_solution_table[speeds](
-        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.x, to.z);
+    return mstmm_generic_tangent_solution_table[speeds](to.Rc, to.r, to.w_I, to.v, to.w, to.z_I,
+      to.B, to.gain, to.y, to.x, to.z);
 }
-#define mstmm_generic_tangent_solution(speeds, ...) mstmm_generic_tangent_solution_by(speeds, (struct mstmm_generic_tangent_solution){__VA_ARGS__})
+#define mstmm_generic_tangent_solution(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_solution, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_load_with_increments {
-    const real *Rc;
-    const real *r;
-    const real *H;
-    const real *V;
-    const real *inverse;
-    const real *e;
-    const real *e_f;
-    const real *e_b;
-    real *y;
-    real *e_I;
+    const real *Rc, *r, *H, *V, *inverse, *e, *e_f, *e_b;
+    real *y, *e_I;
 };
-typedef int mstmm_generic_tangent_load_with_increments_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_load_with_increments_kernel(in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, out_t, out_t);
 extern mstmm_generic_tangent_load_with_increments_kernel *const mstmm_generic_tangent_load_with_increments_table[];
 static inline int mstmm_generic_tangent_load_with_increments_by(int speeds, struct mstmm_generic_tangent_load_with_increments to)
 {
-    return mstmm_generic_tangent_load_with_increments_table[speeds](
-        to.Rc, to.r, to.H, to.V, to.inverse, to.e, to.e_f, to.e_b, to.y, to.e_I);
+    return mstmm_generic_tangent_load_with_increments_table[speeds](to.Rc, to.r, to.H, to.V,
+      to.inverse, to.e, to.e_f, to.e_b, to.y, to.e_I);
 }
-#define mstmm_generic_tangent_load_with_increments(speeds, ...) mstmm_generic_tangent_load_with_increments_by(speeds, (struct mstmm_generic_tangent_load_with_increments){__VA_ARGS__})
+#define mstmm_generic_tangent_load_with_increments(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_load_with_increments, speeds, __VA_ARGS__)
 
 struct mstmm_generic_tangent_solution_with_increments {
-    const real *Rc;
-    const real *r;
-    const real *w_I;
-    const real *v;
-    const real *w;
-    const real *z_I;
-    const real *B;
-    const real *gain;
-    const real *y;
-    const real *b;
-    real *x;
-    real *z;
+    const real *Rc, *r, *w_I, *v, *w, *z_I, *B, *gain, *y, *b;
+    real *x, *z;
 };
-typedef int mstmm_generic_tangent_solution_with_increments_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict, real *restrict);
+typedef int mstmm_generic_tangent_solution_with_increments_kernel(in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, in_t, in_t, in_t, out_t, out_t);
 extern mstmm_generic_tangent_solution_with_increments_kernel *const mstmm_generic_tangent_solution_with_increments_table[];
 static inline int mstmm_generic_tangent_solution_with_increments_by(int speeds, struct mstmm_generic_tangent_solution_with_increments to)
 {
-    return mstmm_generic_tangent_solution_with_increments_table[speeds](
-        to.Rc, to.r, to.w_I, to.v, to.w, to.z_I, to.B, to.gain, to.y, to.b, to.x, to.z);
+    return mstmm_generic_tangent_solution_with_increments_table[speeds](to.Rc, to.r, to.w_I, to.v,
+      to.w, to.z_I, to.B, to.gain, to.y, to.b, to.x, to.z);
 }
-#define mstmm_generic_tangent_solution_with_increments(speeds, ...) mstmm_generic_tangent_solution_with_increments_by(speeds, (struct mstmm_generic_tangent_solution_with_increments){__VA_ARGS__})
+#define mstmm_generic_tangent_solution_with_increments(speeds, ...) MSTMM_NAMED_OF(mstmm_generic_tangent_solution_with_increments, speeds, __VA_ARGS__)
 
 struct mstmm_hinge_hinge {
-    const real *p;
-    const real *q;
-    const real *u;
-    real *R;
-    real *d;
-    real *H;
-    real *v;
-    real *w;
-    real *c;
-    real *qdot;
+    const real *p, *q, *u;
+    real *R, *d, *H, *v, *w, *c, *qdot;
 };
-typedef int mstmm_hinge_hinge_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_hinge_hinge_kernel(in_t, in_t, in_t, out_t, out_t, out_t, out_t, out_t, out_t,
+  out_t);
 static inline int mstmm_hinge_hinge_by(void (*kernel)(void), struct mstmm_hinge_hinge to)
 {
-    return ((mstmm_hinge_hinge_kernel *)kernel)(
-        to.p, to.q, to.u, to.R, to.d, to.H, to.v, to.w, to.c, to.qdot);
+    return ((mstmm_hinge_hinge_kernel *)kernel)(to.p, to.q, to.u, to.R, to.d, to.H, to.v, to.w,
+      to.c, to.qdot);
 }
-#define mstmm_hinge_hinge(kernel, ...) mstmm_hinge_hinge_by(kernel, (struct mstmm_hinge_hinge){__VA_ARGS__})
+#define mstmm_hinge_hinge(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_hinge, kernel, __VA_ARGS__)
 #define MSTMM_HINGE_HINGE_INPUTS 3
 #define MSTMM_HINGE_HINGE_OUTPUTS 7
 static inline void mstmm_hinge_hinge_arrays(struct mstmm_hinge_hinge to, const real **inputs, real **outputs)
@@ -3898,101 +2498,55 @@ static inline void mstmm_hinge_hinge_arrays(struct mstmm_hinge_hinge to, const r
 }
 
 struct mstmm_hinge_forward {
-    const real *Rt;
-    const real *ro;
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *s;
-    const real *motion_I;
-    real *Rc;
-    real *r;
-    real *motion;
-    real *qdot;
+    const real *Rt, *ro, *p, *q, *u, *s, *motion_I;
+    real *Rc, *r, *motion, *qdot;
 };
-typedef int mstmm_hinge_forward_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict);
+typedef int mstmm_hinge_forward_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t,
+  out_t, out_t);
 static inline int mstmm_hinge_forward_by(void (*kernel)(void), struct mstmm_hinge_forward to)
 {
-    return ((mstmm_hinge_forward_kernel *)kernel)(
-        to.Rt, to.ro, to.p, to.q, to.u, to.s, to.motion_I, to.Rc, to.r, to.motion, to.qdot);
+    return ((mstmm_hinge_forward_kernel *)kernel)(to.Rt, to.ro, to.p, to.q, to.u, to.s, to.motion_I,
+      to.Rc, to.r, to.motion, to.qdot);
 }
-#define mstmm_hinge_forward(kernel, ...) mstmm_hinge_forward_by(kernel, (struct mstmm_hinge_forward){__VA_ARGS__})
+#define mstmm_hinge_forward(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_forward, kernel, __VA_ARGS__)
 
 struct mstmm_hinge_condense {
-    const real *Rc;
-    const real *r;
-    const real *p;
-    const real *q;
-    const real *floor_;
-    const real *S;
-    const real *e;
-    const real *tau;
-    real *G;
-    real *g;
-    real *S_I;
-    real *e_I;
+    const real *Rc, *r, *p, *q, *floor_, *S, *e, *tau;
+    real *G, *g, *S_I, *e_I;
 };
-typedef int mstmm_hinge_condense_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_hinge_condense_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t,
+  out_t, out_t, out_t);
 static inline int mstmm_hinge_condense_by(void (*kernel)(void), struct mstmm_hinge_condense to)
 {
-    return ((mstmm_hinge_condense_kernel *)kernel)(
-        to.Rc, to.r, to.p, to.q, to.floor_, to.S, to.e, to.tau, to.G, to.g, to.S_I, to.e_I);
+    return ((mstmm_hinge_condense_kernel *)kernel)(to.Rc, to.r, to.p, to.q, to.floor_, to.S, to.e,
+      to.tau, to.G, to.g, to.S_I, to.e_I);
 }
-#define mstmm_hinge_condense(kernel, ...) mstmm_hinge_condense_by(kernel, (struct mstmm_hinge_condense){__VA_ARGS__})
+#define mstmm_hinge_condense(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_condense, kernel, __VA_ARGS__)
 
 struct mstmm_hinge_recover {
-    const real *Rc;
-    const real *r;
-    const real *p;
-    const real *q;
-    const real *G;
-    const real *g;
-    const real *delta_I;
-    real *udot;
-    real *delta;
+    const real *Rc, *r, *p, *q, *G, *g, *delta_I;
+    real *udot, *delta;
 };
-typedef int mstmm_hinge_recover_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict);
+typedef int mstmm_hinge_recover_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t);
 static inline int mstmm_hinge_recover_by(void (*kernel)(void), struct mstmm_hinge_recover to)
 {
-    return ((mstmm_hinge_recover_kernel *)kernel)(
-        to.Rc, to.r, to.p, to.q, to.G, to.g, to.delta_I, to.udot, to.delta);
+    return ((mstmm_hinge_recover_kernel *)kernel)(to.Rc, to.r, to.p, to.q, to.G, to.g, to.delta_I,
+      to.udot, to.delta);
 }
-#define mstmm_hinge_recover(kernel, ...) mstmm_hinge_recover_by(kernel, (struct mstmm_hinge_recover){__VA_ARGS__})
+#define mstmm_hinge_recover(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_recover, kernel, __VA_ARGS__)
 
 struct mstmm_hinge_hinge_slope {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *d_q;
-    const real *d_u;
-    real *d_R;
-    real *d_d;
-    real *d_H;
-    real *d_v;
-    real *d_w;
-    real *d_c;
-    real *d_qdot;
+    const real *p, *q, *u, *d_q, *d_u;
+    real *d_R, *d_d, *d_H, *d_v, *d_w, *d_c, *d_qdot;
 };
-typedef int mstmm_hinge_hinge_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict, real *restrict, real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict);
+typedef int mstmm_hinge_hinge_slope_kernel(in_t, in_t, in_t, in_t, in_t, out_t, out_t, out_t, out_t,
+  out_t, out_t, out_t);
 static inline int mstmm_hinge_hinge_slope_by(void (*kernel)(void), struct mstmm_hinge_hinge_slope to)
 {
-    return ((mstmm_hinge_hinge_slope_kernel *)kernel)(
-        to.p, to.q, to.u, to.d_q, to.d_u, to.d_R, to.d_d, to.d_H, to.d_v, to.d_w, to.d_c,
-        to.d_qdot);
+    return ((mstmm_hinge_hinge_slope_kernel *)kernel)(to.p, to.q, to.u, to.d_q, to.d_u, to.d_R,
+      to.d_d, to.d_H, to.d_v, to.d_w, to.d_c, to.d_qdot);
 }
-#define mstmm_hinge_hinge_slope(kernel, ...) mstmm_hinge_hinge_slope_by(kernel, (struct mstmm_hinge_hinge_slope){__VA_ARGS__})
+#define mstmm_hinge_hinge_slope(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_hinge_slope, kernel, __VA_ARGS__)
 #define MSTMM_HINGE_HINGE_SLOPE_INPUTS 5
 #define MSTMM_HINGE_HINGE_SLOPE_OUTPUTS 7
 static inline void mstmm_hinge_hinge_slope_arrays(struct mstmm_hinge_hinge_slope to, const real **inputs, real **outputs)
@@ -4012,410 +2566,232 @@ static inline void mstmm_hinge_hinge_slope_arrays(struct mstmm_hinge_hinge_slope
 }
 
 struct mstmm_hinge_rates_by_coordinates {
-    const real *p;
-    const real *q;
-    const real *u;
+    const real *p, *q, *u;
     real *J;
 };
-typedef int mstmm_hinge_rates_by_coordinates_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_hinge_rates_by_coordinates_kernel(in_t, in_t, in_t, out_t);
 static inline int mstmm_hinge_rates_by_coordinates_by(void (*kernel)(void), struct mstmm_hinge_rates_by_coordinates to)
 {
-    return ((mstmm_hinge_rates_by_coordinates_kernel *)kernel)(
-        to.p, to.q, to.u, to.J);
+    return ((mstmm_hinge_rates_by_coordinates_kernel *)kernel)(to.p, to.q, to.u, to.J);
 }
-#define mstmm_hinge_rates_by_coordinates(kernel, ...) mstmm_hinge_rates_by_coordinates_by(kernel, (struct mstmm_hinge_rates_by_coordinates){__VA_ARGS__})
+#define mstmm_hinge_rates_by_coordinates(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_rates_by_coordinates, kernel, __VA_ARGS__)
 
 struct mstmm_hinge_rates_by_speeds {
-    const real *p;
-    const real *q;
-    const real *u;
+    const real *p, *q, *u;
     real *J;
 };
-typedef int mstmm_hinge_rates_by_speeds_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_hinge_rates_by_speeds_kernel(in_t, in_t, in_t, out_t);
 static inline int mstmm_hinge_rates_by_speeds_by(void (*kernel)(void), struct mstmm_hinge_rates_by_speeds to)
 {
-    return ((mstmm_hinge_rates_by_speeds_kernel *)kernel)(
-        to.p, to.q, to.u, to.J);
+    return ((mstmm_hinge_rates_by_speeds_kernel *)kernel)(to.p, to.q, to.u, to.J);
 }
-#define mstmm_hinge_rates_by_speeds(kernel, ...) mstmm_hinge_rates_by_speeds_by(kernel, (struct mstmm_hinge_rates_by_speeds){__VA_ARGS__})
+#define mstmm_hinge_rates_by_speeds(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_rates_by_speeds, kernel, __VA_ARGS__)
 
 struct mstmm_hinge_body_motion {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *Rt;
-    const real *ro;
-    const real *s;
-    const real *motion_I;
-    real *R;
-    real *d;
-    real *H;
-    real *v;
-    real *w;
-    real *c;
-    real *qdot;
-    real *Rc;
-    real *r;
-    real *motion;
+    const real *p, *q, *u, *Rt, *ro, *s, *motion_I;
+    real *R, *d, *H, *v, *w, *c, *qdot, *Rc, *r, *motion;
 };
-typedef int mstmm_hinge_body_motion_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_hinge_body_motion_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t,
+  out_t, out_t, out_t, out_t, out_t, out_t, out_t, out_t);
 static inline int mstmm_hinge_body_motion_by(void (*kernel)(void), struct mstmm_hinge_body_motion to)
 {
-    return ((mstmm_hinge_body_motion_kernel *)kernel)(
-        to.p, to.q, to.u, to.Rt, to.ro, to.s, to.motion_I, to.R, to.d, to.H, to.v, to.w, to.c,
-        to.qdot, to.Rc, to.r, to.motion);
+    return ((mstmm_hinge_body_motion_kernel *)kernel)(to.p, to.q, to.u, to.Rt, to.ro, to.s,
+      to.motion_I, to.R, to.d, to.H, to.v, to.w, to.c, to.qdot, to.Rc, to.r, to.motion);
 }
-#define mstmm_hinge_body_motion(kernel, ...) mstmm_hinge_body_motion_by(kernel, (struct mstmm_hinge_body_motion){__VA_ARGS__})
+#define mstmm_hinge_body_motion(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_body_motion, kernel, __VA_ARGS__)
 
 struct mstmm_hinge_directions {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *s;
-    const real *motion;
-    const real *f;
-    const real *J;
-    const real *laws;
-    const real *along;
-    const real *rate;
-    const real *scale;
-    const real *sq;
-    real *B;
-    real *G;
-    real *W;
-    real *H;
+    const real *p, *q, *u, *s, *motion, *f, *J, *laws, *along, *rate, *scale, *sq;
+    real *B, *G, *W, *H;
 };
-typedef int mstmm_hinge_directions_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_hinge_directions_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, in_t, out_t, out_t, out_t, out_t);
 static inline int mstmm_hinge_directions_by(void (*kernel)(void), struct mstmm_hinge_directions to)
 {
-    return ((mstmm_hinge_directions_kernel *)kernel)(
-        to.p, to.q, to.u, to.s, to.motion, to.f, to.J, to.laws, to.along, to.rate, to.scale,
-        to.sq, to.B, to.G, to.W, to.H);
+    return ((mstmm_hinge_directions_kernel *)kernel)(to.p, to.q, to.u, to.s, to.motion, to.f, to.J,
+      to.laws, to.along, to.rate, to.scale, to.sq, to.B, to.G, to.W, to.H);
 }
-#define mstmm_hinge_directions(kernel, ...) mstmm_hinge_directions_by(kernel, (struct mstmm_hinge_directions){__VA_ARGS__})
+#define mstmm_hinge_directions(kernel, ...) MSTMM_NAMED_OF(mstmm_hinge_directions, kernel, __VA_ARGS__)
 
 struct mstmm_body_inertia {
     const real *p;
     real *S;
 };
-typedef int mstmm_body_inertia_kernel(
-    const real *restrict, real *restrict);
+typedef int mstmm_body_inertia_kernel(in_t, out_t);
 static inline int mstmm_body_inertia_by(void (*kernel)(void), struct mstmm_body_inertia to)
 {
-    return ((mstmm_body_inertia_kernel *)kernel)(
-        to.p, to.S);
+    return ((mstmm_body_inertia_kernel *)kernel)(to.p, to.S);
 }
-#define mstmm_body_inertia(kernel, ...) mstmm_body_inertia_by(kernel, (struct mstmm_body_inertia){__VA_ARGS__})
+#define mstmm_body_inertia(kernel, ...) MSTMM_NAMED_OF(mstmm_body_inertia, kernel, __VA_ARGS__)
 
 struct mstmm_body_bias_load {
-    const real *p;
-    const real *motion;
+    const real *p, *motion;
     real *e;
 };
-typedef int mstmm_body_bias_load_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_body_bias_load_kernel(in_t, in_t, out_t);
 static inline int mstmm_body_bias_load_by(void (*kernel)(void), struct mstmm_body_bias_load to)
 {
-    return ((mstmm_body_bias_load_kernel *)kernel)(
-        to.p, to.motion, to.e);
+    return ((mstmm_body_bias_load_kernel *)kernel)(to.p, to.motion, to.e);
 }
-#define mstmm_body_bias_load(kernel, ...) mstmm_body_bias_load_by(kernel, (struct mstmm_body_bias_load){__VA_ARGS__})
+#define mstmm_body_bias_load(kernel, ...) MSTMM_NAMED_OF(mstmm_body_bias_load, kernel, __VA_ARGS__)
 
 struct mstmm_body_energy {
-    const real *p;
-    const real *v;
-    const real *w;
+    const real *p, *v, *w;
     real *T;
 };
-typedef int mstmm_body_energy_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_body_energy_kernel(in_t, in_t, in_t, out_t);
 static inline int mstmm_body_energy_by(void (*kernel)(void), struct mstmm_body_energy to)
 {
-    return ((mstmm_body_energy_kernel *)kernel)(
-        to.p, to.v, to.w, to.T);
+    return ((mstmm_body_energy_kernel *)kernel)(to.p, to.v, to.w, to.T);
 }
-#define mstmm_body_energy(kernel, ...) mstmm_body_energy_by(kernel, (struct mstmm_body_energy){__VA_ARGS__})
+#define mstmm_body_energy(kernel, ...) MSTMM_NAMED_OF(mstmm_body_energy, kernel, __VA_ARGS__)
 
 struct mstmm_body_bias_load_slope {
-    const real *p;
-    const real *motion;
-    const real *d_motion;
+    const real *p, *motion, *d_motion;
     real *d_e;
 };
-typedef int mstmm_body_bias_load_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_body_bias_load_slope_kernel(in_t, in_t, in_t, out_t);
 static inline int mstmm_body_bias_load_slope_by(void (*kernel)(void), struct mstmm_body_bias_load_slope to)
 {
-    return ((mstmm_body_bias_load_slope_kernel *)kernel)(
-        to.p, to.motion, to.d_motion, to.d_e);
+    return ((mstmm_body_bias_load_slope_kernel *)kernel)(to.p, to.motion, to.d_motion, to.d_e);
 }
-#define mstmm_body_bias_load_slope(kernel, ...) mstmm_body_bias_load_slope_by(kernel, (struct mstmm_body_bias_load_slope){__VA_ARGS__})
+#define mstmm_body_bias_load_slope(kernel, ...) MSTMM_NAMED_OF(mstmm_body_bias_load_slope, kernel, __VA_ARGS__)
 
 struct mstmm_body_load_by_motion {
-    const real *p;
-    const real *motion;
+    const real *p, *motion;
     real *J;
 };
-typedef int mstmm_body_load_by_motion_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_body_load_by_motion_kernel(in_t, in_t, out_t);
 static inline int mstmm_body_load_by_motion_by(void (*kernel)(void), struct mstmm_body_load_by_motion to)
 {
-    return ((mstmm_body_load_by_motion_kernel *)kernel)(
-        to.p, to.motion, to.J);
+    return ((mstmm_body_load_by_motion_kernel *)kernel)(to.p, to.motion, to.J);
 }
-#define mstmm_body_load_by_motion(kernel, ...) mstmm_body_load_by_motion_by(kernel, (struct mstmm_body_load_by_motion){__VA_ARGS__})
+#define mstmm_body_load_by_motion(kernel, ...) MSTMM_NAMED_OF(mstmm_body_load_by_motion, kernel, __VA_ARGS__)
 
 struct mstmm_law_coordinate {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *effort;
-    real *tau;
-    real *V;
-    real *P;
+    const real *p, *q, *u, *effort;
+    real *tau, *V, *P;
 };
-typedef int mstmm_law_coordinate_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    real *restrict, real *restrict, real *restrict);
+typedef int mstmm_law_coordinate_kernel(in_t, in_t, in_t, in_t, out_t, out_t, out_t);
 static inline int mstmm_law_coordinate_by(void (*kernel)(void), struct mstmm_law_coordinate to)
 {
-    return ((mstmm_law_coordinate_kernel *)kernel)(
-        to.p, to.q, to.u, to.effort, to.tau, to.V, to.P);
+    return ((mstmm_law_coordinate_kernel *)kernel)(to.p, to.q, to.u, to.effort, to.tau, to.V, to.P);
 }
-#define mstmm_law_coordinate(kernel, ...) mstmm_law_coordinate_by(kernel, (struct mstmm_law_coordinate){__VA_ARGS__})
+#define mstmm_law_coordinate(kernel, ...) MSTMM_NAMED_OF(mstmm_law_coordinate, kernel, __VA_ARGS__)
 
 struct mstmm_law_quaternion {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *B;
-    const real *effort;
-    const real *twist_ref;
-    real *tau;
-    real *V;
-    real *P;
-    real *twist;
+    const real *p, *q, *u, *B, *effort, *twist_ref;
+    real *tau, *V, *P, *twist;
 };
-typedef int mstmm_law_quaternion_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, real *restrict, real *restrict, real *restrict,
-    real *restrict);
+typedef int mstmm_law_quaternion_kernel(in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t, out_t,
+  out_t);
 static inline int mstmm_law_quaternion_by(void (*kernel)(void), struct mstmm_law_quaternion to)
 {
-    return ((mstmm_law_quaternion_kernel *)kernel)(
-        to.p, to.q, to.u, to.B, to.effort, to.twist_ref, to.tau, to.V, to.P, to.twist);
+    return ((mstmm_law_quaternion_kernel *)kernel)(to.p, to.q, to.u, to.B, to.effort, to.twist_ref,
+      to.tau, to.V, to.P, to.twist);
 }
-#define mstmm_law_quaternion(kernel, ...) mstmm_law_quaternion_by(kernel, (struct mstmm_law_quaternion){__VA_ARGS__})
+#define mstmm_law_quaternion(kernel, ...) MSTMM_NAMED_OF(mstmm_law_quaternion, kernel, __VA_ARGS__)
 
 struct mstmm_law_coordinate_slope {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *effort;
-    const real *d_q;
-    const real *d_u;
-    const real *d_effort;
+    const real *p, *q, *u, *effort, *d_q, *d_u, *d_effort;
     real *d_tau;
 };
-typedef int mstmm_law_coordinate_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_law_coordinate_slope_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t);
 static inline int mstmm_law_coordinate_slope_by(void (*kernel)(void), struct mstmm_law_coordinate_slope to)
 {
-    return ((mstmm_law_coordinate_slope_kernel *)kernel)(
-        to.p, to.q, to.u, to.effort, to.d_q, to.d_u, to.d_effort, to.d_tau);
+    return ((mstmm_law_coordinate_slope_kernel *)kernel)(to.p, to.q, to.u, to.effort, to.d_q,
+      to.d_u, to.d_effort, to.d_tau);
 }
-#define mstmm_law_coordinate_slope(kernel, ...) mstmm_law_coordinate_slope_by(kernel, (struct mstmm_law_coordinate_slope){__VA_ARGS__})
+#define mstmm_law_coordinate_slope(kernel, ...) MSTMM_NAMED_OF(mstmm_law_coordinate_slope, kernel, __VA_ARGS__)
 
 struct mstmm_law_quaternion_slope {
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *B;
-    const real *effort;
-    const real *twist_ref;
-    const real *d_q;
-    const real *d_u;
-    const real *d_effort;
+    const real *p, *q, *u, *B, *effort, *twist_ref, *d_q, *d_u, *d_effort;
     real *d_tau;
 };
-typedef int mstmm_law_quaternion_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict);
+typedef int mstmm_law_quaternion_slope_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  out_t);
 static inline int mstmm_law_quaternion_slope_by(void (*kernel)(void), struct mstmm_law_quaternion_slope to)
 {
-    return ((mstmm_law_quaternion_slope_kernel *)kernel)(
-        to.p, to.q, to.u, to.B, to.effort, to.twist_ref, to.d_q, to.d_u, to.d_effort, to.d_tau);
+    return ((mstmm_law_quaternion_slope_kernel *)kernel)(to.p, to.q, to.u, to.B, to.effort,
+      to.twist_ref, to.d_q, to.d_u, to.d_effort, to.d_tau);
 }
-#define mstmm_law_quaternion_slope(kernel, ...) mstmm_law_quaternion_slope_by(kernel, (struct mstmm_law_quaternion_slope){__VA_ARGS__})
+#define mstmm_law_quaternion_slope(kernel, ...) MSTMM_NAMED_OF(mstmm_law_quaternion_slope, kernel, __VA_ARGS__)
 
 struct mstmm_force_wrench {
-    const real *p;
-    const real *t;
-    const real *effort;
-    const real *A_F;
-    const real *x_F;
-    const real *v_F;
-    const real *w_F;
-    const real *A_T;
-    const real *x_T;
-    const real *v_T;
-    const real *w_T;
-    real *F;
-    real *M;
-    real *V;
-    real *P;
+    const real *p, *t, *effort, *A_F, *x_F, *v_F, *w_F, *A_T, *x_T, *v_T, *w_T;
+    real *F, *M, *V, *P;
 };
-typedef int mstmm_force_wrench_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict);
+typedef int mstmm_force_wrench_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, out_t, out_t, out_t, out_t);
 static inline int mstmm_force_wrench_by(void (*kernel)(void), struct mstmm_force_wrench to)
 {
-    return ((mstmm_force_wrench_kernel *)kernel)(
-        to.p, to.t, to.effort, to.A_F, to.x_F, to.v_F, to.w_F, to.A_T, to.x_T, to.v_T, to.w_T,
-        to.F, to.M, to.V, to.P);
+    return ((mstmm_force_wrench_kernel *)kernel)(to.p, to.t, to.effort, to.A_F, to.x_F, to.v_F,
+      to.w_F, to.A_T, to.x_T, to.v_T, to.w_T, to.F, to.M, to.V, to.P);
 }
-#define mstmm_force_wrench(kernel, ...) mstmm_force_wrench_by(kernel, (struct mstmm_force_wrench){__VA_ARGS__})
+#define mstmm_force_wrench(kernel, ...) MSTMM_NAMED_OF(mstmm_force_wrench, kernel, __VA_ARGS__)
 
 struct mstmm_force_wrench_slope {
-    const real *p;
-    const real *t;
-    const real *effort;
-    const real *A_F;
-    const real *x_F;
-    const real *v_F;
-    const real *w_F;
-    const real *A_T;
-    const real *x_T;
-    const real *v_T;
-    const real *w_T;
-    const real *d_t;
-    const real *d_effort;
-    const real *d_A_F;
-    const real *d_x_F;
-    const real *d_v_F;
-    const real *d_w_F;
-    const real *d_A_T;
-    const real *d_x_T;
-    const real *d_v_T;
-    const real *d_w_T;
-    real *d_F;
-    real *d_M;
+    const real *p, *t, *effort, *A_F, *x_F, *v_F, *w_F, *A_T, *x_T, *v_T, *w_T, *d_t, *d_effort,
+      *d_A_F, *d_x_F, *d_v_F, *d_w_F, *d_A_T, *d_x_T, *d_v_T, *d_w_T;
+    real *d_F, *d_M;
 };
-typedef int mstmm_force_wrench_slope_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict, real *restrict);
+typedef int mstmm_force_wrench_slope_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t,
+  in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t);
 static inline int mstmm_force_wrench_slope_by(void (*kernel)(void), struct mstmm_force_wrench_slope to)
 {
-    return ((mstmm_force_wrench_slope_kernel *)kernel)(
-        to.p, to.t, to.effort, to.A_F, to.x_F, to.v_F, to.w_F, to.A_T, to.x_T, to.v_T, to.w_T,
-        to.d_t, to.d_effort, to.d_A_F, to.d_x_F, to.d_v_F, to.d_w_F, to.d_A_T, to.d_x_T, to.d_v_T,
-        to.d_w_T, to.d_F, to.d_M);
+    return ((mstmm_force_wrench_slope_kernel *)kernel)(to.p, to.t, to.effort, to.A_F, to.x_F,
+      to.v_F, to.w_F, to.A_T, to.x_T, to.v_T, to.w_T, to.d_t, to.d_effort, to.d_A_F, to.d_x_F,
+      to.d_v_F, to.d_w_F, to.d_A_T, to.d_x_T, to.d_v_T, to.d_w_T, to.d_F, to.d_M);
 }
-#define mstmm_force_wrench_slope(kernel, ...) mstmm_force_wrench_slope_by(kernel, (struct mstmm_force_wrench_slope){__VA_ARGS__})
+#define mstmm_force_wrench_slope(kernel, ...) MSTMM_NAMED_OF(mstmm_force_wrench_slope, kernel, __VA_ARGS__)
 
 struct mstmm_link_turn {
-    const real *link;
-    const real *q;
+    const real *link, *q;
     real *turn;
 };
-typedef int mstmm_link_turn_kernel(
-    const real *restrict, const real *restrict, real *restrict);
+typedef int mstmm_link_turn_kernel(in_t, in_t, out_t);
 static inline int mstmm_link_turn_by(void (*kernel)(void), struct mstmm_link_turn to)
 {
-    return ((mstmm_link_turn_kernel *)kernel)(
-        to.link, to.q, to.turn);
+    return ((mstmm_link_turn_kernel *)kernel)(to.link, to.q, to.turn);
 }
-#define mstmm_link_turn(kernel, ...) mstmm_link_turn_by(kernel, (struct mstmm_link_turn){__VA_ARGS__})
+#define mstmm_link_turn(kernel, ...) MSTMM_NAMED_OF(mstmm_link_turn, kernel, __VA_ARGS__)
 
 struct mstmm_link_forward {
-    const real *link;
-    const real *turn;
-    const real *b;
-    const real *p;
-    const real *q;
-    const real *u;
-    const real *motion_I;
-    real *d;
-    real *motion;
-    real *e_B;
-    real *qdot;
+    const real *link, *turn, *b, *p, *q, *u, *motion_I;
+    real *d, *motion, *e_B, *qdot;
 };
-typedef int mstmm_link_forward_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict, real *restrict, real *restrict);
+typedef int mstmm_link_forward_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t, out_t,
+  out_t);
 static inline int mstmm_link_forward_by(void (*kernel)(void), struct mstmm_link_forward to)
 {
-    return ((mstmm_link_forward_kernel *)kernel)(
-        to.link, to.turn, to.b, to.p, to.q, to.u, to.motion_I, to.d, to.motion, to.e_B, to.qdot);
+    return ((mstmm_link_forward_kernel *)kernel)(to.link, to.turn, to.b, to.p, to.q, to.u,
+      to.motion_I, to.d, to.motion, to.e_B, to.qdot);
 }
-#define mstmm_link_forward(kernel, ...) mstmm_link_forward_by(kernel, (struct mstmm_link_forward){__VA_ARGS__})
+#define mstmm_link_forward(kernel, ...) MSTMM_NAMED_OF(mstmm_link_forward, kernel, __VA_ARGS__)
 
 struct mstmm_link_condense {
-    const real *link;
-    const real *turn;
-    const real *d;
-    const real *b;
-    const real *p;
-    const real *S_K;
-    const real *e_K;
-    const real *e_B;
-    const real *tau;
-    real *G;
-    real *g;
-    real *S_I;
-    real *e_I;
+    const real *link, *turn, *d, *b, *p, *S_K, *e_K, *e_B, *tau;
+    real *G, *g, *S_I, *e_I;
 };
-typedef int mstmm_link_condense_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, real *restrict, real *restrict, real *restrict, real *restrict);
+typedef int mstmm_link_condense_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t,
+  out_t, out_t, out_t);
 static inline int mstmm_link_condense_by(void (*kernel)(void), struct mstmm_link_condense to)
 {
-    return ((mstmm_link_condense_kernel *)kernel)(
-        to.link, to.turn, to.d, to.b, to.p, to.S_K, to.e_K, to.e_B, to.tau, to.G, to.g, to.S_I,
-        to.e_I);
+    return ((mstmm_link_condense_kernel *)kernel)(to.link, to.turn, to.d, to.b, to.p, to.S_K,
+      to.e_K, to.e_B, to.tau, to.G, to.g, to.S_I, to.e_I);
 }
-#define mstmm_link_condense(kernel, ...) mstmm_link_condense_by(kernel, (struct mstmm_link_condense){__VA_ARGS__})
+#define mstmm_link_condense(kernel, ...) MSTMM_NAMED_OF(mstmm_link_condense, kernel, __VA_ARGS__)
 
 struct mstmm_link_recover {
-    const real *link;
-    const real *turn;
-    const real *d;
-    const real *p;
-    const real *G;
-    const real *g;
-    const real *delta_I;
-    real *udot;
-    real *delta;
+    const real *link, *turn, *d, *p, *G, *g, *delta_I;
+    real *udot, *delta;
 };
-typedef int mstmm_link_recover_kernel(
-    const real *restrict, const real *restrict, const real *restrict, const real *restrict,
-    const real *restrict, const real *restrict, const real *restrict, real *restrict,
-    real *restrict);
+typedef int mstmm_link_recover_kernel(in_t, in_t, in_t, in_t, in_t, in_t, in_t, out_t, out_t);
 static inline int mstmm_link_recover_by(void (*kernel)(void), struct mstmm_link_recover to)
 {
-    return ((mstmm_link_recover_kernel *)kernel)(
-        to.link, to.turn, to.d, to.p, to.G, to.g, to.delta_I, to.udot, to.delta);
+    return ((mstmm_link_recover_kernel *)kernel)(to.link, to.turn, to.d, to.p, to.G, to.g,
+      to.delta_I, to.udot, to.delta);
 }
-#define mstmm_link_recover(kernel, ...) mstmm_link_recover_by(kernel, (struct mstmm_link_recover){__VA_ARGS__})
+#define mstmm_link_recover(kernel, ...) MSTMM_NAMED_OF(mstmm_link_recover, kernel, __VA_ARGS__)
 
 #endif

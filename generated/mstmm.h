@@ -51,4 +51,21 @@ typedef struct {
 } mstmm_element;
 
 /* cdef end */
+
+/* Arrays of a kernel, which do not overlap. */
+typedef const real *restrict in_t;
+typedef real *restrict out_t;
+
+/* Call of a kernel by lists of its arrays, and the functions of its descriptor. */
+#define MSTMM_CALL(kernel, arguments) \
+    static int kernel##_call(int n, const real *const *in, real *const *out) \
+    { \
+        (void)n, (void)in, (void)out; \
+        return kernel arguments; \
+    }
+#define MSTMM_FUNCTIONS(kernel) (void (*)(void))kernel, kernel##_call
+
+/* Call of a kernel, or of one of those that a record or the number of speeds selects, by names. */
+#define MSTMM_NAMED(call, ...) call##_by((struct call){__VA_ARGS__})
+#define MSTMM_NAMED_OF(call, which, ...) call##_by(which, (struct call){__VA_ARGS__})
 #endif

@@ -7,115 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_frames;
-int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
-    const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x);
-int mstmm_sweep_frames_velocity(const real *restrict Rc, const real *restrict r,
-    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
-    real *restrict v);
-int mstmm_sweep_frames_point(const real *restrict A, const real *restrict x, const real *restrict v,
-    const real *restrict motion, const real *restrict delta, const real *restrict offset,
-    const real *restrict gravity, real *restrict x_K, real *restrict v_K, real *restrict a_K);
-int mstmm_sweep_frames_angular_motion(const real *restrict A, const real *restrict motion,
-    const real *restrict delta, real *restrict w_K, real *restrict alpha_K);
-int mstmm_sweep_frames_end_frame(const real *restrict A, const real *restrict R_end,
-    real *restrict A_end);
-int mstmm_sweep_frames_applied_load(const real *restrict A, const real *restrict A_F,
-    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e);
-int mstmm_sweep_frames_reaction_wrench(const real *restrict x_F, const real *restrict x_T,
-    const real *restrict F, const real *restrict M, real *restrict F_back, real *restrict M_back);
-int mstmm_sweep_frames_power(const real *restrict A_F, const real *restrict F,
-    const real *restrict M, const real *restrict v_K, const real *restrict w_K, real *restrict P);
-int mstmm_sweep_frames_momentum(const real *restrict S, const real *restrict A,
-    const real *restrict x, const real *restrict v, const real *restrict w, real *restrict L,
-    real *restrict K);
-int mstmm_sweep_frames_carried_momentum(const real *restrict A, const real *restrict x,
-    const real *restrict h, real *restrict p, real *restrict L);
-int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restrict A,
-    const real *restrict x, const real *restrict gravity, real *restrict V);
-int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_);
-int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
-    const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
-    real *restrict moment);
-int mstmm_sweep_frames_moment_about(const real *restrict A, const real *restrict offset,
-    const real *restrict f, real *restrict moment);
-int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r,
-    const real *restrict e, real *restrict e_I);
-int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
-    real *restrict T);
-int mstmm_sweep_frames_driven_effort(const real *restrict load, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, real *restrict tau_d);
-int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
-    real *restrict P);
-int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
-    const real *restrict x_T, const real *restrict v_T, real *restrict l);
-int mstmm_sweep_frames_to_inertial(const real *restrict A, const real *restrict b,
-    real *restrict b_0);
-int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
-    const real *restrict motion, const real *restrict load, const real *restrict ro_n,
-    real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
-    real *restrict omega, real *restrict f_C, real *restrict m_C);
-int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
-    const real *restrict z, real *restrict delta);
-int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict S, real *restrict T, real *restrict S_I);
-int mstmm_sweep_frames_tangent_motion(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, real *restrict z);
-int mstmm_sweep_frames_tangent_pose_change(const real *restrict R, const real *restrict d_R,
-    const real *restrict d_d, real *restrict theta, real *restrict x);
-int mstmm_sweep_frames_tangent_known_load(const real *restrict S, const real *restrict b,
-    const real *restrict g, real *restrict e_S, real *restrict e_b);
-int mstmm_sweep_frames_placed_displacement(const real *restrict Rc, const real *restrict r,
-    const real *restrict z_I, const real *restrict p_I, real *restrict p);
-int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
-    real *restrict d_A, real *restrict d_x, real *restrict d_v);
-int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *restrict x,
-    const real *restrict v_P, const real *restrict v, const real *restrict d_v,
-    const real *restrict Q, real *restrict B_p);
-int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
-    const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
-    real *restrict S_wI);
-int mstmm_sweep_frames_placed_known_load(const real *restrict S_p, const real *restrict b_p,
-    real *restrict e_S, real *restrict e_b);
-int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
-    const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
-    const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
-    real *restrict d_A, real *restrict d_x);
-int mstmm_sweep_frames_velocity_slope(const real *restrict Rc, const real *restrict r,
-    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
-    const real *restrict d_Rc, const real *restrict d_r, const real *restrict d_v_I,
-    const real *restrict d_w_I, const real *restrict d_v_rel, real *restrict d_v);
-int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict x,
-    const real *restrict v, const real *restrict motion, const real *restrict delta,
-    const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
-    const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
-    real *restrict d_x_K, real *restrict d_v_K);
-int mstmm_sweep_frames_angular_motion_slope(const real *restrict A, const real *restrict motion,
-    const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
-    real *restrict d_w_K);
-int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
-    const real *restrict d_A, real *restrict d_A_end);
-int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *restrict A_F,
-    const real *restrict offset, const real *restrict F, const real *restrict M,
-    const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
-    const real *restrict d_M, real *restrict d_e);
-int mstmm_sweep_frames_reaction_wrench_slope(const real *restrict x_F, const real *restrict x_T,
-    const real *restrict F, const real *restrict M, const real *restrict d_x_F,
-    const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
-    real *restrict d_F_back, real *restrict d_M_back);
-int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
-    const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
-    const real *restrict d_e, real *restrict d_e_I);
-int mstmm_sweep_frames_driven_effort_slope(const real *restrict load, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, const real *restrict d_load,
-    const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d);
-int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
-    const real *restrict d_v_F, const real *restrict d_x_T, const real *restrict d_v_T,
-    real *restrict d_l);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -141,104 +32,24 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out A[3][3] rotation, body axes to inertial axes
  * out x[3] (m) P of the body, inertial axes
  */
-int mstmm_sweep_frames_pose(const real *restrict A_I, const real *restrict x_I,
-    const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x)
+int mstmm_sweep_frames_pose(in_t A_I, in_t x_I, in_t Rc, in_t r, out_t A, out_t x)
 {
-    const real t0 = A_I[0] * Rc[0];
-    const real t1 = A_I[1] * Rc[3];
-    const real t2 = t0 + t1;
-    const real t3 = A_I[2] * Rc[6];
-    const real t4 = t2 + t3;
-    A[0] = t4;
-    const real t5 = A_I[0] * Rc[1];
-    const real t6 = A_I[1] * Rc[4];
-    const real t7 = t5 + t6;
-    const real t8 = A_I[2] * Rc[7];
-    const real t9 = t7 + t8;
-    A[1] = t9;
-    const real t10 = A_I[0] * Rc[2];
-    const real t11 = A_I[1] * Rc[5];
-    const real t12 = t10 + t11;
-    const real t13 = A_I[2] * Rc[8];
-    const real t14 = t12 + t13;
-    A[2] = t14;
-    const real t15 = A_I[3] * Rc[0];
-    const real t16 = A_I[4] * Rc[3];
-    const real t17 = t15 + t16;
-    const real t18 = A_I[5] * Rc[6];
-    const real t19 = t17 + t18;
-    A[3] = t19;
-    const real t20 = A_I[3] * Rc[1];
-    const real t21 = A_I[4] * Rc[4];
-    const real t22 = t20 + t21;
-    const real t23 = A_I[5] * Rc[7];
-    const real t24 = t22 + t23;
-    A[4] = t24;
-    const real t25 = A_I[3] * Rc[2];
-    const real t26 = A_I[4] * Rc[5];
-    const real t27 = t25 + t26;
-    const real t28 = A_I[5] * Rc[8];
-    const real t29 = t27 + t28;
-    A[5] = t29;
-    const real t30 = A_I[6] * Rc[0];
-    const real t31 = A_I[7] * Rc[3];
-    const real t32 = t30 + t31;
-    const real t33 = A_I[8] * Rc[6];
-    const real t34 = t32 + t33;
-    A[6] = t34;
-    const real t35 = A_I[6] * Rc[1];
-    const real t36 = A_I[7] * Rc[4];
-    const real t37 = t35 + t36;
-    const real t38 = A_I[8] * Rc[7];
-    const real t39 = t37 + t38;
-    A[7] = t39;
-    const real t40 = A_I[6] * Rc[2];
-    const real t41 = A_I[7] * Rc[5];
-    const real t42 = t40 + t41;
-    const real t43 = A_I[8] * Rc[8];
-    const real t44 = t42 + t43;
-    A[8] = t44;
-    const real t45 = A_I[0] * r[0];
-    const real t46 = A_I[1] * r[1];
-    const real t47 = t45 + t46;
-    const real t48 = A_I[2] * r[2];
-    const real t49 = t47 + t48;
-    const real t50 = x_I[0] + t49;
-    x[0] = t50;
-    const real t51 = A_I[3] * r[0];
-    const real t52 = A_I[4] * r[1];
-    const real t53 = t51 + t52;
-    const real t54 = A_I[5] * r[2];
-    const real t55 = t53 + t54;
-    const real t56 = x_I[1] + t55;
-    x[1] = t56;
-    const real t57 = A_I[6] * r[0];
-    const real t58 = A_I[7] * r[1];
-    const real t59 = t57 + t58;
-    const real t60 = A_I[8] * r[2];
-    const real t61 = t59 + t60;
-    const real t62 = x_I[2] + t61;
-    x[2] = t62;
-    return 0;
+  A[0] = A_I[0] * Rc[0] + A_I[1] * Rc[3] + A_I[2] * Rc[6];
+  A[1] = A_I[0] * Rc[1] + A_I[1] * Rc[4] + A_I[2] * Rc[7];
+  A[2] = A_I[0] * Rc[2] + A_I[1] * Rc[5] + A_I[2] * Rc[8];
+  A[3] = A_I[3] * Rc[0] + A_I[4] * Rc[3] + A_I[5] * Rc[6];
+  A[4] = A_I[3] * Rc[1] + A_I[4] * Rc[4] + A_I[5] * Rc[7];
+  A[5] = A_I[3] * Rc[2] + A_I[4] * Rc[5] + A_I[5] * Rc[8];
+  A[6] = A_I[6] * Rc[0] + A_I[7] * Rc[3] + A_I[8] * Rc[6];
+  A[7] = A_I[6] * Rc[1] + A_I[7] * Rc[4] + A_I[8] * Rc[7];
+  A[8] = A_I[6] * Rc[2] + A_I[7] * Rc[5] + A_I[8] * Rc[8];
+  x[0] = x_I[0] + (A_I[0] * r[0] + A_I[1] * r[1] + A_I[2] * r[2]);
+  x[1] = x_I[1] + (A_I[3] * r[0] + A_I[4] * r[1] + A_I[5] * r[2]);
+  x[2] = x_I[2] + (A_I[6] * r[0] + A_I[7] * r[1] + A_I[8] * r[2]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_pose_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_pose(in[0], in[1], in[2], in[3], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_pose_inputs[] = {
-    {"A_I", 9, "", 0, 0},
-    {"x_I", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_pose_outputs[] = {
-    {"A", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_pose, (in[0], in[1], in[2], in[3], out[0], out[1]))
 
 /* velocity of a body's input end
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -248,63 +59,18 @@ static const mstmm_port mstmm_sweep_frames_pose_outputs[] = {
  * in  v_rel[3] (m/s) relative velocity of the hinge, body axes
  * out v[3] (m/s) velocity of P, body axes
  */
-int mstmm_sweep_frames_velocity(const real *restrict Rc, const real *restrict r,
-    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
-    real *restrict v)
+int mstmm_sweep_frames_velocity(in_t Rc, in_t r, in_t v_I, in_t w_I, in_t v_rel, out_t v)
 {
-    const real t0 = r[2] * w_I[1];
-    const real t1 = r[1] * w_I[2];
-    const real t2 = t0 - t1;
-    const real t3 = v_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * w_I[2];
-    const real t6 = r[2] * w_I[0];
-    const real t7 = t5 - t6;
-    const real t8 = v_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * w_I[0];
-    const real t12 = r[0] * w_I[1];
-    const real t13 = t11 - t12;
-    const real t14 = v_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = v_rel[0] + t16;
-    v[0] = t17;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = v_rel[1] + t22;
-    v[1] = t23;
-    const real t24 = Rc[2] * t3;
-    const real t25 = Rc[5] * t8;
-    const real t26 = t24 + t25;
-    const real t27 = Rc[8] * t14;
-    const real t28 = t26 + t27;
-    const real t29 = v_rel[2] + t28;
-    v[2] = t29;
-    return 0;
+  real t3 = v_I[0] + (r[2] * w_I[1] - r[1] * w_I[2]);
+  real t8 = v_I[1] + (r[0] * w_I[2] - r[2] * w_I[0]);
+  real t14 = v_I[2] + (r[1] * w_I[0] - r[0] * w_I[1]);
+  v[0] = v_rel[0] + (Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14);
+  v[1] = v_rel[1] + (Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14);
+  v[2] = v_rel[2] + (Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14);
+  return 0;
 }
 
-static int mstmm_sweep_frames_velocity_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_velocity(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_velocity_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"v_I", 3, "m/s", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v_rel", 3, "m/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_velocity_outputs[] = {
-    {"v", 3, "m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_velocity, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* motion of a point of a body
  * in  A[3][3] rotation, body axes to inertial axes
@@ -318,151 +84,41 @@ static const mstmm_port mstmm_sweep_frames_velocity_outputs[] = {
  * out v_K[3] (m/s) velocity, inertial axes
  * out a_K[3] (m/s2) acceleration, inertial axes
  */
-int mstmm_sweep_frames_point(const real *restrict A, const real *restrict x, const real *restrict v,
-    const real *restrict motion, const real *restrict delta, const real *restrict offset,
-    const real *restrict gravity, real *restrict x_K, real *restrict v_K, real *restrict a_K)
+int mstmm_sweep_frames_point(in_t A, in_t x, in_t v, in_t motion, in_t delta, in_t offset,
+    in_t gravity, out_t x_K, out_t v_K, out_t a_K)
 {
-    const real t0 = A[0] * offset[0];
-    const real t1 = A[1] * offset[1];
-    const real t2 = t0 + t1;
-    const real t3 = A[2] * offset[2];
-    const real t4 = t2 + t3;
-    const real t5 = x[0] + t4;
-    x_K[0] = t5;
-    const real t6 = A[3] * offset[0];
-    const real t7 = A[4] * offset[1];
-    const real t8 = t6 + t7;
-    const real t9 = A[5] * offset[2];
-    const real t10 = t8 + t9;
-    const real t11 = x[1] + t10;
-    x_K[1] = t11;
-    const real t12 = A[6] * offset[0];
-    const real t13 = A[7] * offset[1];
-    const real t14 = t12 + t13;
-    const real t15 = A[8] * offset[2];
-    const real t16 = t14 + t15;
-    const real t17 = x[2] + t16;
-    x_K[2] = t17;
-    const real t18 = motion[1] * offset[2];
-    const real t19 = motion[2] * offset[1];
-    const real t20 = t18 - t19;
-    const real t21 = v[0] + t20;
-    const real t22 = A[0] * t21;
-    const real t23 = motion[2] * offset[0];
-    const real t24 = motion[0] * offset[2];
-    const real t25 = t23 - t24;
-    const real t26 = v[1] + t25;
-    const real t27 = A[1] * t26;
-    const real t28 = t22 + t27;
-    const real t29 = motion[0] * offset[1];
-    const real t30 = motion[1] * offset[0];
-    const real t31 = t29 - t30;
-    const real t32 = v[2] + t31;
-    const real t33 = A[2] * t32;
-    const real t34 = t28 + t33;
-    v_K[0] = t34;
-    const real t35 = A[3] * t21;
-    const real t36 = A[4] * t26;
-    const real t37 = t35 + t36;
-    const real t38 = A[5] * t32;
-    const real t39 = t37 + t38;
-    v_K[1] = t39;
-    const real t40 = A[6] * t21;
-    const real t41 = A[7] * t26;
-    const real t42 = t40 + t41;
-    const real t43 = A[8] * t32;
-    const real t44 = t42 + t43;
-    v_K[2] = t44;
-    const real t45 = motion[6] + delta[0];
-    const real t46 = motion[4] + delta[4];
-    const real t47 = offset[2] * t46;
-    const real t48 = motion[5] + delta[5];
-    const real t49 = offset[1] * t48;
-    const real t50 = t47 - t49;
-    const real t51 = motion[0] * motion[1];
-    const real t52 = offset[1] * t51;
-    const real t53 = motion[1] * motion[1];
-    const real t54 = motion[2] * motion[2];
-    const real t55 = t53 + t54;
-    const real t56 = offset[0] * t55;
-    const real t57 = t52 - t56;
-    const real t58 = motion[0] * motion[2];
-    const real t59 = offset[2] * t58;
-    const real t60 = t57 + t59;
-    const real t61 = t50 + t60;
-    const real t62 = t45 + t61;
-    const real t63 = A[0] * t62;
-    const real t64 = motion[7] + delta[1];
-    const real t65 = offset[0] * t48;
-    const real t66 = motion[3] + delta[3];
-    const real t67 = offset[2] * t66;
-    const real t68 = t65 - t67;
-    const real t69 = offset[0] * t51;
-    const real t70 = motion[0] * motion[0];
-    const real t71 = t54 + t70;
-    const real t72 = offset[1] * t71;
-    const real t73 = t69 - t72;
-    const real t74 = motion[1] * motion[2];
-    const real t75 = offset[2] * t74;
-    const real t76 = t73 + t75;
-    const real t77 = t68 + t76;
-    const real t78 = t64 + t77;
-    const real t79 = A[1] * t78;
-    const real t80 = t63 + t79;
-    const real t81 = motion[8] + delta[2];
-    const real t82 = offset[1] * t66;
-    const real t83 = offset[0] * t46;
-    const real t84 = t82 - t83;
-    const real t85 = offset[0] * t58;
-    const real t86 = offset[1] * t74;
-    const real t87 = t85 + t86;
-    const real t88 = t53 + t70;
-    const real t89 = offset[2] * t88;
-    const real t90 = t87 - t89;
-    const real t91 = t84 + t90;
-    const real t92 = t81 + t91;
-    const real t93 = A[2] * t92;
-    const real t94 = t80 + t93;
-    const real t95 = gravity[0] + t94;
-    a_K[0] = t95;
-    const real t96 = A[3] * t62;
-    const real t97 = A[4] * t78;
-    const real t98 = t96 + t97;
-    const real t99 = A[5] * t92;
-    const real t100 = t98 + t99;
-    const real t101 = gravity[1] + t100;
-    a_K[1] = t101;
-    const real t102 = A[6] * t62;
-    const real t103 = A[7] * t78;
-    const real t104 = t102 + t103;
-    const real t105 = A[8] * t92;
-    const real t106 = t104 + t105;
-    const real t107 = gravity[2] + t106;
-    a_K[2] = t107;
-    return 0;
+  x_K[0] = x[0] + (A[0] * offset[0] + A[1] * offset[1] + A[2] * offset[2]);
+  x_K[1] = x[1] + (A[3] * offset[0] + A[4] * offset[1] + A[5] * offset[2]);
+  x_K[2] = x[2] + (A[6] * offset[0] + A[7] * offset[1] + A[8] * offset[2]);
+  real t21 = v[0] + (motion[1] * offset[2] - motion[2] * offset[1]);
+  real t26 = v[1] + (motion[2] * offset[0] - motion[0] * offset[2]);
+  real t32 = v[2] + (motion[0] * offset[1] - motion[1] * offset[0]);
+  v_K[0] = A[0] * t21 + A[1] * t26 + A[2] * t32;
+  v_K[1] = A[3] * t21 + A[4] * t26 + A[5] * t32;
+  v_K[2] = A[6] * t21 + A[7] * t26 + A[8] * t32;
+  real t46 = motion[4] + delta[4];
+  real t48 = motion[5] + delta[5];
+  real t51 = motion[0] * motion[1];
+  real t53 = motion[1] * motion[1];
+  real t54 = motion[2] * motion[2];
+  real t58 = motion[0] * motion[2];
+  real t62 = motion[6] + delta[0] + (offset[2] * t46 - offset[1] * t48 + (offset[1] * t51 -
+    offset[0] * (t53 + t54) + offset[2] * t58));
+  real t66 = motion[3] + delta[3];
+  real t70 = motion[0] * motion[0];
+  real t74 = motion[1] * motion[2];
+  real t78 = motion[7] + delta[1] + (offset[0] * t48 - offset[2] * t66 + (offset[0] * t51 -
+    offset[1] * (t54 + t70) + offset[2] * t74));
+  real t92 = motion[8] + delta[2] + (offset[1] * t66 - offset[0] * t46 + (offset[0] * t58 +
+    offset[1] * t74 - offset[2] * (t53 + t70)));
+  a_K[0] = gravity[0] + (A[0] * t62 + A[1] * t78 + A[2] * t92);
+  a_K[1] = gravity[1] + (A[3] * t62 + A[4] * t78 + A[5] * t92);
+  a_K[2] = gravity[2] + (A[6] * t62 + A[7] * t78 + A[8] * t92);
+  return 0;
 }
 
-static int mstmm_sweep_frames_point_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_point(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_frames_point_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-    {"gravity", 3, "m/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_point_outputs[] = {
-    {"x_K", 3, "m", 0, 0},
-    {"v_K", 3, "m/s", 0, 0},
-    {"a_K", 3, "m/s2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_point, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* rotation of a body
  * in  A[3][3] rotation, body axes to inertial axes
@@ -471,147 +127,42 @@ static const mstmm_port mstmm_sweep_frames_point_outputs[] = {
  * out w_K[3] (rad/s) angular velocity, inertial axes
  * out alpha_K[3] (rad/s2) angular acceleration, inertial axes
  */
-int mstmm_sweep_frames_angular_motion(const real *restrict A, const real *restrict motion,
-    const real *restrict delta, real *restrict w_K, real *restrict alpha_K)
+int mstmm_sweep_frames_angular_motion(in_t A, in_t motion, in_t delta, out_t w_K, out_t alpha_K)
 {
-    const real t0 = A[0] * motion[0];
-    const real t1 = A[1] * motion[1];
-    const real t2 = t0 + t1;
-    const real t3 = A[2] * motion[2];
-    const real t4 = t2 + t3;
-    w_K[0] = t4;
-    const real t5 = A[3] * motion[0];
-    const real t6 = A[4] * motion[1];
-    const real t7 = t5 + t6;
-    const real t8 = A[5] * motion[2];
-    const real t9 = t7 + t8;
-    w_K[1] = t9;
-    const real t10 = A[6] * motion[0];
-    const real t11 = A[7] * motion[1];
-    const real t12 = t10 + t11;
-    const real t13 = A[8] * motion[2];
-    const real t14 = t12 + t13;
-    w_K[2] = t14;
-    const real t15 = motion[3] + delta[3];
-    const real t16 = A[0] * t15;
-    const real t17 = motion[4] + delta[4];
-    const real t18 = A[1] * t17;
-    const real t19 = t16 + t18;
-    const real t20 = motion[5] + delta[5];
-    const real t21 = A[2] * t20;
-    const real t22 = t19 + t21;
-    alpha_K[0] = t22;
-    const real t23 = A[3] * t15;
-    const real t24 = A[4] * t17;
-    const real t25 = t23 + t24;
-    const real t26 = A[5] * t20;
-    const real t27 = t25 + t26;
-    alpha_K[1] = t27;
-    const real t28 = A[6] * t15;
-    const real t29 = A[7] * t17;
-    const real t30 = t28 + t29;
-    const real t31 = A[8] * t20;
-    const real t32 = t30 + t31;
-    alpha_K[2] = t32;
-    return 0;
+  w_K[0] = A[0] * motion[0] + A[1] * motion[1] + A[2] * motion[2];
+  w_K[1] = A[3] * motion[0] + A[4] * motion[1] + A[5] * motion[2];
+  w_K[2] = A[6] * motion[0] + A[7] * motion[1] + A[8] * motion[2];
+  real t15 = motion[3] + delta[3];
+  real t17 = motion[4] + delta[4];
+  real t20 = motion[5] + delta[5];
+  alpha_K[0] = A[0] * t15 + A[1] * t17 + A[2] * t20;
+  alpha_K[1] = A[3] * t15 + A[4] * t17 + A[5] * t20;
+  alpha_K[2] = A[6] * t15 + A[7] * t17 + A[8] * t20;
+  return 0;
 }
 
-static int mstmm_sweep_frames_angular_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_angular_motion(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_angular_motion_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_angular_motion_outputs[] = {
-    {"w_K", 3, "rad/s", 0, 0},
-    {"alpha_K", 3, "rad/s2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_angular_motion, (in[0], in[1], in[2], out[0], out[1]))
 
 /* axes of an end
  * in  A[3][3] rotation, body axes to inertial axes
  * in  R_end[3][3] rotation, end axes to body axes
  * out A_end[3][3] rotation, end axes to inertial axes
  */
-int mstmm_sweep_frames_end_frame(const real *restrict A, const real *restrict R_end,
-    real *restrict A_end)
+int mstmm_sweep_frames_end_frame(in_t A, in_t R_end, out_t A_end)
 {
-    const real t0 = A[0] * R_end[0];
-    const real t1 = A[1] * R_end[3];
-    const real t2 = t0 + t1;
-    const real t3 = A[2] * R_end[6];
-    const real t4 = t2 + t3;
-    A_end[0] = t4;
-    const real t5 = A[0] * R_end[1];
-    const real t6 = A[1] * R_end[4];
-    const real t7 = t5 + t6;
-    const real t8 = A[2] * R_end[7];
-    const real t9 = t7 + t8;
-    A_end[1] = t9;
-    const real t10 = A[0] * R_end[2];
-    const real t11 = A[1] * R_end[5];
-    const real t12 = t10 + t11;
-    const real t13 = A[2] * R_end[8];
-    const real t14 = t12 + t13;
-    A_end[2] = t14;
-    const real t15 = A[3] * R_end[0];
-    const real t16 = A[4] * R_end[3];
-    const real t17 = t15 + t16;
-    const real t18 = A[5] * R_end[6];
-    const real t19 = t17 + t18;
-    A_end[3] = t19;
-    const real t20 = A[3] * R_end[1];
-    const real t21 = A[4] * R_end[4];
-    const real t22 = t20 + t21;
-    const real t23 = A[5] * R_end[7];
-    const real t24 = t22 + t23;
-    A_end[4] = t24;
-    const real t25 = A[3] * R_end[2];
-    const real t26 = A[4] * R_end[5];
-    const real t27 = t25 + t26;
-    const real t28 = A[5] * R_end[8];
-    const real t29 = t27 + t28;
-    A_end[5] = t29;
-    const real t30 = A[6] * R_end[0];
-    const real t31 = A[7] * R_end[3];
-    const real t32 = t30 + t31;
-    const real t33 = A[8] * R_end[6];
-    const real t34 = t32 + t33;
-    A_end[6] = t34;
-    const real t35 = A[6] * R_end[1];
-    const real t36 = A[7] * R_end[4];
-    const real t37 = t35 + t36;
-    const real t38 = A[8] * R_end[7];
-    const real t39 = t37 + t38;
-    A_end[7] = t39;
-    const real t40 = A[6] * R_end[2];
-    const real t41 = A[7] * R_end[5];
-    const real t42 = t40 + t41;
-    const real t43 = A[8] * R_end[8];
-    const real t44 = t42 + t43;
-    A_end[8] = t44;
-    return 0;
+  A_end[0] = A[0] * R_end[0] + A[1] * R_end[3] + A[2] * R_end[6];
+  A_end[1] = A[0] * R_end[1] + A[1] * R_end[4] + A[2] * R_end[7];
+  A_end[2] = A[0] * R_end[2] + A[1] * R_end[5] + A[2] * R_end[8];
+  A_end[3] = A[3] * R_end[0] + A[4] * R_end[3] + A[5] * R_end[6];
+  A_end[4] = A[3] * R_end[1] + A[4] * R_end[4] + A[5] * R_end[7];
+  A_end[5] = A[3] * R_end[2] + A[4] * R_end[5] + A[5] * R_end[8];
+  A_end[6] = A[6] * R_end[0] + A[7] * R_end[3] + A[8] * R_end[6];
+  A_end[7] = A[6] * R_end[1] + A[7] * R_end[4] + A[8] * R_end[7];
+  A_end[8] = A[6] * R_end[2] + A[7] * R_end[5] + A[8] * R_end[8];
+  return 0;
 }
 
-static int mstmm_sweep_frames_end_frame_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_end_frame(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_end_frame_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"R_end", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_end_frame_outputs[] = {
-    {"A_end", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_end_frame, (in[0], in[1], out[0]))
 
 /* load applied at a point of a body
  * in  A[3][3] rotation, body axes to inertial axes
@@ -621,125 +172,30 @@ static const mstmm_port mstmm_sweep_frames_end_frame_outputs[] = {
  * in  M[3] (N*m) moment, axes of the load
  * out e[6] (N, N*m) contribution to e, added to what is there
  */
-int mstmm_sweep_frames_applied_load(const real *restrict A, const real *restrict A_F,
-    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e)
+int mstmm_sweep_frames_applied_load(in_t A, in_t A_F, in_t offset, in_t F, in_t M, out_t e)
 {
-    const real t0 = A[0] * A_F[0];
-    const real t1 = A[3] * A_F[3];
-    const real t2 = t0 + t1;
-    const real t3 = A[6] * A_F[6];
-    const real t4 = t2 + t3;
-    const real t5 = F[0] * t4;
-    const real t6 = A[0] * A_F[1];
-    const real t7 = A[3] * A_F[4];
-    const real t8 = t6 + t7;
-    const real t9 = A[6] * A_F[7];
-    const real t10 = t8 + t9;
-    const real t11 = F[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = A[0] * A_F[2];
-    const real t14 = A[3] * A_F[5];
-    const real t15 = t13 + t14;
-    const real t16 = A[6] * A_F[8];
-    const real t17 = t15 + t16;
-    const real t18 = F[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = -t19;
-    e[0] += t20;
-    const real t21 = A[1] * A_F[0];
-    const real t22 = A[4] * A_F[3];
-    const real t23 = t21 + t22;
-    const real t24 = A[7] * A_F[6];
-    const real t25 = t23 + t24;
-    const real t26 = F[0] * t25;
-    const real t27 = A[1] * A_F[1];
-    const real t28 = A[4] * A_F[4];
-    const real t29 = t27 + t28;
-    const real t30 = A[7] * A_F[7];
-    const real t31 = t29 + t30;
-    const real t32 = F[1] * t31;
-    const real t33 = t26 + t32;
-    const real t34 = A[1] * A_F[2];
-    const real t35 = A[4] * A_F[5];
-    const real t36 = t34 + t35;
-    const real t37 = A[7] * A_F[8];
-    const real t38 = t36 + t37;
-    const real t39 = F[2] * t38;
-    const real t40 = t33 + t39;
-    const real t41 = -t40;
-    e[1] += t41;
-    const real t42 = A[2] * A_F[0];
-    const real t43 = A[5] * A_F[3];
-    const real t44 = t42 + t43;
-    const real t45 = A[8] * A_F[6];
-    const real t46 = t44 + t45;
-    const real t47 = F[0] * t46;
-    const real t48 = A[2] * A_F[1];
-    const real t49 = A[5] * A_F[4];
-    const real t50 = t48 + t49;
-    const real t51 = A[8] * A_F[7];
-    const real t52 = t50 + t51;
-    const real t53 = F[1] * t52;
-    const real t54 = t47 + t53;
-    const real t55 = A[2] * A_F[2];
-    const real t56 = A[5] * A_F[5];
-    const real t57 = t55 + t56;
-    const real t58 = A[8] * A_F[8];
-    const real t59 = t57 + t58;
-    const real t60 = F[2] * t59;
-    const real t61 = t54 + t60;
-    const real t62 = -t61;
-    e[2] += t62;
-    const real t63 = offset[2] * t40;
-    const real t64 = offset[1] * t61;
-    const real t65 = t63 - t64;
-    const real t66 = M[0] * t4;
-    const real t67 = M[1] * t10;
-    const real t68 = t66 + t67;
-    const real t69 = M[2] * t17;
-    const real t70 = t68 + t69;
-    const real t71 = t65 - t70;
-    e[3] += t71;
-    const real t72 = offset[0] * t61;
-    const real t73 = offset[2] * t19;
-    const real t74 = t72 - t73;
-    const real t75 = M[0] * t25;
-    const real t76 = M[1] * t31;
-    const real t77 = t75 + t76;
-    const real t78 = M[2] * t38;
-    const real t79 = t77 + t78;
-    const real t80 = t74 - t79;
-    e[4] += t80;
-    const real t81 = offset[1] * t19;
-    const real t82 = offset[0] * t40;
-    const real t83 = t81 - t82;
-    const real t84 = M[0] * t46;
-    const real t85 = M[1] * t52;
-    const real t86 = t84 + t85;
-    const real t87 = M[2] * t59;
-    const real t88 = t86 + t87;
-    const real t89 = t83 - t88;
-    e[5] += t89;
-    return 0;
+  real t4 = A[0] * A_F[0] + A[3] * A_F[3] + A[6] * A_F[6];
+  real t10 = A[0] * A_F[1] + A[3] * A_F[4] + A[6] * A_F[7];
+  real t17 = A[0] * A_F[2] + A[3] * A_F[5] + A[6] * A_F[8];
+  real t19 = F[0] * t4 + F[1] * t10 + F[2] * t17;
+  e[0] += -t19;
+  real t25 = A[1] * A_F[0] + A[4] * A_F[3] + A[7] * A_F[6];
+  real t31 = A[1] * A_F[1] + A[4] * A_F[4] + A[7] * A_F[7];
+  real t38 = A[1] * A_F[2] + A[4] * A_F[5] + A[7] * A_F[8];
+  real t40 = F[0] * t25 + F[1] * t31 + F[2] * t38;
+  e[1] += -t40;
+  real t46 = A[2] * A_F[0] + A[5] * A_F[3] + A[8] * A_F[6];
+  real t52 = A[2] * A_F[1] + A[5] * A_F[4] + A[8] * A_F[7];
+  real t59 = A[2] * A_F[2] + A[5] * A_F[5] + A[8] * A_F[8];
+  real t61 = F[0] * t46 + F[1] * t52 + F[2] * t59;
+  e[2] += -t61;
+  e[3] += offset[2] * t40 - offset[1] * t61 - (M[0] * t4 + M[1] * t10 + M[2] * t17);
+  e[4] += offset[0] * t61 - offset[2] * t19 - (M[0] * t25 + M[1] * t31 + M[2] * t38);
+  e[5] += offset[1] * t19 - offset[0] * t40 - (M[0] * t46 + M[1] * t52 + M[2] * t59);
+  return 0;
 }
 
-static int mstmm_sweep_frames_applied_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_applied_load(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_applied_load_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-    {"F", 3, "N", 0, 0},
-    {"M", 3, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_applied_load_outputs[] = {
-    {"e", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_applied_load, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* load on the other end of a force element
  * in  x_F[3]
@@ -749,54 +205,22 @@ static const mstmm_port mstmm_sweep_frames_applied_load_outputs[] = {
  * out F_back[3] (N) force on F
  * out M_back[3] (N*m) moment on F
  */
-int mstmm_sweep_frames_reaction_wrench(const real *restrict x_F, const real *restrict x_T,
-    const real *restrict F, const real *restrict M, real *restrict F_back, real *restrict M_back)
+int mstmm_sweep_frames_reaction_wrench(in_t x_F, in_t x_T, in_t F, in_t M, out_t F_back,
+    out_t M_back)
 {
-    const real t0 = -F[0];
-    F_back[0] = t0;
-    const real t1 = -F[1];
-    F_back[1] = t1;
-    const real t2 = -F[2];
-    F_back[2] = t2;
-    const real t3 = x_T[2] - x_F[2];
-    const real t4 = F[1] * t3;
-    const real t5 = x_F[1] - x_T[1];
-    const real t6 = F[2] * t5;
-    const real t7 = t4 + t6;
-    const real t8 = t7 - M[0];
-    M_back[0] = t8;
-    const real t9 = x_T[0] - x_F[0];
-    const real t10 = F[2] * t9;
-    const real t11 = F[0] * t3;
-    const real t12 = t10 - t11;
-    const real t13 = t12 - M[1];
-    M_back[1] = t13;
-    const real t14 = F[0] * t5;
-    const real t15 = F[1] * t9;
-    const real t16 = t14 + t15;
-    const real t17 = M[2] + t16;
-    const real t18 = -t17;
-    M_back[2] = t18;
-    return 0;
+  F_back[0] = -F[0];
+  F_back[1] = -F[1];
+  F_back[2] = -F[2];
+  real t3 = x_T[2] - x_F[2];
+  real t5 = x_F[1] - x_T[1];
+  M_back[0] = F[1] * t3 + F[2] * t5 - M[0];
+  real t9 = x_T[0] - x_F[0];
+  M_back[1] = F[2] * t9 - F[0] * t3 - M[1];
+  M_back[2] = -(M[2] + (F[0] * t5 + F[1] * t9));
+  return 0;
 }
 
-static int mstmm_sweep_frames_reaction_wrench_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_reaction_wrench(in[0], in[1], in[2], in[3], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_reaction_wrench_inputs[] = {
-    {"x_F", 3, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"F", 3, "", 0, 0},
-    {"M", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_reaction_wrench_outputs[] = {
-    {"F_back", 3, "N", 0, 0},
-    {"M_back", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_reaction_wrench, (in[0], in[1], in[2], in[3], out[0], out[1]))
 
 /* power of an applied load
  * in  A_F[3][3] rotation, axes of the load to inertial axes
@@ -806,71 +230,17 @@ static const mstmm_port mstmm_sweep_frames_reaction_wrench_outputs[] = {
  * in  w_K[3] (rad/s) angular velocity, inertial axes
  * out P[1] (W) power
  */
-int mstmm_sweep_frames_power(const real *restrict A_F, const real *restrict F,
-    const real *restrict M, const real *restrict v_K, const real *restrict w_K, real *restrict P)
+int mstmm_sweep_frames_power(in_t A_F, in_t F, in_t M, in_t v_K, in_t w_K, out_t P)
 {
-    const real t0 = A_F[0] * v_K[0];
-    const real t1 = A_F[3] * v_K[1];
-    const real t2 = t0 + t1;
-    const real t3 = A_F[6] * v_K[2];
-    const real t4 = t2 + t3;
-    const real t5 = F[0] * t4;
-    const real t6 = A_F[1] * v_K[0];
-    const real t7 = A_F[4] * v_K[1];
-    const real t8 = t6 + t7;
-    const real t9 = A_F[7] * v_K[2];
-    const real t10 = t8 + t9;
-    const real t11 = F[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = A_F[2] * v_K[0];
-    const real t14 = A_F[5] * v_K[1];
-    const real t15 = t13 + t14;
-    const real t16 = A_F[8] * v_K[2];
-    const real t17 = t15 + t16;
-    const real t18 = F[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = A_F[0] * w_K[0];
-    const real t21 = A_F[3] * w_K[1];
-    const real t22 = t20 + t21;
-    const real t23 = A_F[6] * w_K[2];
-    const real t24 = t22 + t23;
-    const real t25 = M[0] * t24;
-    const real t26 = A_F[1] * w_K[0];
-    const real t27 = A_F[4] * w_K[1];
-    const real t28 = t26 + t27;
-    const real t29 = A_F[7] * w_K[2];
-    const real t30 = t28 + t29;
-    const real t31 = M[1] * t30;
-    const real t32 = t25 + t31;
-    const real t33 = A_F[2] * w_K[0];
-    const real t34 = A_F[5] * w_K[1];
-    const real t35 = t33 + t34;
-    const real t36 = A_F[8] * w_K[2];
-    const real t37 = t35 + t36;
-    const real t38 = M[2] * t37;
-    const real t39 = t32 + t38;
-    const real t40 = t19 + t39;
-    P[0] = t40;
-    return 0;
+  P[0] = F[0] * (A_F[0] * v_K[0] + A_F[3] * v_K[1] + A_F[6] * v_K[2]) + F[1] * (A_F[1] * v_K[0] +
+    A_F[4] * v_K[1] + A_F[7] * v_K[2]) + F[2] * (A_F[2] * v_K[0] + A_F[5] * v_K[1] + A_F[8] *
+    v_K[2]) + (M[0] * (A_F[0] * w_K[0] + A_F[3] * w_K[1] + A_F[6] * w_K[2]) + M[1] * (A_F[1] *
+    w_K[0] + A_F[4] * w_K[1] + A_F[7] * w_K[2]) + M[2] * (A_F[2] * w_K[0] + A_F[5] * w_K[1] + A_F[8]
+    * w_K[2]));
+  return 0;
 }
 
-static int mstmm_sweep_frames_power_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_power(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_power_inputs[] = {
-    {"A_F", 9, "", 0, 0},
-    {"F", 3, "N", 0, 0},
-    {"M", 3, "N*m", 0, 0},
-    {"v_K", 3, "m/s", 0, 0},
-    {"w_K", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_power_outputs[] = {
-    {"P", 1, "W", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_power, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* momentum of a body
  * in  S[21] mass matrix at P
@@ -881,178 +251,27 @@ static const mstmm_port mstmm_sweep_frames_power_outputs[] = {
  * out L[3] (kg*m/s) momentum, inertial axes, added to what is there
  * out K[3] (kg*m2/s) about the inertial origin, inertial axes, added to what is there
  */
-int mstmm_sweep_frames_momentum(const real *restrict S, const real *restrict A,
-    const real *restrict x, const real *restrict v, const real *restrict w, real *restrict L,
-    real *restrict K)
+int mstmm_sweep_frames_momentum(in_t S, in_t A, in_t x, in_t v, in_t w, out_t L, out_t K)
 {
-    const real t0 = S[0] * v[0];
-    const real t1 = S[1] * v[1];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * v[2];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * w[0];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * w[1];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * w[2];
-    const real t10 = t8 + t9;
-    const real t11 = A[0] * t10;
-    const real t12 = S[1] * v[0];
-    const real t13 = S[6] * v[1];
-    const real t14 = t12 + t13;
-    const real t15 = S[7] * v[2];
-    const real t16 = t14 + t15;
-    const real t17 = S[8] * w[0];
-    const real t18 = t16 + t17;
-    const real t19 = S[9] * w[1];
-    const real t20 = t18 + t19;
-    const real t21 = S[10] * w[2];
-    const real t22 = t20 + t21;
-    const real t23 = A[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = S[2] * v[0];
-    const real t26 = S[7] * v[1];
-    const real t27 = t25 + t26;
-    const real t28 = S[11] * v[2];
-    const real t29 = t27 + t28;
-    const real t30 = S[12] * w[0];
-    const real t31 = t29 + t30;
-    const real t32 = S[13] * w[1];
-    const real t33 = t31 + t32;
-    const real t34 = S[14] * w[2];
-    const real t35 = t33 + t34;
-    const real t36 = A[2] * t35;
-    const real t37 = t24 + t36;
-    L[0] += t37;
-    const real t38 = A[3] * t10;
-    const real t39 = A[4] * t22;
-    const real t40 = t38 + t39;
-    const real t41 = A[5] * t35;
-    const real t42 = t40 + t41;
-    L[1] += t42;
-    const real t43 = A[6] * t10;
-    const real t44 = A[7] * t22;
-    const real t45 = t43 + t44;
-    const real t46 = A[8] * t35;
-    const real t47 = t45 + t46;
-    L[2] += t47;
-    const real t48 = S[3] * v[0];
-    const real t49 = S[8] * v[1];
-    const real t50 = t48 + t49;
-    const real t51 = S[12] * v[2];
-    const real t52 = t50 + t51;
-    const real t53 = S[15] * w[0];
-    const real t54 = t52 + t53;
-    const real t55 = S[16] * w[1];
-    const real t56 = t54 + t55;
-    const real t57 = S[17] * w[2];
-    const real t58 = t56 + t57;
-    const real t59 = A[0] * t58;
-    const real t60 = S[4] * v[0];
-    const real t61 = S[9] * v[1];
-    const real t62 = t60 + t61;
-    const real t63 = S[13] * v[2];
-    const real t64 = t62 + t63;
-    const real t65 = S[16] * w[0];
-    const real t66 = t64 + t65;
-    const real t67 = S[18] * w[1];
-    const real t68 = t66 + t67;
-    const real t69 = S[19] * w[2];
-    const real t70 = t68 + t69;
-    const real t71 = A[1] * t70;
-    const real t72 = t59 + t71;
-    const real t73 = S[5] * v[0];
-    const real t74 = S[10] * v[1];
-    const real t75 = t73 + t74;
-    const real t76 = S[14] * v[2];
-    const real t77 = t75 + t76;
-    const real t78 = S[17] * w[0];
-    const real t79 = t77 + t78;
-    const real t80 = S[19] * w[1];
-    const real t81 = t79 + t80;
-    const real t82 = S[20] * w[2];
-    const real t83 = t81 + t82;
-    const real t84 = A[2] * t83;
-    const real t85 = t72 + t84;
-    const real t86 = A[6] * x[1];
-    const real t87 = A[3] * x[2];
-    const real t88 = t86 - t87;
-    const real t89 = t10 * t88;
-    const real t90 = A[7] * x[1];
-    const real t91 = A[4] * x[2];
-    const real t92 = t90 - t91;
-    const real t93 = t22 * t92;
-    const real t94 = t89 + t93;
-    const real t95 = A[8] * x[1];
-    const real t96 = A[5] * x[2];
-    const real t97 = t95 - t96;
-    const real t98 = t35 * t97;
-    const real t99 = t94 + t98;
-    const real t100 = t85 + t99;
-    K[0] += t100;
-    const real t101 = A[3] * t58;
-    const real t102 = A[4] * t70;
-    const real t103 = t101 + t102;
-    const real t104 = A[5] * t83;
-    const real t105 = t103 + t104;
-    const real t106 = A[0] * x[2];
-    const real t107 = A[6] * x[0];
-    const real t108 = t106 - t107;
-    const real t109 = t10 * t108;
-    const real t110 = A[1] * x[2];
-    const real t111 = A[7] * x[0];
-    const real t112 = t110 - t111;
-    const real t113 = t22 * t112;
-    const real t114 = t109 + t113;
-    const real t115 = A[2] * x[2];
-    const real t116 = A[8] * x[0];
-    const real t117 = t115 - t116;
-    const real t118 = t35 * t117;
-    const real t119 = t114 + t118;
-    const real t120 = t105 + t119;
-    K[1] += t120;
-    const real t121 = A[6] * t58;
-    const real t122 = A[7] * t70;
-    const real t123 = t121 + t122;
-    const real t124 = A[8] * t83;
-    const real t125 = t123 + t124;
-    const real t126 = A[3] * x[0];
-    const real t127 = A[0] * x[1];
-    const real t128 = t126 - t127;
-    const real t129 = t10 * t128;
-    const real t130 = A[4] * x[0];
-    const real t131 = A[1] * x[1];
-    const real t132 = t130 - t131;
-    const real t133 = t22 * t132;
-    const real t134 = t129 + t133;
-    const real t135 = A[5] * x[0];
-    const real t136 = A[2] * x[1];
-    const real t137 = t135 - t136;
-    const real t138 = t35 * t137;
-    const real t139 = t134 + t138;
-    const real t140 = t125 + t139;
-    K[2] += t140;
-    return 0;
+  real t10 = S[0] * v[0] + S[1] * v[1] + S[2] * v[2] + S[3] * w[0] + S[4] * w[1] + S[5] * w[2];
+  real t22 = S[1] * v[0] + S[6] * v[1] + S[7] * v[2] + S[8] * w[0] + S[9] * w[1] + S[10] * w[2];
+  real t35 = S[2] * v[0] + S[7] * v[1] + S[11] * v[2] + S[12] * w[0] + S[13] * w[1] + S[14] * w[2];
+  L[0] += A[0] * t10 + A[1] * t22 + A[2] * t35;
+  L[1] += A[3] * t10 + A[4] * t22 + A[5] * t35;
+  L[2] += A[6] * t10 + A[7] * t22 + A[8] * t35;
+  real t58 = S[3] * v[0] + S[8] * v[1] + S[12] * v[2] + S[15] * w[0] + S[16] * w[1] + S[17] * w[2];
+  real t70 = S[4] * v[0] + S[9] * v[1] + S[13] * v[2] + S[16] * w[0] + S[18] * w[1] + S[19] * w[2];
+  real t83 = S[5] * v[0] + S[10] * v[1] + S[14] * v[2] + S[17] * w[0] + S[19] * w[1] + S[20] * w[2];
+  K[0] += A[0] * t58 + A[1] * t70 + A[2] * t83 + (t10 * (A[6] * x[1] - A[3] * x[2]) + t22 * (A[7] *
+    x[1] - A[4] * x[2]) + t35 * (A[8] * x[1] - A[5] * x[2]));
+  K[1] += A[3] * t58 + A[4] * t70 + A[5] * t83 + (t10 * (A[0] * x[2] - A[6] * x[0]) + t22 * (A[1] *
+    x[2] - A[7] * x[0]) + t35 * (A[2] * x[2] - A[8] * x[0]));
+  K[2] += A[6] * t58 + A[7] * t70 + A[8] * t83 + (t10 * (A[3] * x[0] - A[0] * x[1]) + t22 * (A[4] *
+    x[0] - A[1] * x[1]) + t35 * (A[5] * x[0] - A[2] * x[1]));
+  return 0;
 }
 
-static int mstmm_sweep_frames_momentum_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_momentum(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_momentum_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"A", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_momentum_outputs[] = {
-    {"L", 3, "kg*m/s", 1, 0},
-    {"K", 3, "kg*m2/s", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_momentum, (in[0], in[1], in[2], in[3], in[4], out[0], out[1]))
 
 /* momentum about the inertial origin
  * in  A[3][3] rotation, body axes to inertial axes
@@ -1061,76 +280,21 @@ static const mstmm_port mstmm_sweep_frames_momentum_outputs[] = {
  * out p[3] (N*s) momentum, inertial axes, added to what is there
  * out L[3] (N*m*s) angular momentum about the inertial origin, added to what is there
  */
-int mstmm_sweep_frames_carried_momentum(const real *restrict A, const real *restrict x,
-    const real *restrict h, real *restrict p, real *restrict L)
+int mstmm_sweep_frames_carried_momentum(in_t A, in_t x, in_t h, out_t p, out_t L)
 {
-    const real t0 = A[0] * h[0];
-    const real t1 = A[1] * h[1];
-    const real t2 = t0 + t1;
-    const real t3 = A[2] * h[2];
-    const real t4 = t2 + t3;
-    p[0] += t4;
-    const real t5 = A[3] * h[0];
-    const real t6 = A[4] * h[1];
-    const real t7 = t5 + t6;
-    const real t8 = A[5] * h[2];
-    const real t9 = t7 + t8;
-    p[1] += t9;
-    const real t10 = A[6] * h[0];
-    const real t11 = A[7] * h[1];
-    const real t12 = t10 + t11;
-    const real t13 = A[8] * h[2];
-    const real t14 = t12 + t13;
-    p[2] += t14;
-    const real t15 = x[1] * t14;
-    const real t16 = x[2] * t9;
-    const real t17 = t15 - t16;
-    const real t18 = A[0] * h[3];
-    const real t19 = A[1] * h[4];
-    const real t20 = t18 + t19;
-    const real t21 = A[2] * h[5];
-    const real t22 = t20 + t21;
-    const real t23 = t17 + t22;
-    L[0] += t23;
-    const real t24 = x[2] * t4;
-    const real t25 = x[0] * t14;
-    const real t26 = t24 - t25;
-    const real t27 = A[3] * h[3];
-    const real t28 = A[4] * h[4];
-    const real t29 = t27 + t28;
-    const real t30 = A[5] * h[5];
-    const real t31 = t29 + t30;
-    const real t32 = t26 + t31;
-    L[1] += t32;
-    const real t33 = x[0] * t9;
-    const real t34 = x[1] * t4;
-    const real t35 = t33 - t34;
-    const real t36 = A[6] * h[3];
-    const real t37 = A[7] * h[4];
-    const real t38 = t36 + t37;
-    const real t39 = A[8] * h[5];
-    const real t40 = t38 + t39;
-    const real t41 = t35 + t40;
-    L[2] += t41;
-    return 0;
+  real t4 = A[0] * h[0] + A[1] * h[1] + A[2] * h[2];
+  p[0] += t4;
+  real t9 = A[3] * h[0] + A[4] * h[1] + A[5] * h[2];
+  p[1] += t9;
+  real t14 = A[6] * h[0] + A[7] * h[1] + A[8] * h[2];
+  p[2] += t14;
+  L[0] += x[1] * t14 - x[2] * t9 + (A[0] * h[3] + A[1] * h[4] + A[2] * h[5]);
+  L[1] += x[2] * t4 - x[0] * t14 + (A[3] * h[3] + A[4] * h[4] + A[5] * h[5]);
+  L[2] += x[0] * t9 - x[1] * t4 + (A[6] * h[3] + A[7] * h[4] + A[8] * h[5]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_carried_momentum_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_carried_momentum(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_carried_momentum_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"h", 6, "N*s, N*m*s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_carried_momentum_outputs[] = {
-    {"p", 3, "N*s", 1, 0},
-    {"L", 3, "N*m*s", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_carried_momentum, (in[0], in[1], in[2], out[0], out[1]))
 
 /* potential energy of gravity
  * in  S[21] mass matrix at P
@@ -1139,87 +303,28 @@ static const mstmm_port mstmm_sweep_frames_carried_momentum_outputs[] = {
  * in  gravity[3] (m/s2) inertial axes
  * out V[1] (J) potential energy
  */
-int mstmm_sweep_frames_gravity_energy(const real *restrict S, const real *restrict A,
-    const real *restrict x, const real *restrict gravity, real *restrict V)
+int mstmm_sweep_frames_gravity_energy(in_t S, in_t A, in_t x, in_t gravity, out_t V)
 {
-    const real t0 = S[0] * x[0];
-    const real t1 = S[10] * A[0];
-    const real t2 = S[12] * A[1];
-    const real t3 = t1 + t2;
-    const real t4 = S[4] * A[2];
-    const real t5 = t3 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = gravity[0] * t6;
-    const real t8 = S[0] * x[1];
-    const real t9 = S[10] * A[3];
-    const real t10 = S[12] * A[4];
-    const real t11 = t9 + t10;
-    const real t12 = S[4] * A[5];
-    const real t13 = t11 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = gravity[1] * t14;
-    const real t16 = t7 + t15;
-    const real t17 = S[0] * x[2];
-    const real t18 = S[10] * A[6];
-    const real t19 = S[12] * A[7];
-    const real t20 = t18 + t19;
-    const real t21 = S[4] * A[8];
-    const real t22 = t20 + t21;
-    const real t23 = t17 + t22;
-    const real t24 = gravity[2] * t23;
-    const real t25 = t16 + t24;
-    const real t26 = -t25;
-    V[0] = t26;
-    return 0;
+  V[0] = -(gravity[0] * (S[0] * x[0] + (S[10] * A[0] + S[12] * A[1] + S[4] * A[2])) + gravity[1] *
+    (S[0] * x[1] + (S[10] * A[3] + S[12] * A[4] + S[4] * A[5])) + gravity[2] * (S[0] * x[2] + (S[10]
+    * A[6] + S[12] * A[7] + S[4] * A[8])));
+  return 0;
 }
 
-static int mstmm_sweep_frames_gravity_energy_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_gravity_energy(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_gravity_energy_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"A", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"gravity", 3, "m/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_gravity_energy_outputs[] = {
-    {"V", 1, "J", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_gravity_energy, (in[0], in[1], in[2], in[3], out[0]))
 
 /* least inertia that is not rounding
  * in  S[21] mass matrix at P
  * out floor[2] (kg, kg*m2) least inertia along and about an axis that is not rounding
  */
-int mstmm_sweep_frames_pivot_floor(const real *restrict S, real *restrict floor_)
+int mstmm_sweep_frames_pivot_floor(in_t S, out_t floor_)
 {
-    const real t0 = S[0] + S[6];
-    const real t1 = S[11] + t0;
-    const real t2 = ((real)1 / (real)300000000000000) * t1;
-    floor_[0] = t2;
-    const real t3 = S[15] + S[18];
-    const real t4 = S[20] + t3;
-    const real t5 = ((real)1 / (real)300000000000000) * t4;
-    floor_[1] = t5;
-    return 0;
+  floor_[0] = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  floor_[1] = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  return 0;
 }
 
-static int mstmm_sweep_frames_pivot_floor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_pivot_floor(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_pivot_floor_inputs[] = {
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_pivot_floor_outputs[] = {
-    {"floor", 2, "kg, kg*m2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_pivot_floor, (in[0], out[0]))
 
 /* load of the inboard on the outboard side at P
  * in  S[21] f = S a + e of everything outboard
@@ -1230,145 +335,37 @@ static const mstmm_port mstmm_sweep_frames_pivot_floor_outputs[] = {
  * out force[3] (N) inertial axes
  * out moment[3] (N*m) inertial axes
  */
-int mstmm_sweep_frames_reaction(const real *restrict S, const real *restrict e,
-    const real *restrict delta, const real *restrict A, real *restrict f, real *restrict force,
-    real *restrict moment)
+int mstmm_sweep_frames_reaction(in_t S, in_t e, in_t delta, in_t A, out_t f, out_t force,
+    out_t moment)
 {
-    const real t0 = S[0] * delta[0];
-    const real t1 = S[1] * delta[1];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * delta[2];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * delta[3];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * delta[4];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * delta[5];
-    const real t10 = t8 + t9;
-    const real t11 = e[0] + t10;
-    f[0] = t11;
-    const real t12 = S[1] * delta[0];
-    const real t13 = S[6] * delta[1];
-    const real t14 = t12 + t13;
-    const real t15 = S[7] * delta[2];
-    const real t16 = t14 + t15;
-    const real t17 = S[8] * delta[3];
-    const real t18 = t16 + t17;
-    const real t19 = S[9] * delta[4];
-    const real t20 = t18 + t19;
-    const real t21 = S[10] * delta[5];
-    const real t22 = t20 + t21;
-    const real t23 = e[1] + t22;
-    f[1] = t23;
-    const real t24 = S[2] * delta[0];
-    const real t25 = S[7] * delta[1];
-    const real t26 = t24 + t25;
-    const real t27 = S[11] * delta[2];
-    const real t28 = t26 + t27;
-    const real t29 = S[12] * delta[3];
-    const real t30 = t28 + t29;
-    const real t31 = S[13] * delta[4];
-    const real t32 = t30 + t31;
-    const real t33 = S[14] * delta[5];
-    const real t34 = t32 + t33;
-    const real t35 = e[2] + t34;
-    f[2] = t35;
-    const real t36 = S[3] * delta[0];
-    const real t37 = S[8] * delta[1];
-    const real t38 = t36 + t37;
-    const real t39 = S[12] * delta[2];
-    const real t40 = t38 + t39;
-    const real t41 = S[15] * delta[3];
-    const real t42 = t40 + t41;
-    const real t43 = S[16] * delta[4];
-    const real t44 = t42 + t43;
-    const real t45 = S[17] * delta[5];
-    const real t46 = t44 + t45;
-    const real t47 = e[3] + t46;
-    f[3] = t47;
-    const real t48 = S[4] * delta[0];
-    const real t49 = S[9] * delta[1];
-    const real t50 = t48 + t49;
-    const real t51 = S[13] * delta[2];
-    const real t52 = t50 + t51;
-    const real t53 = S[16] * delta[3];
-    const real t54 = t52 + t53;
-    const real t55 = S[18] * delta[4];
-    const real t56 = t54 + t55;
-    const real t57 = S[19] * delta[5];
-    const real t58 = t56 + t57;
-    const real t59 = e[4] + t58;
-    f[4] = t59;
-    const real t60 = S[5] * delta[0];
-    const real t61 = S[10] * delta[1];
-    const real t62 = t60 + t61;
-    const real t63 = S[14] * delta[2];
-    const real t64 = t62 + t63;
-    const real t65 = S[17] * delta[3];
-    const real t66 = t64 + t65;
-    const real t67 = S[19] * delta[4];
-    const real t68 = t66 + t67;
-    const real t69 = S[20] * delta[5];
-    const real t70 = t68 + t69;
-    const real t71 = e[5] + t70;
-    f[5] = t71;
-    const real t72 = A[0] * t11;
-    const real t73 = A[1] * t23;
-    const real t74 = t72 + t73;
-    const real t75 = A[2] * t35;
-    const real t76 = t74 + t75;
-    force[0] = t76;
-    const real t77 = A[3] * t11;
-    const real t78 = A[4] * t23;
-    const real t79 = t77 + t78;
-    const real t80 = A[5] * t35;
-    const real t81 = t79 + t80;
-    force[1] = t81;
-    const real t82 = A[6] * t11;
-    const real t83 = A[7] * t23;
-    const real t84 = t82 + t83;
-    const real t85 = A[8] * t35;
-    const real t86 = t84 + t85;
-    force[2] = t86;
-    const real t87 = A[0] * t47;
-    const real t88 = A[1] * t59;
-    const real t89 = t87 + t88;
-    const real t90 = A[2] * t71;
-    const real t91 = t89 + t90;
-    moment[0] = t91;
-    const real t92 = A[3] * t47;
-    const real t93 = A[4] * t59;
-    const real t94 = t92 + t93;
-    const real t95 = A[5] * t71;
-    const real t96 = t94 + t95;
-    moment[1] = t96;
-    const real t97 = A[6] * t47;
-    const real t98 = A[7] * t59;
-    const real t99 = t97 + t98;
-    const real t100 = A[8] * t71;
-    const real t101 = t99 + t100;
-    moment[2] = t101;
-    return 0;
+  real t11 = e[0] + (S[0] * delta[0] + S[1] * delta[1] + S[2] * delta[2] + S[3] * delta[3] + S[4] *
+    delta[4] + S[5] * delta[5]);
+  f[0] = t11;
+  real t23 = e[1] + (S[1] * delta[0] + S[6] * delta[1] + S[7] * delta[2] + S[8] * delta[3] + S[9] *
+    delta[4] + S[10] * delta[5]);
+  f[1] = t23;
+  real t35 = e[2] + (S[2] * delta[0] + S[7] * delta[1] + S[11] * delta[2] + S[12] * delta[3] + S[13]
+    * delta[4] + S[14] * delta[5]);
+  f[2] = t35;
+  real t47 = e[3] + (S[3] * delta[0] + S[8] * delta[1] + S[12] * delta[2] + S[15] * delta[3] + S[16]
+    * delta[4] + S[17] * delta[5]);
+  f[3] = t47;
+  real t59 = e[4] + (S[4] * delta[0] + S[9] * delta[1] + S[13] * delta[2] + S[16] * delta[3] + S[18]
+    * delta[4] + S[19] * delta[5]);
+  f[4] = t59;
+  real t71 = e[5] + (S[5] * delta[0] + S[10] * delta[1] + S[14] * delta[2] + S[17] * delta[3] +
+    S[19] * delta[4] + S[20] * delta[5]);
+  f[5] = t71;
+  force[0] = A[0] * t11 + A[1] * t23 + A[2] * t35;
+  force[1] = A[3] * t11 + A[4] * t23 + A[5] * t35;
+  force[2] = A[6] * t11 + A[7] * t23 + A[8] * t35;
+  moment[0] = A[0] * t47 + A[1] * t59 + A[2] * t71;
+  moment[1] = A[3] * t47 + A[4] * t59 + A[5] * t71;
+  moment[2] = A[6] * t47 + A[7] * t59 + A[8] * t71;
+  return 0;
 }
 
-static int mstmm_sweep_frames_reaction_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_reaction(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_frames_reaction_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"A", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_reaction_outputs[] = {
-    {"f", 6, "N, N*m", 0, 0},
-    {"force", 3, "N", 0, 0},
-    {"moment", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_reaction, (in[0], in[1], in[2], in[3], out[0], out[1], out[2]))
 
 /* moment about another point
  * in  A[3][3] rotation, body axes to inertial axes
@@ -1376,57 +373,18 @@ static const mstmm_port mstmm_sweep_frames_reaction_outputs[] = {
  * in  f[6] (N, N*m) load at P, body axes
  * out moment[3] (N*m) about the point, inertial axes
  */
-int mstmm_sweep_frames_moment_about(const real *restrict A, const real *restrict offset,
-    const real *restrict f, real *restrict moment)
+int mstmm_sweep_frames_moment_about(in_t A, in_t offset, in_t f, out_t moment)
 {
-    const real t0 = offset[2] * f[1];
-    const real t1 = offset[1] * f[2];
-    const real t2 = t0 - t1;
-    const real t3 = f[3] + t2;
-    const real t4 = A[0] * t3;
-    const real t5 = offset[0] * f[2];
-    const real t6 = offset[2] * f[0];
-    const real t7 = t5 - t6;
-    const real t8 = f[4] + t7;
-    const real t9 = A[1] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = offset[1] * f[0];
-    const real t12 = offset[0] * f[1];
-    const real t13 = t11 - t12;
-    const real t14 = f[5] + t13;
-    const real t15 = A[2] * t14;
-    const real t16 = t10 + t15;
-    moment[0] = t16;
-    const real t17 = A[3] * t3;
-    const real t18 = A[4] * t8;
-    const real t19 = t17 + t18;
-    const real t20 = A[5] * t14;
-    const real t21 = t19 + t20;
-    moment[1] = t21;
-    const real t22 = A[6] * t3;
-    const real t23 = A[7] * t8;
-    const real t24 = t22 + t23;
-    const real t25 = A[8] * t14;
-    const real t26 = t24 + t25;
-    moment[2] = t26;
-    return 0;
+  real t3 = f[3] + (offset[2] * f[1] - offset[1] * f[2]);
+  real t8 = f[4] + (offset[0] * f[2] - offset[2] * f[0]);
+  real t14 = f[5] + (offset[1] * f[0] - offset[0] * f[1]);
+  moment[0] = A[0] * t3 + A[1] * t8 + A[2] * t14;
+  moment[1] = A[3] * t3 + A[4] * t8 + A[5] * t14;
+  moment[2] = A[6] * t3 + A[7] * t8 + A[8] * t14;
+  return 0;
 }
 
-static int mstmm_sweep_frames_moment_about_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_moment_about(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_moment_about_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_moment_about_outputs[] = {
-    {"moment", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_moment_about, (in[0], in[1], in[2], out[0]))
 
 /* load carried to the parent
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1434,105 +392,34 @@ static const mstmm_port mstmm_sweep_frames_moment_about_outputs[] = {
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * out e_I[6] (N, N*m) contribution to the parent, added to what is there
  */
-int mstmm_sweep_frames_transport(const real *restrict Rc, const real *restrict r,
-    const real *restrict e, real *restrict e_I)
+int mstmm_sweep_frames_transport(in_t Rc, in_t r, in_t e, out_t e_I)
 {
-    const real t0 = Rc[0] * e[0];
-    const real t1 = Rc[1] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[2] * e[2];
-    const real t4 = t2 + t3;
-    e_I[0] += t4;
-    const real t5 = Rc[3] * e[0];
-    const real t6 = Rc[4] * e[1];
-    const real t7 = t5 + t6;
-    const real t8 = Rc[5] * e[2];
-    const real t9 = t7 + t8;
-    e_I[1] += t9;
-    const real t10 = Rc[6] * e[0];
-    const real t11 = Rc[7] * e[1];
-    const real t12 = t10 + t11;
-    const real t13 = Rc[8] * e[2];
-    const real t14 = t12 + t13;
-    e_I[2] += t14;
-    const real t15 = r[1] * t14;
-    const real t16 = r[2] * t9;
-    const real t17 = t15 - t16;
-    const real t18 = Rc[0] * e[3];
-    const real t19 = Rc[1] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = Rc[2] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = t17 + t22;
-    e_I[3] += t23;
-    const real t24 = r[2] * t4;
-    const real t25 = r[0] * t14;
-    const real t26 = t24 - t25;
-    const real t27 = Rc[3] * e[3];
-    const real t28 = Rc[4] * e[4];
-    const real t29 = t27 + t28;
-    const real t30 = Rc[5] * e[5];
-    const real t31 = t29 + t30;
-    const real t32 = t26 + t31;
-    e_I[4] += t32;
-    const real t33 = r[0] * t9;
-    const real t34 = r[1] * t4;
-    const real t35 = t33 - t34;
-    const real t36 = Rc[6] * e[3];
-    const real t37 = Rc[7] * e[4];
-    const real t38 = t36 + t37;
-    const real t39 = Rc[8] * e[5];
-    const real t40 = t38 + t39;
-    const real t41 = t35 + t40;
-    e_I[5] += t41;
-    return 0;
+  real t4 = Rc[0] * e[0] + Rc[1] * e[1] + Rc[2] * e[2];
+  e_I[0] += t4;
+  real t9 = Rc[3] * e[0] + Rc[4] * e[1] + Rc[5] * e[2];
+  e_I[1] += t9;
+  real t14 = Rc[6] * e[0] + Rc[7] * e[1] + Rc[8] * e[2];
+  e_I[2] += t14;
+  e_I[3] += r[1] * t14 - r[2] * t9 + (Rc[0] * e[3] + Rc[1] * e[4] + Rc[2] * e[5]);
+  e_I[4] += r[2] * t4 - r[0] * t14 + (Rc[3] * e[3] + Rc[4] * e[4] + Rc[5] * e[5]);
+  e_I[5] += r[0] * t9 - r[1] * t4 + (Rc[6] * e[3] + Rc[7] * e[4] + Rc[8] * e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_transport_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_transport(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_transport_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_transport_outputs[] = {
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_transport, (in[0], in[1], in[2], out[0]))
 
 /* kinetic energy of a reflected rotor
  * in  J[1] (kg*m2) reflected inertia
  * in  u[1] (rad/s) speed
  * out T[1] (J) kinetic energy
  */
-int mstmm_sweep_frames_rotor_energy(const real *restrict J, const real *restrict u,
-    real *restrict T)
+int mstmm_sweep_frames_rotor_energy(in_t J, in_t u, out_t T)
 {
-    const real t0 = J[0] * u[0];
-    const real t1 = u[0] * t0;
-    const real t2 = t1 * 0.5;
-    T[0] = t2;
-    return 0;
+  T[0] = u[0] * (J[0] * u[0]) * 0.5;
+  return 0;
 }
 
-static int mstmm_sweep_frames_rotor_energy_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_rotor_energy(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_rotor_energy_inputs[] = {
-    {"J", 1, "kg*m2", 0, 0},
-    {"u", 1, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_rotor_energy_outputs[] = {
-    {"T", 1, "J", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_rotor_energy, (in[0], in[1], out[0]))
 
 /* effort required by a prescribed acceleration
  * in  load[1] (N, N*m) effort along the speed of the load at P, H^T f
@@ -1541,60 +428,26 @@ static const mstmm_port mstmm_sweep_frames_rotor_energy_outputs[] = {
  * in  tau[1] (N, N*m) effort already applied
  * out tau_d[1] (N, N*m) missing effort
  */
-int mstmm_sweep_frames_driven_effort(const real *restrict load, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, real *restrict tau_d)
+int mstmm_sweep_frames_driven_effort(in_t load, in_t J, in_t udot, in_t tau, out_t tau_d)
 {
-    const real t0 = J[0] * udot[0];
-    const real t1 = t0 - tau[0];
-    const real t2 = load[0] + t1;
-    tau_d[0] = t2;
-    return 0;
+  tau_d[0] = load[0] + (J[0] * udot[0] - tau[0]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_driven_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_driven_effort(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_driven_effort_inputs[] = {
-    {"load", 1, "N, N*m", 0, 0},
-    {"J", 1, "kg or kg*m2", 0, 0},
-    {"udot", 1, "", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_driven_effort_outputs[] = {
-    {"tau_d", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_driven_effort, (in[0], in[1], in[2], in[3], out[0]))
 
 /* power of an effort
  * in  tau[1] (N, N*m) effort
  * in  u[1] (m/s, rad/s) speed
  * out P[1] (W) power
  */
-int mstmm_sweep_frames_speed_power(const real *restrict tau, const real *restrict u,
-    real *restrict P)
+int mstmm_sweep_frames_speed_power(in_t tau, in_t u, out_t P)
 {
-    const real t0 = tau[0] * u[0];
-    P[0] = t0;
-    return 0;
+  P[0] = tau[0] * u[0];
+  return 0;
 }
 
-static int mstmm_sweep_frames_speed_power_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_speed_power(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_speed_power_inputs[] = {
-    {"tau", 1, "N, N*m", 0, 0},
-    {"u", 1, "m/s, rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_speed_power_outputs[] = {
-    {"P", 1, "W", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_speed_power, (in[0], in[1], out[0]))
 
 /* distance of two points
  * in  x_F[3]
@@ -1603,93 +456,33 @@ static const mstmm_port mstmm_sweep_frames_speed_power_outputs[] = {
  * in  v_T[3]
  * out l[2] (m, m/s) distance and its rate
  */
-int mstmm_sweep_frames_length(const real *restrict x_F, const real *restrict v_F,
-    const real *restrict x_T, const real *restrict v_T, real *restrict l)
+int mstmm_sweep_frames_length(in_t x_F, in_t v_F, in_t x_T, in_t v_T, out_t l)
 {
-    const real t0 = x_T[2] - x_F[2];
-    const real t1 = t0 * t0;
-    const real t2 = x_T[0] - x_F[0];
-    const real t3 = t2 * t2;
-    const real t4 = x_T[1] - x_F[1];
-    const real t5 = t4 * t4;
-    const real t6 = t3 + t5;
-    const real t7 = t1 + t6;
-    const real t8 = sqrt(t7);
-    l[0] = t8;
-    const real t9 = v_T[2] - v_F[2];
-    const real t10 = t0 * t9;
-    const real t11 = v_T[0] - v_F[0];
-    const real t12 = t2 * t11;
-    const real t13 = v_T[1] - v_F[1];
-    const real t14 = t4 * t13;
-    const real t15 = t12 + t14;
-    const real t16 = t10 + t15;
-    const real t17 = 1.0 / t8;
-    const real t18 = t16 * t17;
-    l[1] = t18;
-    return 0;
+  real t0 = x_T[2] - x_F[2];
+  real t2 = x_T[0] - x_F[0];
+  real t4 = x_T[1] - x_F[1];
+  real t8 = sqrt(t0 * t0 + (t2 * t2 + t4 * t4));
+  l[0] = t8;
+  l[1] = (t0 * (v_T[2] - v_F[2]) + (t2 * (v_T[0] - v_F[0]) + t4 * (v_T[1] - v_F[1]))) * (1.0 / t8);
+  return 0;
 }
 
-static int mstmm_sweep_frames_length_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_length(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_length_inputs[] = {
-    {"x_F", 3, "", 0, 0},
-    {"v_F", 3, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"v_T", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_length_outputs[] = {
-    {"l", 2, "m, m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_length, (in[0], in[1], in[2], in[3], out[0]))
 
 /* vector in inertial axes
  * in  A[3][3] rotation, body axes to inertial axes
  * in  b[3] body axes
  * out b_0[3] inertial axes
  */
-int mstmm_sweep_frames_to_inertial(const real *restrict A, const real *restrict b,
-    real *restrict b_0)
+int mstmm_sweep_frames_to_inertial(in_t A, in_t b, out_t b_0)
 {
-    const real t0 = A[0] * b[0];
-    const real t1 = A[1] * b[1];
-    const real t2 = t0 + t1;
-    const real t3 = A[2] * b[2];
-    const real t4 = t2 + t3;
-    b_0[0] = t4;
-    const real t5 = A[3] * b[0];
-    const real t6 = A[4] * b[1];
-    const real t7 = t5 + t6;
-    const real t8 = A[5] * b[2];
-    const real t9 = t7 + t8;
-    b_0[1] = t9;
-    const real t10 = A[6] * b[0];
-    const real t11 = A[7] * b[1];
-    const real t12 = t10 + t11;
-    const real t13 = A[8] * b[2];
-    const real t14 = t12 + t13;
-    b_0[2] = t14;
-    return 0;
+  b_0[0] = A[0] * b[0] + A[1] * b[1] + A[2] * b[2];
+  b_0[1] = A[3] * b[0] + A[4] * b[1] + A[5] * b[2];
+  b_0[2] = A[6] * b[0] + A[7] * b[1] + A[8] * b[2];
+  return 0;
 }
 
-static int mstmm_sweep_frames_to_inertial_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_to_inertial(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_to_inertial_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"b", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_to_inertial_outputs[] = {
-    {"b_0", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_to_inertial, (in[0], in[1], out[0]))
 
 /* inputs of the classical body matrix
  * in  A[3][3] rotation, body axes to inertial axes
@@ -1705,231 +498,50 @@ static const mstmm_port mstmm_sweep_frames_to_inertial_outputs[] = {
  * out f_C[3] (N) force at the mass centre
  * out m_C[3] (N*m) moment
  */
-int mstmm_sweep_frames_classical_body(const real *restrict A, const real *restrict p,
-    const real *restrict motion, const real *restrict load, const real *restrict ro_n,
-    real *restrict M, real *restrict r_IO, real *restrict r_IC, real *restrict J_I,
-    real *restrict omega, real *restrict f_C, real *restrict m_C)
+int mstmm_sweep_frames_classical_body(in_t A, in_t p, in_t motion, in_t load, in_t ro_n, out_t M,
+    out_t r_IO, out_t r_IC, out_t J_I, out_t omega, out_t f_C, out_t m_C)
 {
-    M[0] = p[0];
-    const real t0 = A[0] * ro_n[0];
-    const real t1 = A[1] * ro_n[1];
-    const real t2 = t0 + t1;
-    const real t3 = A[2] * ro_n[2];
-    const real t4 = t2 + t3;
-    r_IO[0] = t4;
-    const real t5 = A[3] * ro_n[0];
-    const real t6 = A[4] * ro_n[1];
-    const real t7 = t5 + t6;
-    const real t8 = A[5] * ro_n[2];
-    const real t9 = t7 + t8;
-    r_IO[1] = t9;
-    const real t10 = A[6] * ro_n[0];
-    const real t11 = A[7] * ro_n[1];
-    const real t12 = t10 + t11;
-    const real t13 = A[8] * ro_n[2];
-    const real t14 = t12 + t13;
-    r_IO[2] = t14;
-    const real t15 = 1.0 / p[0];
-    const real t16 = p[1] * t15;
-    const real t17 = A[0] * t16;
-    const real t18 = p[2] * t15;
-    const real t19 = A[1] * t18;
-    const real t20 = t17 + t19;
-    const real t21 = p[3] * t15;
-    const real t22 = A[2] * t21;
-    const real t23 = t20 + t22;
-    r_IC[0] = t23;
-    const real t24 = A[3] * t16;
-    const real t25 = A[4] * t18;
-    const real t26 = t24 + t25;
-    const real t27 = A[5] * t21;
-    const real t28 = t26 + t27;
-    r_IC[1] = t28;
-    const real t29 = A[6] * t16;
-    const real t30 = A[7] * t18;
-    const real t31 = t29 + t30;
-    const real t32 = A[8] * t21;
-    const real t33 = t31 + t32;
-    r_IC[2] = t33;
-    const real t34 = A[0] * p[4];
-    const real t35 = A[1] * p[5];
-    const real t36 = t34 + t35;
-    const real t37 = A[2] * p[6];
-    const real t38 = t36 + t37;
-    const real t39 = A[0] * t38;
-    const real t40 = A[0] * p[5];
-    const real t41 = A[1] * p[7];
-    const real t42 = t40 + t41;
-    const real t43 = A[2] * p[8];
-    const real t44 = t42 + t43;
-    const real t45 = A[1] * t44;
-    const real t46 = t39 + t45;
-    const real t47 = A[0] * p[6];
-    const real t48 = A[1] * p[8];
-    const real t49 = t47 + t48;
-    const real t50 = A[2] * p[9];
-    const real t51 = t49 + t50;
-    const real t52 = A[2] * t51;
-    const real t53 = t46 + t52;
-    J_I[0] = t53;
-    const real t54 = A[3] * t38;
-    const real t55 = A[4] * t44;
-    const real t56 = t54 + t55;
-    const real t57 = A[5] * t51;
-    const real t58 = t56 + t57;
-    J_I[1] = t58;
-    const real t59 = A[6] * t38;
-    const real t60 = A[7] * t44;
-    const real t61 = t59 + t60;
-    const real t62 = A[8] * t51;
-    const real t63 = t61 + t62;
-    J_I[2] = t63;
-    const real t64 = A[3] * p[4];
-    const real t65 = A[4] * p[5];
-    const real t66 = t64 + t65;
-    const real t67 = A[5] * p[6];
-    const real t68 = t66 + t67;
-    const real t69 = A[3] * t68;
-    const real t70 = A[3] * p[5];
-    const real t71 = A[4] * p[7];
-    const real t72 = t70 + t71;
-    const real t73 = A[5] * p[8];
-    const real t74 = t72 + t73;
-    const real t75 = A[4] * t74;
-    const real t76 = t69 + t75;
-    const real t77 = A[3] * p[6];
-    const real t78 = A[4] * p[8];
-    const real t79 = t77 + t78;
-    const real t80 = A[5] * p[9];
-    const real t81 = t79 + t80;
-    const real t82 = A[5] * t81;
-    const real t83 = t76 + t82;
-    J_I[3] = t83;
-    const real t84 = A[6] * t68;
-    const real t85 = A[7] * t74;
-    const real t86 = t84 + t85;
-    const real t87 = A[8] * t81;
-    const real t88 = t86 + t87;
-    J_I[4] = t88;
-    const real t89 = A[6] * p[4];
-    const real t90 = A[7] * p[5];
-    const real t91 = t89 + t90;
-    const real t92 = A[8] * p[6];
-    const real t93 = t91 + t92;
-    const real t94 = A[6] * t93;
-    const real t95 = A[6] * p[5];
-    const real t96 = A[7] * p[7];
-    const real t97 = t95 + t96;
-    const real t98 = A[8] * p[8];
-    const real t99 = t97 + t98;
-    const real t100 = A[7] * t99;
-    const real t101 = t94 + t100;
-    const real t102 = A[6] * p[6];
-    const real t103 = A[7] * p[8];
-    const real t104 = t102 + t103;
-    const real t105 = A[8] * p[9];
-    const real t106 = t104 + t105;
-    const real t107 = A[8] * t106;
-    const real t108 = t101 + t107;
-    J_I[5] = t108;
-    const real t109 = A[0] * motion[0];
-    const real t110 = A[1] * motion[1];
-    const real t111 = t109 + t110;
-    const real t112 = A[2] * motion[2];
-    const real t113 = t111 + t112;
-    omega[0] = t113;
-    const real t114 = A[3] * motion[0];
-    const real t115 = A[4] * motion[1];
-    const real t116 = t114 + t115;
-    const real t117 = A[5] * motion[2];
-    const real t118 = t116 + t117;
-    omega[1] = t118;
-    const real t119 = A[6] * motion[0];
-    const real t120 = A[7] * motion[1];
-    const real t121 = t119 + t120;
-    const real t122 = A[8] * motion[2];
-    const real t123 = t121 + t122;
-    omega[2] = t123;
-    const real t124 = A[0] * load[0];
-    const real t125 = A[1] * load[1];
-    const real t126 = t124 + t125;
-    const real t127 = A[2] * load[2];
-    const real t128 = t126 + t127;
-    f_C[0] = t128;
-    const real t129 = A[3] * load[0];
-    const real t130 = A[4] * load[1];
-    const real t131 = t129 + t130;
-    const real t132 = A[5] * load[2];
-    const real t133 = t131 + t132;
-    f_C[1] = t133;
-    const real t134 = A[6] * load[0];
-    const real t135 = A[7] * load[1];
-    const real t136 = t134 + t135;
-    const real t137 = A[8] * load[2];
-    const real t138 = t136 + t137;
-    f_C[2] = t138;
-    const real t139 = p[3] * load[1];
-    const real t140 = t15 * t139;
-    const real t141 = p[2] * load[2];
-    const real t142 = t15 * t141;
-    const real t143 = t140 - t142;
-    const real t144 = load[3] + t143;
-    const real t145 = A[0] * t144;
-    const real t146 = p[1] * load[2];
-    const real t147 = t15 * t146;
-    const real t148 = p[3] * load[0];
-    const real t149 = t15 * t148;
-    const real t150 = t147 - t149;
-    const real t151 = load[4] + t150;
-    const real t152 = A[1] * t151;
-    const real t153 = t145 + t152;
-    const real t154 = p[2] * load[0];
-    const real t155 = t15 * t154;
-    const real t156 = p[1] * load[1];
-    const real t157 = t15 * t156;
-    const real t158 = t155 - t157;
-    const real t159 = load[5] + t158;
-    const real t160 = A[2] * t159;
-    const real t161 = t153 + t160;
-    m_C[0] = t161;
-    const real t162 = A[3] * t144;
-    const real t163 = A[4] * t151;
-    const real t164 = t162 + t163;
-    const real t165 = A[5] * t159;
-    const real t166 = t164 + t165;
-    m_C[1] = t166;
-    const real t167 = A[6] * t144;
-    const real t168 = A[7] * t151;
-    const real t169 = t167 + t168;
-    const real t170 = A[8] * t159;
-    const real t171 = t169 + t170;
-    m_C[2] = t171;
-    return 0;
+  M[0] = p[0];
+  r_IO[0] = A[0] * ro_n[0] + A[1] * ro_n[1] + A[2] * ro_n[2];
+  r_IO[1] = A[3] * ro_n[0] + A[4] * ro_n[1] + A[5] * ro_n[2];
+  r_IO[2] = A[6] * ro_n[0] + A[7] * ro_n[1] + A[8] * ro_n[2];
+  real t15 = 1.0 / p[0];
+  real t16 = p[1] * t15;
+  real t18 = p[2] * t15;
+  real t21 = p[3] * t15;
+  r_IC[0] = A[0] * t16 + A[1] * t18 + A[2] * t21;
+  r_IC[1] = A[3] * t16 + A[4] * t18 + A[5] * t21;
+  r_IC[2] = A[6] * t16 + A[7] * t18 + A[8] * t21;
+  real t38 = A[0] * p[4] + A[1] * p[5] + A[2] * p[6];
+  real t44 = A[0] * p[5] + A[1] * p[7] + A[2] * p[8];
+  real t51 = A[0] * p[6] + A[1] * p[8] + A[2] * p[9];
+  J_I[0] = A[0] * t38 + A[1] * t44 + A[2] * t51;
+  J_I[1] = A[3] * t38 + A[4] * t44 + A[5] * t51;
+  J_I[2] = A[6] * t38 + A[7] * t44 + A[8] * t51;
+  real t68 = A[3] * p[4] + A[4] * p[5] + A[5] * p[6];
+  real t74 = A[3] * p[5] + A[4] * p[7] + A[5] * p[8];
+  real t81 = A[3] * p[6] + A[4] * p[8] + A[5] * p[9];
+  J_I[3] = A[3] * t68 + A[4] * t74 + A[5] * t81;
+  J_I[4] = A[6] * t68 + A[7] * t74 + A[8] * t81;
+  J_I[5] = A[6] * (A[6] * p[4] + A[7] * p[5] + A[8] * p[6]) + A[7] * (A[6] * p[5] + A[7] * p[7] +
+    A[8] * p[8]) + A[8] * (A[6] * p[6] + A[7] * p[8] + A[8] * p[9]);
+  omega[0] = A[0] * motion[0] + A[1] * motion[1] + A[2] * motion[2];
+  omega[1] = A[3] * motion[0] + A[4] * motion[1] + A[5] * motion[2];
+  omega[2] = A[6] * motion[0] + A[7] * motion[1] + A[8] * motion[2];
+  f_C[0] = A[0] * load[0] + A[1] * load[1] + A[2] * load[2];
+  f_C[1] = A[3] * load[0] + A[4] * load[1] + A[5] * load[2];
+  f_C[2] = A[6] * load[0] + A[7] * load[1] + A[8] * load[2];
+  real t144 = load[3] + (t15 * (p[3] * load[1]) - t15 * (p[2] * load[2]));
+  real t151 = load[4] + (t15 * (p[1] * load[2]) - t15 * (p[3] * load[0]));
+  real t159 = load[5] + (t15 * (p[2] * load[0]) - t15 * (p[1] * load[1]));
+  m_C[0] = A[0] * t144 + A[1] * t151 + A[2] * t159;
+  m_C[1] = A[3] * t144 + A[4] * t151 + A[5] * t159;
+  m_C[2] = A[6] * t144 + A[7] * t151 + A[8] * t159;
+  return 0;
 }
 
-static int mstmm_sweep_frames_classical_body_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_classical_body(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_sweep_frames_classical_body_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"p", 10, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"load", 6, "N, N*m", 0, 0},
-    {"ro_n", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_classical_body_outputs[] = {
-    {"M", 1, "kg", 0, 0},
-    {"r_IO", 3, "m", 0, 0},
-    {"r_IC", 3, "m", 0, 0},
-    {"J_I", 6, "kg*m2", 0, 0},
-    {"omega", 3, "rad/s", 0, 0},
-    {"f_C", 3, "N", 0, 0},
-    {"m_C", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_classical_body, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4], out[5], out[6]))
 
 /* deviation read from a classical state vector
  * in  A[3][3] rotation, body axes to inertial axes
@@ -1937,69 +549,18 @@ static const mstmm_port mstmm_sweep_frames_classical_body_outputs[] = {
  * in  z[13] [rdd; omegadot; m; q; 1] at P, inertial axes
  * out delta[6] deviation of the body's acceleration
  */
-int mstmm_sweep_frames_state_deviation(const real *restrict A, const real *restrict motion,
-    const real *restrict z, real *restrict delta)
+int mstmm_sweep_frames_state_deviation(in_t A, in_t motion, in_t z, out_t delta)
 {
-    const real t0 = A[0] * z[0];
-    const real t1 = A[3] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = A[6] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = t4 - motion[6];
-    delta[0] = t5;
-    const real t6 = A[1] * z[0];
-    const real t7 = A[4] * z[1];
-    const real t8 = t6 + t7;
-    const real t9 = A[7] * z[2];
-    const real t10 = t8 + t9;
-    const real t11 = t10 - motion[7];
-    delta[1] = t11;
-    const real t12 = A[2] * z[0];
-    const real t13 = A[5] * z[1];
-    const real t14 = t12 + t13;
-    const real t15 = A[8] * z[2];
-    const real t16 = t14 + t15;
-    const real t17 = t16 - motion[8];
-    delta[2] = t17;
-    const real t18 = A[0] * z[3];
-    const real t19 = A[3] * z[4];
-    const real t20 = t18 + t19;
-    const real t21 = A[6] * z[5];
-    const real t22 = t20 + t21;
-    const real t23 = t22 - motion[3];
-    delta[3] = t23;
-    const real t24 = A[1] * z[3];
-    const real t25 = A[4] * z[4];
-    const real t26 = t24 + t25;
-    const real t27 = A[7] * z[5];
-    const real t28 = t26 + t27;
-    const real t29 = t28 - motion[4];
-    delta[4] = t29;
-    const real t30 = A[2] * z[3];
-    const real t31 = A[5] * z[4];
-    const real t32 = t30 + t31;
-    const real t33 = A[8] * z[5];
-    const real t34 = t32 + t33;
-    const real t35 = t34 - motion[5];
-    delta[5] = t35;
-    return 0;
+  delta[0] = A[0] * z[0] + A[3] * z[1] + A[6] * z[2] - motion[6];
+  delta[1] = A[1] * z[0] + A[4] * z[1] + A[7] * z[2] - motion[7];
+  delta[2] = A[2] * z[0] + A[5] * z[1] + A[8] * z[2] - motion[8];
+  delta[3] = A[0] * z[3] + A[3] * z[4] + A[6] * z[5] - motion[3];
+  delta[4] = A[1] * z[3] + A[4] * z[4] + A[7] * z[5] - motion[4];
+  delta[5] = A[2] * z[3] + A[5] * z[4] + A[8] * z[5] - motion[5];
+  return 0;
 }
 
-static int mstmm_sweep_frames_state_deviation_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_state_deviation(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_state_deviation_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"z", 13, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_state_deviation_outputs[] = {
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_state_deviation, (in[0], in[1], in[2], out[0]))
 
 /* change of a load carried to the parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2013,252 +574,207 @@ static const mstmm_port mstmm_sweep_frames_state_deviation_outputs[] = {
  * out T[9][6] S Th, one row per entry
  * out S_I[9][6] S of the parent, added to what is there
  */
-int mstmm_sweep_frames_tangent_carry(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict S, real *restrict T, real *restrict S_I)
+int mstmm_sweep_frames_tangent_carry(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t S, out_t T,
+    out_t S_I)
 {
-    const real t17 = Rc[6] * v[0];
-    const real t18 = Rc[7] * v[1];
-    const real t19 = t17 + t18;
-    const real t20 = Rc[8] * v[2];
-    const real t21 = t19 + t20;
-    const real t22 = t21 * 2.0;
-    const real t23 = r[1] * w_I[0];
-    const real t24 = 2.0 * t23;
-    const real t25 = r[0] * w_I[1];
-    const real t26 = t24 - t25;
-    const real t27 = t22 + t26;
-    const real t34 = r[1] * w_I[1];
-    const real t35 = r[2] * w_I[2];
-    const real t36 = t34 + t35;
-    const real t44 = r[2] * w_I[0];
-    const real t45 = 2.0 * t44;
-    const real t46 = r[0] * w_I[2];
-    const real t47 = t45 - t46;
-    const real t48 = Rc[3] * v[0];
-    const real t49 = Rc[4] * v[1];
-    const real t50 = t48 + t49;
-    const real t51 = Rc[5] * v[2];
-    const real t52 = t50 + t51;
-    const real t53 = t52 * 2.0;
-    const real t54 = t47 - t53;
-    const real t258 = t25 * 2.0;
-    const real t259 = t258 - t23;
-    const real t260 = t259 - t22;
-    const real t262 = r[0] * w_I[0];
-    const real t263 = t35 + t262;
-    const real t266 = Rc[0] * v[0];
-    const real t267 = Rc[1] * v[1];
-    const real t268 = t266 + t267;
-    const real t269 = Rc[2] * v[2];
-    const real t270 = t268 + t269;
-    const real t271 = t270 * 2.0;
-    const real t272 = r[2] * w_I[1];
-    const real t273 = 2.0 * t272;
-    const real t274 = r[1] * w_I[2];
-    const real t275 = t273 - t274;
-    const real t276 = t271 + t275;
-    const real t340 = t34 + t262;
-    const real t342 = 2.0 * t46;
-    const real t343 = t342 - t44;
-    const real t344 = t53 + t343;
-    const real t346 = 2.0 * t274;
-    const real t347 = t346 - t272;
-    const real t348 = t347 - t271;
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = mstmm_beside(S + 30 + k);
-        const two_t v2 = w[1] * v1;
-        const two_t v3 = mstmm_beside(S + 24 + k);
-        const two_t v4 = w[2] * v3;
-        const two_t v5 = v2 - v4;
-        const two_t v6 = v0 + v5;
-        const two_t v7 = Rc[0] * v6;
-        const two_t v8 = mstmm_beside(S + 6 + k);
-        const two_t v9 = mstmm_beside(S + 18 + k);
-        const two_t v10 = w[2] * v9;
-        const two_t v11 = w[0] * v1;
-        const two_t v12 = v10 - v11;
-        const two_t v13 = v8 + v12;
-        const two_t v14 = Rc[1] * v13;
-        const two_t v15 = v7 + v14;
-        const two_t v16 = mstmm_beside(S + 12 + k);
-        const two_t v17 = w[0] * v3;
-        const two_t v18 = w[1] * v9;
-        const two_t v19 = v17 - v18;
-        const two_t v20 = v16 + v19;
-        const two_t v21 = Rc[2] * v20;
-        const two_t v22 = v15 + v21;
-        const two_t v23 = mstmm_beside(S + 36 + k);
-        const two_t v24 = Rc[3] * v23;
-        const two_t v25 = mstmm_beside(S + 42 + k);
-        const two_t v26 = Rc[4] * v25;
-        const two_t v27 = v24 + v26;
-        const two_t v28 = mstmm_beside(S + 48 + k);
-        const two_t v29 = Rc[5] * v28;
-        const two_t v30 = v27 + v29;
-        const two_t v31 = t27 * v30;
-        const two_t v32 = Rc[0] * v23;
-        const two_t v33 = Rc[1] * v25;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = Rc[2] * v28;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = t36 * v36;
-        const two_t v38 = v31 - v37;
-        const two_t v39 = Rc[6] * v23;
-        const two_t v40 = Rc[7] * v25;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = Rc[8] * v28;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = t54 * v43;
-        const two_t v45 = v38 + v44;
-        const two_t v46 = v22 - v45;
-        const two_t v47 = Rc[3] * v6;
-        const two_t v48 = Rc[4] * v13;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = Rc[5] * v20;
-        const two_t v51 = v49 + v50;
-        const two_t v52 = t260 * v36;
-        const two_t v53 = t263 * v30;
-        const two_t v54 = v52 - v53;
-        const two_t v55 = t276 * v43;
-        const two_t v56 = v54 + v55;
-        const two_t v57 = v51 - v56;
-        const two_t v58 = Rc[6] * v6;
-        const two_t v59 = Rc[7] * v13;
-        const two_t v60 = v58 + v59;
-        const two_t v61 = Rc[8] * v20;
-        const two_t v62 = v60 + v61;
-        const two_t v63 = t340 * v43;
-        const two_t v64 = t344 * v36;
-        const two_t v65 = t348 * v30;
-        const two_t v66 = v64 + v65;
-        const two_t v67 = v63 - v66;
-        const two_t v68 = v62 + v67;
-        const two_t v69 = Rc[0] * v9;
-        const two_t v70 = Rc[1] * v3;
-        const two_t v71 = v69 + v70;
-        const two_t v72 = Rc[2] * v1;
-        const two_t v73 = v71 + v72;
-        const two_t v74 = r[1] * v43;
-        const two_t v75 = r[2] * v30;
-        const two_t v76 = v74 - v75;
-        const two_t v77 = v73 + v76;
-        const two_t v78 = Rc[3] * v9;
-        const two_t v79 = Rc[4] * v3;
-        const two_t v80 = v78 + v79;
-        const two_t v81 = Rc[5] * v1;
-        const two_t v82 = v80 + v81;
-        const two_t v83 = r[2] * v36;
-        const two_t v84 = r[0] * v43;
-        const two_t v85 = v83 - v84;
-        const two_t v86 = v82 + v85;
-        const two_t v87 = Rc[6] * v9;
-        const two_t v88 = Rc[7] * v3;
-        const two_t v89 = v87 + v88;
-        const two_t v90 = Rc[8] * v1;
-        const two_t v91 = v89 + v90;
-        const two_t v92 = r[0] * v30;
-        const two_t v93 = r[1] * v36;
-        const two_t v94 = v92 - v93;
-        const two_t v95 = v91 + v94;
-        *(two_free_t *)(T + 0 + k) = v46;
-        *(two_free_t *)(T + 6 + k) = v57;
-        *(two_free_t *)(T + 12 + k) = v68;
-        *(two_free_t *)(T + 18 + k) = v77;
-        *(two_free_t *)(T + 24 + k) = v86;
-        *(two_free_t *)(T + 30 + k) = v95;
-        *(two_free_t *)(T + 36 + k) = v36;
-        *(two_free_t *)(T + 42 + k) = v30;
-        *(two_free_t *)(T + 48 + k) = v43;
+  real t22 = (Rc[6] * v[0] + Rc[7] * v[1] + Rc[8] * v[2]) * 2.0;
+  real t23 = r[1] * w_I[0];
+  real t25 = r[0] * w_I[1];
+  real t27 = t22 + (2.0 * t23 - t25);
+  real t34 = r[1] * w_I[1];
+  real t35 = r[2] * w_I[2];
+  real t36 = t34 + t35;
+  real t44 = r[2] * w_I[0];
+  real t46 = r[0] * w_I[2];
+  real t53 = (Rc[3] * v[0] + Rc[4] * v[1] + Rc[5] * v[2]) * 2.0;
+  real t54 = 2.0 * t44 - t46 - t53;
+  real t260 = t25 * 2.0 - t23 - t22;
+  real t262 = r[0] * w_I[0];
+  real t263 = t35 + t262;
+  real t271 = (Rc[0] * v[0] + Rc[1] * v[1] + Rc[2] * v[2]) * 2.0;
+  real t272 = r[2] * w_I[1];
+  real t274 = r[1] * w_I[2];
+  real t276 = t271 + (2.0 * t272 - t274);
+  real t340 = t34 + t262;
+  real t344 = t53 + (2.0 * t46 - t44);
+  real t348 = 2.0 * t274 - t272 - t271;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = mstmm_beside(S + 30 + k);
+    const two_t v2 = w[1] * v1;
+    const two_t v3 = mstmm_beside(S + 24 + k);
+    const two_t v4 = w[2] * v3;
+    const two_t v5 = v2 - v4;
+    const two_t v6 = v0 + v5;
+    const two_t v7 = Rc[0] * v6;
+    const two_t v8 = mstmm_beside(S + 6 + k);
+    const two_t v9 = mstmm_beside(S + 18 + k);
+    const two_t v10 = w[2] * v9;
+    const two_t v11 = w[0] * v1;
+    const two_t v12 = v10 - v11;
+    const two_t v13 = v8 + v12;
+    const two_t v14 = Rc[1] * v13;
+    const two_t v15 = v7 + v14;
+    const two_t v16 = mstmm_beside(S + 12 + k);
+    const two_t v17 = w[0] * v3;
+    const two_t v18 = w[1] * v9;
+    const two_t v19 = v17 - v18;
+    const two_t v20 = v16 + v19;
+    const two_t v21 = Rc[2] * v20;
+    const two_t v22 = v15 + v21;
+    const two_t v23 = mstmm_beside(S + 36 + k);
+    const two_t v24 = Rc[3] * v23;
+    const two_t v25 = mstmm_beside(S + 42 + k);
+    const two_t v26 = Rc[4] * v25;
+    const two_t v27 = v24 + v26;
+    const two_t v28 = mstmm_beside(S + 48 + k);
+    const two_t v29 = Rc[5] * v28;
+    const two_t v30 = v27 + v29;
+    const two_t v31 = t27 * v30;
+    const two_t v32 = Rc[0] * v23;
+    const two_t v33 = Rc[1] * v25;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = Rc[2] * v28;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = t36 * v36;
+    const two_t v38 = v31 - v37;
+    const two_t v39 = Rc[6] * v23;
+    const two_t v40 = Rc[7] * v25;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = Rc[8] * v28;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = t54 * v43;
+    const two_t v45 = v38 + v44;
+    const two_t v46 = v22 - v45;
+    const two_t v47 = Rc[3] * v6;
+    const two_t v48 = Rc[4] * v13;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = Rc[5] * v20;
+    const two_t v51 = v49 + v50;
+    const two_t v52 = t260 * v36;
+    const two_t v53 = t263 * v30;
+    const two_t v54 = v52 - v53;
+    const two_t v55 = t276 * v43;
+    const two_t v56 = v54 + v55;
+    const two_t v57 = v51 - v56;
+    const two_t v58 = Rc[6] * v6;
+    const two_t v59 = Rc[7] * v13;
+    const two_t v60 = v58 + v59;
+    const two_t v61 = Rc[8] * v20;
+    const two_t v62 = v60 + v61;
+    const two_t v63 = t340 * v43;
+    const two_t v64 = t344 * v36;
+    const two_t v65 = t348 * v30;
+    const two_t v66 = v64 + v65;
+    const two_t v67 = v63 - v66;
+    const two_t v68 = v62 + v67;
+    const two_t v69 = Rc[0] * v9;
+    const two_t v70 = Rc[1] * v3;
+    const two_t v71 = v69 + v70;
+    const two_t v72 = Rc[2] * v1;
+    const two_t v73 = v71 + v72;
+    const two_t v74 = r[1] * v43;
+    const two_t v75 = r[2] * v30;
+    const two_t v76 = v74 - v75;
+    const two_t v77 = v73 + v76;
+    const two_t v78 = Rc[3] * v9;
+    const two_t v79 = Rc[4] * v3;
+    const two_t v80 = v78 + v79;
+    const two_t v81 = Rc[5] * v1;
+    const two_t v82 = v80 + v81;
+    const two_t v83 = r[2] * v36;
+    const two_t v84 = r[0] * v43;
+    const two_t v85 = v83 - v84;
+    const two_t v86 = v82 + v85;
+    const two_t v87 = Rc[6] * v9;
+    const two_t v88 = Rc[7] * v3;
+    const two_t v89 = v87 + v88;
+    const two_t v90 = Rc[8] * v1;
+    const two_t v91 = v89 + v90;
+    const two_t v92 = r[0] * v30;
+    const two_t v93 = r[1] * v36;
+    const two_t v94 = v92 - v93;
+    const two_t v95 = v91 + v94;
+    *(two_free_t *)(T + 0 + k) = v46;
+    *(two_free_t *)(T + 6 + k) = v57;
+    *(two_free_t *)(T + 12 + k) = v68;
+    *(two_free_t *)(T + 18 + k) = v77;
+    *(two_free_t *)(T + 24 + k) = v86;
+    *(two_free_t *)(T + 30 + k) = v95;
+    *(two_free_t *)(T + 36 + k) = v36;
+    *(two_free_t *)(T + 42 + k) = v30;
+    *(two_free_t *)(T + 48 + k) = v43;
+  }
+  for (int k = 0; k < 9; k += 2) {
+    const int next = k < 8;
+    const two_t v0 = mstmm_apart(T + 0 + 6 * k, 6 * next);
+    const two_t v1 = Rc[0] * v0;
+    const two_t v2 = mstmm_apart(T + 1 + 6 * k, 6 * next);
+    const two_t v3 = Rc[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(T + 2 + 6 * k, 6 * next);
+    const two_t v6 = Rc[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = Rc[3] * v0;
+    const two_t v9 = Rc[4] * v2;
+    const two_t v10 = v8 + v9;
+    const two_t v11 = Rc[5] * v5;
+    const two_t v12 = v10 + v11;
+    const two_t v13 = Rc[6] * v0;
+    const two_t v14 = Rc[7] * v2;
+    const two_t v15 = v13 + v14;
+    const two_t v16 = Rc[8] * v5;
+    const two_t v17 = v15 + v16;
+    const two_t v18 = mstmm_apart(T + 3 + 6 * k, 6 * next);
+    const two_t v19 = Rc[0] * v18;
+    const two_t v20 = mstmm_apart(T + 4 + 6 * k, 6 * next);
+    const two_t v21 = Rc[1] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_apart(T + 5 + 6 * k, 6 * next);
+    const two_t v24 = Rc[2] * v23;
+    const two_t v25 = v22 + v24;
+    const two_t v26 = r[1] * v17;
+    const two_t v27 = r[2] * v12;
+    const two_t v28 = v26 - v27;
+    const two_t v29 = v25 + v28;
+    const two_t v30 = Rc[3] * v18;
+    const two_t v31 = Rc[4] * v20;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = Rc[5] * v23;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = r[2] * v7;
+    const two_t v36 = r[0] * v17;
+    const two_t v37 = v35 - v36;
+    const two_t v38 = v34 + v37;
+    const two_t v39 = Rc[6] * v18;
+    const two_t v40 = Rc[7] * v20;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = Rc[8] * v23;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = r[0] * v12;
+    const two_t v45 = r[1] * v7;
+    const two_t v46 = v44 - v45;
+    const two_t v47 = v43 + v46;
+    S_I[0 + 6 * k] += v7[0];
+    S_I[1 + 6 * k] += v12[0];
+    S_I[2 + 6 * k] += v17[0];
+    S_I[3 + 6 * k] += v29[0];
+    S_I[4 + 6 * k] += v38[0];
+    S_I[5 + 6 * k] += v47[0];
+    if (next) {
+      S_I[6 + 6 * k] += v7[1];
+      S_I[7 + 6 * k] += v12[1];
+      S_I[8 + 6 * k] += v17[1];
+      S_I[9 + 6 * k] += v29[1];
+      S_I[10 + 6 * k] += v38[1];
+      S_I[11 + 6 * k] += v47[1];
     }
-    for (int k = 0; k < 9; k += 2) {
-        const int next = k < 8;
-        const two_t v0 = mstmm_apart(T + 0 + 6 * k, 6 * next);
-        const two_t v1 = Rc[0] * v0;
-        const two_t v2 = mstmm_apart(T + 1 + 6 * k, 6 * next);
-        const two_t v3 = Rc[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(T + 2 + 6 * k, 6 * next);
-        const two_t v6 = Rc[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = Rc[3] * v0;
-        const two_t v9 = Rc[4] * v2;
-        const two_t v10 = v8 + v9;
-        const two_t v11 = Rc[5] * v5;
-        const two_t v12 = v10 + v11;
-        const two_t v13 = Rc[6] * v0;
-        const two_t v14 = Rc[7] * v2;
-        const two_t v15 = v13 + v14;
-        const two_t v16 = Rc[8] * v5;
-        const two_t v17 = v15 + v16;
-        const two_t v18 = mstmm_apart(T + 3 + 6 * k, 6 * next);
-        const two_t v19 = Rc[0] * v18;
-        const two_t v20 = mstmm_apart(T + 4 + 6 * k, 6 * next);
-        const two_t v21 = Rc[1] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_apart(T + 5 + 6 * k, 6 * next);
-        const two_t v24 = Rc[2] * v23;
-        const two_t v25 = v22 + v24;
-        const two_t v26 = r[1] * v17;
-        const two_t v27 = r[2] * v12;
-        const two_t v28 = v26 - v27;
-        const two_t v29 = v25 + v28;
-        const two_t v30 = Rc[3] * v18;
-        const two_t v31 = Rc[4] * v20;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = Rc[5] * v23;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = r[2] * v7;
-        const two_t v36 = r[0] * v17;
-        const two_t v37 = v35 - v36;
-        const two_t v38 = v34 + v37;
-        const two_t v39 = Rc[6] * v18;
-        const two_t v40 = Rc[7] * v20;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = Rc[8] * v23;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = r[0] * v12;
-        const two_t v45 = r[1] * v7;
-        const two_t v46 = v44 - v45;
-        const two_t v47 = v43 + v46;
-        S_I[0 + 6 * k] += v7[0];
-        S_I[1 + 6 * k] += v12[0];
-        S_I[2 + 6 * k] += v17[0];
-        S_I[3 + 6 * k] += v29[0];
-        S_I[4 + 6 * k] += v38[0];
-        S_I[5 + 6 * k] += v47[0];
-        if (next) {
-            S_I[6 + 6 * k] += v7[1];
-            S_I[7 + 6 * k] += v12[1];
-            S_I[8 + 6 * k] += v17[1];
-            S_I[9 + 6 * k] += v29[1];
-            S_I[10 + 6 * k] += v38[1];
-            S_I[11 + 6 * k] += v47[1];
-        }
-    }
-    return 0;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_frames_tangent_carry_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_tangent_carry(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_tangent_carry_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_tangent_carry_outputs[] = {
-    {"T", 54, "", 0, 0},
-    {"S_I", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_tangent_carry, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* change of a body's motion by that of its parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2271,166 +787,42 @@ static const mstmm_port mstmm_sweep_frames_tangent_carry_outputs[] = {
  * in  z_I[9] change of the parent's motion, parent axes
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_frames_tangent_motion(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, real *restrict z)
+int mstmm_sweep_frames_tangent_motion(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    z[0] = t4;
-    const real t5 = Rc[1] * z_I[0];
-    const real t6 = Rc[4] * z_I[1];
-    const real t7 = t5 + t6;
-    const real t8 = Rc[7] * z_I[2];
-    const real t9 = t7 + t8;
-    z[1] = t9;
-    const real t10 = Rc[2] * z_I[0];
-    const real t11 = Rc[5] * z_I[1];
-    const real t12 = t10 + t11;
-    const real t13 = Rc[8] * z_I[2];
-    const real t14 = t12 + t13;
-    z[2] = t14;
-    const real t15 = w[2] * t9;
-    const real t16 = w[1] * t14;
-    const real t17 = t15 - t16;
-    const real t18 = Rc[0] * z_I[3];
-    const real t19 = Rc[3] * z_I[4];
-    const real t20 = t18 + t19;
-    const real t21 = Rc[6] * z_I[5];
-    const real t22 = t20 + t21;
-    const real t23 = t17 + t22;
-    z[3] = t23;
-    const real t24 = w[0] * t14;
-    const real t25 = w[2] * t4;
-    const real t26 = t24 - t25;
-    const real t27 = Rc[1] * z_I[3];
-    const real t28 = Rc[4] * z_I[4];
-    const real t29 = t27 + t28;
-    const real t30 = Rc[7] * z_I[5];
-    const real t31 = t29 + t30;
-    const real t32 = t26 + t31;
-    z[4] = t32;
-    const real t33 = w[1] * t4;
-    const real t34 = w[0] * t9;
-    const real t35 = t33 - t34;
-    const real t36 = Rc[2] * z_I[3];
-    const real t37 = Rc[5] * z_I[4];
-    const real t38 = t36 + t37;
-    const real t39 = Rc[8] * z_I[5];
-    const real t40 = t38 + t39;
-    const real t41 = t35 + t40;
-    z[5] = t41;
-    const real t42 = v[2] * 2.0;
-    const real t43 = t9 * t42;
-    const real t44 = v[1] * 2.0;
-    const real t45 = t14 * t44;
-    const real t46 = t43 - t45;
-    const real t47 = r[2] * z_I[4];
-    const real t48 = r[1] * w_I[1];
-    const real t49 = r[2] * w_I[2];
-    const real t50 = t48 + t49;
-    const real t51 = z_I[0] * t50;
-    const real t52 = r[0] * w_I[1];
-    const real t53 = 2.0 * t52;
-    const real t54 = r[1] * w_I[0];
-    const real t55 = t53 - t54;
-    const real t56 = z_I[1] * t55;
-    const real t57 = r[0] * w_I[2];
-    const real t58 = 2.0 * t57;
-    const real t59 = r[2] * w_I[0];
-    const real t60 = t58 - t59;
-    const real t61 = z_I[2] * t60;
-    const real t62 = t56 + t61;
-    const real t63 = t51 - t62;
-    const real t64 = r[1] * z_I[5];
-    const real t65 = t63 - t64;
-    const real t66 = t47 + t65;
-    const real t67 = z_I[6] + t66;
-    const real t68 = Rc[0] * t67;
-    const real t69 = r[0] * z_I[5];
-    const real t70 = r[0] * w_I[0];
-    const real t71 = t49 + t70;
-    const real t72 = z_I[1] * t71;
-    const real t73 = 2.0 * t54;
-    const real t74 = t73 - t52;
-    const real t75 = z_I[0] * t74;
-    const real t76 = t72 - t75;
-    const real t77 = r[1] * w_I[2];
-    const real t78 = 2.0 * t77;
-    const real t79 = r[2] * w_I[1];
-    const real t80 = t78 - t79;
-    const real t81 = z_I[2] * t80;
-    const real t82 = t76 - t81;
-    const real t83 = t69 + t82;
-    const real t84 = r[2] * z_I[3];
-    const real t85 = t83 - t84;
-    const real t86 = z_I[7] + t85;
-    const real t87 = Rc[3] * t86;
-    const real t88 = t68 + t87;
-    const real t89 = r[1] * z_I[3];
-    const real t90 = t48 + t70;
-    const real t91 = z_I[2] * t90;
-    const real t92 = 2.0 * t59;
-    const real t93 = t92 - t57;
-    const real t94 = z_I[0] * t93;
-    const real t95 = t91 - t94;
-    const real t96 = 2.0 * t79;
-    const real t97 = t96 - t77;
-    const real t98 = z_I[1] * t97;
-    const real t99 = t95 - t98;
-    const real t100 = r[0] * z_I[4];
-    const real t101 = t99 - t100;
-    const real t102 = t89 + t101;
-    const real t103 = z_I[8] + t102;
-    const real t104 = Rc[6] * t103;
-    const real t105 = t88 + t104;
-    const real t106 = t46 + t105;
-    z[6] = t106;
-    const real t107 = v[0] * 2.0;
-    const real t108 = t14 * t107;
-    const real t109 = t4 * t42;
-    const real t110 = t108 - t109;
-    const real t111 = Rc[1] * t67;
-    const real t112 = Rc[4] * t86;
-    const real t113 = t111 + t112;
-    const real t114 = Rc[7] * t103;
-    const real t115 = t113 + t114;
-    const real t116 = t110 + t115;
-    z[7] = t116;
-    const real t117 = t4 * t44;
-    const real t118 = t9 * t107;
-    const real t119 = t117 - t118;
-    const real t120 = Rc[2] * t67;
-    const real t121 = Rc[5] * t86;
-    const real t122 = t120 + t121;
-    const real t123 = Rc[8] * t103;
-    const real t124 = t122 + t123;
-    const real t125 = t119 + t124;
-    z[8] = t125;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  z[0] = t4;
+  real t9 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  z[1] = t9;
+  real t14 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  z[2] = t14;
+  z[3] = w[2] * t9 - w[1] * t14 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  z[4] = w[0] * t14 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  z[5] = w[1] * t4 - w[0] * t9 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t42 = v[2] * 2.0;
+  real t44 = v[1] * 2.0;
+  real t48 = r[1] * w_I[1];
+  real t49 = r[2] * w_I[2];
+  real t52 = r[0] * w_I[1];
+  real t54 = r[1] * w_I[0];
+  real t57 = r[0] * w_I[2];
+  real t59 = r[2] * w_I[0];
+  real t67 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t48 + t49) - (z_I[1] * (2.0 * t52 - t54) + z_I[2]
+    * (2.0 * t57 - t59)) - r[1] * z_I[5]));
+  real t70 = r[0] * w_I[0];
+  real t77 = r[1] * w_I[2];
+  real t79 = r[2] * w_I[1];
+  real t86 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t49 + t70) - z_I[0] * (2.0 * t54 - t52) - z_I[2] *
+    (2.0 * t77 - t79)) - r[2] * z_I[3]);
+  real t103 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t48 + t70) - z_I[0] * (2.0 * t59 - t57) - z_I[1]
+    * (2.0 * t79 - t77) - r[0] * z_I[4]));
+  z[6] = t9 * t42 - t14 * t44 + (Rc[0] * t67 + Rc[3] * t86 + Rc[6] * t103);
+  real t107 = v[0] * 2.0;
+  z[7] = t14 * t107 - t4 * t42 + (Rc[1] * t67 + Rc[4] * t86 + Rc[7] * t103);
+  z[8] = t4 * t44 - t9 * t107 + (Rc[2] * t67 + Rc[5] * t86 + Rc[8] * t103);
+  return 0;
 }
 
-static int mstmm_sweep_frames_tangent_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_tangent_motion(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_tangent_motion_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_tangent_motion_outputs[] = {
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_tangent_motion, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* rotation and displacement along a direction
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2441,64 +833,18 @@ static const mstmm_port mstmm_sweep_frames_tangent_motion_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_frames_tangent_pose_change(const real *restrict R, const real *restrict d_R,
-    const real *restrict d_d, real *restrict theta, real *restrict x)
+int mstmm_sweep_frames_tangent_pose_change(in_t R, in_t d_R, in_t d_d, out_t theta, out_t x)
 {
-    const real t0 = R[8] * d_R[7];
-    const real t1 = R[2] * d_R[1];
-    const real t2 = R[5] * d_R[4];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    theta[0] = t4;
-    const real t5 = R[6] * d_R[8];
-    const real t6 = R[0] * d_R[2];
-    const real t7 = R[3] * d_R[5];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    theta[1] = t9;
-    const real t10 = R[7] * d_R[6];
-    const real t11 = R[1] * d_R[0];
-    const real t12 = R[4] * d_R[3];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    theta[2] = t14;
-    const real t15 = R[0] * d_d[0];
-    const real t16 = R[3] * d_d[1];
-    const real t17 = t15 + t16;
-    const real t18 = R[6] * d_d[2];
-    const real t19 = t17 + t18;
-    x[0] = t19;
-    const real t20 = R[1] * d_d[0];
-    const real t21 = R[4] * d_d[1];
-    const real t22 = t20 + t21;
-    const real t23 = R[7] * d_d[2];
-    const real t24 = t22 + t23;
-    x[1] = t24;
-    const real t25 = R[2] * d_d[0];
-    const real t26 = R[5] * d_d[1];
-    const real t27 = t25 + t26;
-    const real t28 = R[8] * d_d[2];
-    const real t29 = t27 + t28;
-    x[2] = t29;
-    return 0;
+  theta[0] = R[8] * d_R[7] + (R[2] * d_R[1] + R[5] * d_R[4]);
+  theta[1] = R[6] * d_R[8] + (R[0] * d_R[2] + R[3] * d_R[5]);
+  theta[2] = R[7] * d_R[6] + (R[1] * d_R[0] + R[4] * d_R[3]);
+  x[0] = R[0] * d_d[0] + R[3] * d_d[1] + R[6] * d_d[2];
+  x[1] = R[1] * d_d[0] + R[4] * d_d[1] + R[7] * d_d[2];
+  x[2] = R[2] * d_d[0] + R[5] * d_d[1] + R[8] * d_d[2];
+  return 0;
 }
 
-static int mstmm_sweep_frames_tangent_pose_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_tangent_pose_change(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_tangent_pose_change_inputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_tangent_pose_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_tangent_pose_change, (in[0], in[1], in[2], out[0], out[1]))
 
 /* load due to a known motion
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2509,63 +855,47 @@ static const mstmm_port mstmm_sweep_frames_tangent_pose_change_outputs[] = {
  * out e_S[6] (N, N*m) load due to the known motion
  * out e_b[6] (N, N*m) load due to known increments, without the unknowns
  */
-int mstmm_sweep_frames_tangent_known_load(const real *restrict S, const real *restrict b,
-    const real *restrict g, real *restrict e_S, real *restrict e_b)
+int mstmm_sweep_frames_tangent_known_load(in_t S, in_t b, in_t g, out_t e_S, out_t e_b)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = v0 * b[0];
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = v2 * b[1];
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = v5 * b[2];
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = v8 * b[3];
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = v11 * b[4];
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = v14 * b[5];
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = v17 * b[6];
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = v20 * b[7];
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = v23 * b[8];
-        const two_t v25 = v22 + v24;
-        *(two_free_t *)(e_S + 0 + k) = v25;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(g + 0 + k);
-        const two_t v1 = mstmm_beside(e_S + 0 + k);
-        const two_t v2 = v0 + v1;
-        *(two_free_t *)(e_b + 0 + k) = v2;
-    }
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = v0 * b[0];
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = v2 * b[1];
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = v5 * b[2];
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = v8 * b[3];
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = v11 * b[4];
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = v14 * b[5];
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = v17 * b[6];
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = v20 * b[7];
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = v23 * b[8];
+    const two_t v25 = v22 + v24;
+    *(two_free_t *)(e_S + 0 + k) = v25;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(g + 0 + k);
+    const two_t v1 = mstmm_beside(e_S + 0 + k);
+    const two_t v2 = v0 + v1;
+    *(two_free_t *)(e_b + 0 + k) = v2;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_frames_tangent_known_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_tangent_known_load(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_tangent_known_load_inputs[] = {
-    {"S", 54, "", 0, 0},
-    {"b", 9, "", 0, 0},
-    {"g", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_tangent_known_load_outputs[] = {
-    {"e_S", 6, "N, N*m", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_tangent_known_load, (in[0], in[1], in[2], out[0], out[1]))
 
 /* change of a body's pose by the motion of its parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2576,106 +906,27 @@ static const mstmm_port mstmm_sweep_frames_tangent_known_load_outputs[] = {
  * in  p_I[9] change of the parent's pose, parent axes
  * out p[9] change of pose: rotation, position and velocity of P, own axes
  */
-int mstmm_sweep_frames_placed_displacement(const real *restrict Rc, const real *restrict r,
-    const real *restrict z_I, const real *restrict p_I, real *restrict p)
+int mstmm_sweep_frames_placed_displacement(in_t Rc, in_t r, in_t z_I, in_t p_I, out_t p)
 {
-    const real t0 = Rc[0] * p_I[0];
-    const real t1 = Rc[3] * p_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * p_I[2];
-    const real t4 = t2 + t3;
-    p[0] = t4;
-    const real t5 = Rc[1] * p_I[0];
-    const real t6 = Rc[4] * p_I[1];
-    const real t7 = t5 + t6;
-    const real t8 = Rc[7] * p_I[2];
-    const real t9 = t7 + t8;
-    p[1] = t9;
-    const real t10 = Rc[2] * p_I[0];
-    const real t11 = Rc[5] * p_I[1];
-    const real t12 = t10 + t11;
-    const real t13 = Rc[8] * p_I[2];
-    const real t14 = t12 + t13;
-    p[2] = t14;
-    const real t15 = r[2] * p_I[1];
-    const real t16 = r[1] * p_I[2];
-    const real t17 = t15 - t16;
-    const real t18 = p_I[3] + t17;
-    const real t19 = Rc[0] * t18;
-    const real t20 = r[0] * p_I[2];
-    const real t21 = r[2] * p_I[0];
-    const real t22 = t20 - t21;
-    const real t23 = p_I[4] + t22;
-    const real t24 = Rc[3] * t23;
-    const real t25 = t19 + t24;
-    const real t26 = r[1] * p_I[0];
-    const real t27 = r[0] * p_I[1];
-    const real t28 = t26 - t27;
-    const real t29 = p_I[5] + t28;
-    const real t30 = Rc[6] * t29;
-    const real t31 = t25 + t30;
-    p[3] = t31;
-    const real t32 = Rc[1] * t18;
-    const real t33 = Rc[4] * t23;
-    const real t34 = t32 + t33;
-    const real t35 = Rc[7] * t29;
-    const real t36 = t34 + t35;
-    p[4] = t36;
-    const real t37 = Rc[2] * t18;
-    const real t38 = Rc[5] * t23;
-    const real t39 = t37 + t38;
-    const real t40 = Rc[8] * t29;
-    const real t41 = t39 + t40;
-    p[5] = t41;
-    const real t42 = r[2] * z_I[1];
-    const real t43 = r[1] * z_I[2];
-    const real t44 = t42 - t43;
-    const real t45 = p_I[6] + t44;
-    const real t46 = Rc[0] * t45;
-    const real t47 = r[0] * z_I[2];
-    const real t48 = r[2] * z_I[0];
-    const real t49 = t47 - t48;
-    const real t50 = p_I[7] + t49;
-    const real t51 = Rc[3] * t50;
-    const real t52 = t46 + t51;
-    const real t53 = r[1] * z_I[0];
-    const real t54 = r[0] * z_I[1];
-    const real t55 = t53 - t54;
-    const real t56 = p_I[8] + t55;
-    const real t57 = Rc[6] * t56;
-    const real t58 = t52 + t57;
-    p[6] = t58;
-    const real t59 = Rc[1] * t45;
-    const real t60 = Rc[4] * t50;
-    const real t61 = t59 + t60;
-    const real t62 = Rc[7] * t56;
-    const real t63 = t61 + t62;
-    p[7] = t63;
-    const real t64 = Rc[2] * t45;
-    const real t65 = Rc[5] * t50;
-    const real t66 = t64 + t65;
-    const real t67 = Rc[8] * t56;
-    const real t68 = t66 + t67;
-    p[8] = t68;
-    return 0;
+  p[0] = Rc[0] * p_I[0] + Rc[3] * p_I[1] + Rc[6] * p_I[2];
+  p[1] = Rc[1] * p_I[0] + Rc[4] * p_I[1] + Rc[7] * p_I[2];
+  p[2] = Rc[2] * p_I[0] + Rc[5] * p_I[1] + Rc[8] * p_I[2];
+  real t18 = p_I[3] + (r[2] * p_I[1] - r[1] * p_I[2]);
+  real t23 = p_I[4] + (r[0] * p_I[2] - r[2] * p_I[0]);
+  real t29 = p_I[5] + (r[1] * p_I[0] - r[0] * p_I[1]);
+  p[3] = Rc[0] * t18 + Rc[3] * t23 + Rc[6] * t29;
+  p[4] = Rc[1] * t18 + Rc[4] * t23 + Rc[7] * t29;
+  p[5] = Rc[2] * t18 + Rc[5] * t23 + Rc[8] * t29;
+  real t45 = p_I[6] + (r[2] * z_I[1] - r[1] * z_I[2]);
+  real t50 = p_I[7] + (r[0] * z_I[2] - r[2] * z_I[0]);
+  real t56 = p_I[8] + (r[1] * z_I[0] - r[0] * z_I[1]);
+  p[6] = Rc[0] * t45 + Rc[3] * t50 + Rc[6] * t56;
+  p[7] = Rc[1] * t45 + Rc[4] * t50 + Rc[7] * t56;
+  p[8] = Rc[2] * t45 + Rc[5] * t50 + Rc[8] * t56;
+  return 0;
 }
 
-static int mstmm_sweep_frames_placed_displacement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_placed_displacement(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_placed_displacement_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"p_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_placed_displacement_outputs[] = {
-    {"p", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_placed_displacement, (in[0], in[1], in[2], in[3], out[0]))
 
 /* pose and velocity by a change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2686,85 +937,27 @@ static const mstmm_port mstmm_sweep_frames_placed_displacement_outputs[] = {
  * out d_x[3] (m) displacement of P, inertial axes
  * out d_v[3] (m/s) change of velocity of P, own axes
  */
-int mstmm_sweep_frames_placed_pose(const real *restrict A, const real *restrict p,
-    real *restrict d_A, real *restrict d_x, real *restrict d_v)
+int mstmm_sweep_frames_placed_pose(in_t A, in_t p, out_t d_A, out_t d_x, out_t d_v)
 {
-    const real t0 = A[1] * p[2];
-    const real t1 = A[2] * p[1];
-    const real t2 = t0 - t1;
-    d_A[0] = t2;
-    const real t3 = A[2] * p[0];
-    const real t4 = A[0] * p[2];
-    const real t5 = t3 - t4;
-    d_A[1] = t5;
-    const real t6 = A[0] * p[1];
-    const real t7 = A[1] * p[0];
-    const real t8 = t6 - t7;
-    d_A[2] = t8;
-    const real t9 = A[4] * p[2];
-    const real t10 = A[5] * p[1];
-    const real t11 = t9 - t10;
-    d_A[3] = t11;
-    const real t12 = A[5] * p[0];
-    const real t13 = A[3] * p[2];
-    const real t14 = t12 - t13;
-    d_A[4] = t14;
-    const real t15 = A[3] * p[1];
-    const real t16 = A[4] * p[0];
-    const real t17 = t15 - t16;
-    d_A[5] = t17;
-    const real t18 = A[7] * p[2];
-    const real t19 = A[8] * p[1];
-    const real t20 = t18 - t19;
-    d_A[6] = t20;
-    const real t21 = A[8] * p[0];
-    const real t22 = A[6] * p[2];
-    const real t23 = t21 - t22;
-    d_A[7] = t23;
-    const real t24 = A[6] * p[1];
-    const real t25 = A[7] * p[0];
-    const real t26 = t24 - t25;
-    d_A[8] = t26;
-    const real t27 = A[0] * p[3];
-    const real t28 = A[1] * p[4];
-    const real t29 = t27 + t28;
-    const real t30 = A[2] * p[5];
-    const real t31 = t29 + t30;
-    d_x[0] = t31;
-    const real t32 = A[3] * p[3];
-    const real t33 = A[4] * p[4];
-    const real t34 = t32 + t33;
-    const real t35 = A[5] * p[5];
-    const real t36 = t34 + t35;
-    d_x[1] = t36;
-    const real t37 = A[6] * p[3];
-    const real t38 = A[7] * p[4];
-    const real t39 = t37 + t38;
-    const real t40 = A[8] * p[5];
-    const real t41 = t39 + t40;
-    d_x[2] = t41;
-    d_v[0] = p[6];
-    d_v[1] = p[7];
-    d_v[2] = p[8];
-    return 0;
+  d_A[0] = A[1] * p[2] - A[2] * p[1];
+  d_A[1] = A[2] * p[0] - A[0] * p[2];
+  d_A[2] = A[0] * p[1] - A[1] * p[0];
+  d_A[3] = A[4] * p[2] - A[5] * p[1];
+  d_A[4] = A[5] * p[0] - A[3] * p[2];
+  d_A[5] = A[3] * p[1] - A[4] * p[0];
+  d_A[6] = A[7] * p[2] - A[8] * p[1];
+  d_A[7] = A[8] * p[0] - A[6] * p[2];
+  d_A[8] = A[6] * p[1] - A[7] * p[0];
+  d_x[0] = A[0] * p[3] + A[1] * p[4] + A[2] * p[5];
+  d_x[1] = A[3] * p[3] + A[4] * p[4] + A[5] * p[5];
+  d_x[2] = A[6] * p[3] + A[7] * p[4] + A[8] * p[5];
+  d_v[0] = p[6];
+  d_v[1] = p[7];
+  d_v[2] = p[8];
+  return 0;
 }
 
-static int mstmm_sweep_frames_placed_pose_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_placed_pose(in[0], in[1], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_frames_placed_pose_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"p", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_placed_pose_outputs[] = {
-    {"d_A", 9, "", 0, 0},
-    {"d_x", 3, "m", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_placed_pose, (in[0], in[1], out[0], out[1], out[2]))
 
 /* change of pose along a direction
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2777,67 +970,25 @@ static const mstmm_port mstmm_sweep_frames_placed_pose_outputs[] = {
  * in  Q[9] motion of Q in body axes: w first
  * out B_p[9] change of pose along the direction
  */
-int mstmm_sweep_frames_placed_column(const real *restrict theta, const real *restrict x,
-    const real *restrict v_P, const real *restrict v, const real *restrict d_v,
-    const real *restrict Q, real *restrict B_p)
+int mstmm_sweep_frames_placed_column(in_t theta, in_t x, in_t v_P, in_t v, in_t d_v, in_t Q,
+    out_t B_p)
 {
-    B_p[0] = theta[0];
-    B_p[1] = theta[1];
-    B_p[2] = theta[2];
-    B_p[3] = x[0];
-    B_p[4] = x[1];
-    B_p[5] = x[2];
-    const real t0 = x[2] * Q[1];
-    const real t1 = v_P[1] - v[1];
-    const real t2 = theta[2] * t1;
-    const real t3 = v_P[2] - v[2];
-    const real t4 = theta[1] * t3;
-    const real t5 = t2 - t4;
-    const real t6 = t0 + t5;
-    const real t7 = x[1] * Q[2];
-    const real t8 = t6 - t7;
-    const real t9 = d_v[0] + t8;
-    B_p[6] = t9;
-    const real t10 = x[0] * Q[2];
-    const real t11 = theta[0] * t3;
-    const real t12 = v_P[0] - v[0];
-    const real t13 = theta[2] * t12;
-    const real t14 = t11 - t13;
-    const real t15 = x[2] * Q[0];
-    const real t16 = t14 - t15;
-    const real t17 = t10 + t16;
-    const real t18 = d_v[1] + t17;
-    B_p[7] = t18;
-    const real t19 = x[1] * Q[0];
-    const real t20 = theta[1] * t12;
-    const real t21 = theta[0] * t1;
-    const real t22 = t20 - t21;
-    const real t23 = t19 + t22;
-    const real t24 = x[0] * Q[1];
-    const real t25 = t23 - t24;
-    const real t26 = d_v[2] + t25;
-    B_p[8] = t26;
-    return 0;
+  B_p[0] = theta[0];
+  B_p[1] = theta[1];
+  B_p[2] = theta[2];
+  B_p[3] = x[0];
+  B_p[4] = x[1];
+  B_p[5] = x[2];
+  real t1 = v_P[1] - v[1];
+  real t3 = v_P[2] - v[2];
+  B_p[6] = d_v[0] + (x[2] * Q[1] + (theta[2] * t1 - theta[1] * t3) - x[1] * Q[2]);
+  real t12 = v_P[0] - v[0];
+  B_p[7] = d_v[1] + (x[0] * Q[2] + (theta[0] * t3 - theta[2] * t12 - x[2] * Q[0]));
+  B_p[8] = d_v[2] + (x[1] * Q[0] + (theta[1] * t12 - theta[0] * t1) - x[0] * Q[1]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_placed_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_placed_column(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_placed_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"v_P", 3, "m/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"Q", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_placed_column_outputs[] = {
-    {"B_p", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_placed_column, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* change of a load by the pose, carried to the parent
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2850,1075 +1001,265 @@ static const mstmm_port mstmm_sweep_frames_placed_column_outputs[] = {
  * out S_pI[9][6] S_p of the parent, added to what is there
  * out S_wI[3][6] S of the parent, by angular velocity, added to what is there
  */
-int mstmm_sweep_frames_placed_carry(const real *restrict Rc, const real *restrict r,
-    const real *restrict S_p, real *restrict T_p, real *restrict T_w, real *restrict S_pI,
-    real *restrict S_wI)
+int mstmm_sweep_frames_placed_carry(in_t Rc, in_t r, in_t S_p, out_t T_p, out_t T_w, out_t S_pI,
+    out_t S_wI)
 {
-    const real t0 = Rc[0] * S_p[0];
-    const real t1 = Rc[1] * S_p[6];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[2] * S_p[12];
-    const real t4 = t2 + t3;
-    const real t5 = Rc[6] * S_p[18];
-    const real t6 = Rc[7] * S_p[24];
-    const real t7 = t5 + t6;
-    const real t8 = Rc[8] * S_p[30];
-    const real t9 = t7 + t8;
-    const real t10 = r[1] * t9;
-    const real t11 = Rc[3] * S_p[18];
-    const real t12 = Rc[4] * S_p[24];
-    const real t13 = t11 + t12;
-    const real t14 = Rc[5] * S_p[30];
-    const real t15 = t13 + t14;
-    const real t16 = r[2] * t15;
-    const real t17 = t10 - t16;
-    const real t18 = t4 + t17;
-    T_p[0] = t18;
-    const real t19 = Rc[0] * S_p[1];
-    const real t20 = Rc[1] * S_p[7];
-    const real t21 = t19 + t20;
-    const real t22 = Rc[2] * S_p[13];
-    const real t23 = t21 + t22;
-    const real t24 = Rc[6] * S_p[19];
-    const real t25 = Rc[7] * S_p[25];
-    const real t26 = t24 + t25;
-    const real t27 = Rc[8] * S_p[31];
-    const real t28 = t26 + t27;
-    const real t29 = r[1] * t28;
-    const real t30 = Rc[3] * S_p[19];
-    const real t31 = Rc[4] * S_p[25];
-    const real t32 = t30 + t31;
-    const real t33 = Rc[5] * S_p[31];
-    const real t34 = t32 + t33;
-    const real t35 = r[2] * t34;
-    const real t36 = t29 - t35;
-    const real t37 = t23 + t36;
-    T_p[1] = t37;
-    const real t38 = Rc[0] * S_p[2];
-    const real t39 = Rc[1] * S_p[8];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[2] * S_p[14];
-    const real t42 = t40 + t41;
-    const real t43 = Rc[6] * S_p[20];
-    const real t44 = Rc[7] * S_p[26];
-    const real t45 = t43 + t44;
-    const real t46 = Rc[8] * S_p[32];
-    const real t47 = t45 + t46;
-    const real t48 = r[1] * t47;
-    const real t49 = Rc[3] * S_p[20];
-    const real t50 = Rc[4] * S_p[26];
-    const real t51 = t49 + t50;
-    const real t52 = Rc[5] * S_p[32];
-    const real t53 = t51 + t52;
-    const real t54 = r[2] * t53;
-    const real t55 = t48 - t54;
-    const real t56 = t42 + t55;
-    T_p[2] = t56;
-    const real t57 = Rc[0] * S_p[3];
-    const real t58 = Rc[1] * S_p[9];
-    const real t59 = t57 + t58;
-    const real t60 = Rc[2] * S_p[15];
-    const real t61 = t59 + t60;
-    const real t62 = Rc[6] * S_p[21];
-    const real t63 = Rc[7] * S_p[27];
-    const real t64 = t62 + t63;
-    const real t65 = Rc[8] * S_p[33];
-    const real t66 = t64 + t65;
-    const real t67 = r[1] * t66;
-    const real t68 = Rc[3] * S_p[21];
-    const real t69 = Rc[4] * S_p[27];
-    const real t70 = t68 + t69;
-    const real t71 = Rc[5] * S_p[33];
-    const real t72 = t70 + t71;
-    const real t73 = r[2] * t72;
-    const real t74 = t67 - t73;
-    const real t75 = t61 + t74;
-    T_p[3] = t75;
-    const real t76 = Rc[0] * S_p[4];
-    const real t77 = Rc[1] * S_p[10];
-    const real t78 = t76 + t77;
-    const real t79 = Rc[2] * S_p[16];
-    const real t80 = t78 + t79;
-    const real t81 = Rc[6] * S_p[22];
-    const real t82 = Rc[7] * S_p[28];
-    const real t83 = t81 + t82;
-    const real t84 = Rc[8] * S_p[34];
-    const real t85 = t83 + t84;
-    const real t86 = r[1] * t85;
-    const real t87 = Rc[3] * S_p[22];
-    const real t88 = Rc[4] * S_p[28];
-    const real t89 = t87 + t88;
-    const real t90 = Rc[5] * S_p[34];
-    const real t91 = t89 + t90;
-    const real t92 = r[2] * t91;
-    const real t93 = t86 - t92;
-    const real t94 = t80 + t93;
-    T_p[4] = t94;
-    const real t95 = Rc[0] * S_p[5];
-    const real t96 = Rc[1] * S_p[11];
-    const real t97 = t95 + t96;
-    const real t98 = Rc[2] * S_p[17];
-    const real t99 = t97 + t98;
-    const real t100 = Rc[6] * S_p[23];
-    const real t101 = Rc[7] * S_p[29];
-    const real t102 = t100 + t101;
-    const real t103 = Rc[8] * S_p[35];
-    const real t104 = t102 + t103;
-    const real t105 = r[1] * t104;
-    const real t106 = Rc[3] * S_p[23];
-    const real t107 = Rc[4] * S_p[29];
-    const real t108 = t106 + t107;
-    const real t109 = Rc[5] * S_p[35];
-    const real t110 = t108 + t109;
-    const real t111 = r[2] * t110;
-    const real t112 = t105 - t111;
-    const real t113 = t99 + t112;
-    T_p[5] = t113;
-    const real t114 = Rc[3] * S_p[0];
-    const real t115 = Rc[4] * S_p[6];
-    const real t116 = t114 + t115;
-    const real t117 = Rc[5] * S_p[12];
-    const real t118 = t116 + t117;
-    const real t119 = Rc[0] * S_p[18];
-    const real t120 = Rc[1] * S_p[24];
-    const real t121 = t119 + t120;
-    const real t122 = Rc[2] * S_p[30];
-    const real t123 = t121 + t122;
-    const real t124 = r[2] * t123;
-    const real t125 = r[0] * t9;
-    const real t126 = t124 - t125;
-    const real t127 = t118 + t126;
-    T_p[6] = t127;
-    const real t128 = Rc[3] * S_p[1];
-    const real t129 = Rc[4] * S_p[7];
-    const real t130 = t128 + t129;
-    const real t131 = Rc[5] * S_p[13];
-    const real t132 = t130 + t131;
-    const real t133 = Rc[0] * S_p[19];
-    const real t134 = Rc[1] * S_p[25];
-    const real t135 = t133 + t134;
-    const real t136 = Rc[2] * S_p[31];
-    const real t137 = t135 + t136;
-    const real t138 = r[2] * t137;
-    const real t139 = r[0] * t28;
-    const real t140 = t138 - t139;
-    const real t141 = t132 + t140;
-    T_p[7] = t141;
-    const real t142 = Rc[3] * S_p[2];
-    const real t143 = Rc[4] * S_p[8];
-    const real t144 = t142 + t143;
-    const real t145 = Rc[5] * S_p[14];
-    const real t146 = t144 + t145;
-    const real t147 = Rc[0] * S_p[20];
-    const real t148 = Rc[1] * S_p[26];
-    const real t149 = t147 + t148;
-    const real t150 = Rc[2] * S_p[32];
-    const real t151 = t149 + t150;
-    const real t152 = r[2] * t151;
-    const real t153 = r[0] * t47;
-    const real t154 = t152 - t153;
-    const real t155 = t146 + t154;
-    T_p[8] = t155;
-    const real t156 = Rc[3] * S_p[3];
-    const real t157 = Rc[4] * S_p[9];
-    const real t158 = t156 + t157;
-    const real t159 = Rc[5] * S_p[15];
-    const real t160 = t158 + t159;
-    const real t161 = Rc[0] * S_p[21];
-    const real t162 = Rc[1] * S_p[27];
-    const real t163 = t161 + t162;
-    const real t164 = Rc[2] * S_p[33];
-    const real t165 = t163 + t164;
-    const real t166 = r[2] * t165;
-    const real t167 = r[0] * t66;
-    const real t168 = t166 - t167;
-    const real t169 = t160 + t168;
-    T_p[9] = t169;
-    const real t170 = Rc[3] * S_p[4];
-    const real t171 = Rc[4] * S_p[10];
-    const real t172 = t170 + t171;
-    const real t173 = Rc[5] * S_p[16];
-    const real t174 = t172 + t173;
-    const real t175 = Rc[0] * S_p[22];
-    const real t176 = Rc[1] * S_p[28];
-    const real t177 = t175 + t176;
-    const real t178 = Rc[2] * S_p[34];
-    const real t179 = t177 + t178;
-    const real t180 = r[2] * t179;
-    const real t181 = r[0] * t85;
-    const real t182 = t180 - t181;
-    const real t183 = t174 + t182;
-    T_p[10] = t183;
-    const real t184 = Rc[3] * S_p[5];
-    const real t185 = Rc[4] * S_p[11];
-    const real t186 = t184 + t185;
-    const real t187 = Rc[5] * S_p[17];
-    const real t188 = t186 + t187;
-    const real t189 = Rc[0] * S_p[23];
-    const real t190 = Rc[1] * S_p[29];
-    const real t191 = t189 + t190;
-    const real t192 = Rc[2] * S_p[35];
-    const real t193 = t191 + t192;
-    const real t194 = r[2] * t193;
-    const real t195 = r[0] * t104;
-    const real t196 = t194 - t195;
-    const real t197 = t188 + t196;
-    T_p[11] = t197;
-    const real t198 = Rc[6] * S_p[0];
-    const real t199 = Rc[7] * S_p[6];
-    const real t200 = t198 + t199;
-    const real t201 = Rc[8] * S_p[12];
-    const real t202 = t200 + t201;
-    const real t203 = r[0] * t15;
-    const real t204 = r[1] * t123;
-    const real t205 = t203 - t204;
-    const real t206 = t202 + t205;
-    T_p[12] = t206;
-    const real t207 = Rc[6] * S_p[1];
-    const real t208 = Rc[7] * S_p[7];
-    const real t209 = t207 + t208;
-    const real t210 = Rc[8] * S_p[13];
-    const real t211 = t209 + t210;
-    const real t212 = r[0] * t34;
-    const real t213 = r[1] * t137;
-    const real t214 = t212 - t213;
-    const real t215 = t211 + t214;
-    T_p[13] = t215;
-    const real t216 = Rc[6] * S_p[2];
-    const real t217 = Rc[7] * S_p[8];
-    const real t218 = t216 + t217;
-    const real t219 = Rc[8] * S_p[14];
-    const real t220 = t218 + t219;
-    const real t221 = r[0] * t53;
-    const real t222 = r[1] * t151;
-    const real t223 = t221 - t222;
-    const real t224 = t220 + t223;
-    T_p[14] = t224;
-    const real t225 = Rc[6] * S_p[3];
-    const real t226 = Rc[7] * S_p[9];
-    const real t227 = t225 + t226;
-    const real t228 = Rc[8] * S_p[15];
-    const real t229 = t227 + t228;
-    const real t230 = r[0] * t72;
-    const real t231 = r[1] * t165;
-    const real t232 = t230 - t231;
-    const real t233 = t229 + t232;
-    T_p[15] = t233;
-    const real t234 = Rc[6] * S_p[4];
-    const real t235 = Rc[7] * S_p[10];
-    const real t236 = t234 + t235;
-    const real t237 = Rc[8] * S_p[16];
-    const real t238 = t236 + t237;
-    const real t239 = r[0] * t91;
-    const real t240 = r[1] * t179;
-    const real t241 = t239 - t240;
-    const real t242 = t238 + t241;
-    T_p[16] = t242;
-    const real t243 = Rc[6] * S_p[5];
-    const real t244 = Rc[7] * S_p[11];
-    const real t245 = t243 + t244;
-    const real t246 = Rc[8] * S_p[17];
-    const real t247 = t245 + t246;
-    const real t248 = r[0] * t110;
-    const real t249 = r[1] * t193;
-    const real t250 = t248 - t249;
-    const real t251 = t247 + t250;
-    T_p[17] = t251;
-    T_p[18] = t123;
-    T_p[19] = t137;
-    T_p[20] = t151;
-    T_p[21] = t165;
-    T_p[22] = t179;
-    T_p[23] = t193;
-    T_p[24] = t15;
-    T_p[25] = t34;
-    T_p[26] = t53;
-    T_p[27] = t72;
-    T_p[28] = t91;
-    T_p[29] = t110;
-    T_p[30] = t9;
-    T_p[31] = t28;
-    T_p[32] = t47;
-    T_p[33] = t66;
-    T_p[34] = t85;
-    T_p[35] = t104;
-    const real t252 = Rc[0] * S_p[36];
-    const real t253 = Rc[1] * S_p[42];
-    const real t254 = t252 + t253;
-    const real t255 = Rc[2] * S_p[48];
-    const real t256 = t254 + t255;
-    T_p[36] = t256;
-    const real t257 = Rc[0] * S_p[37];
-    const real t258 = Rc[1] * S_p[43];
-    const real t259 = t257 + t258;
-    const real t260 = Rc[2] * S_p[49];
-    const real t261 = t259 + t260;
-    T_p[37] = t261;
-    const real t262 = Rc[0] * S_p[38];
-    const real t263 = Rc[1] * S_p[44];
-    const real t264 = t262 + t263;
-    const real t265 = Rc[2] * S_p[50];
-    const real t266 = t264 + t265;
-    T_p[38] = t266;
-    const real t267 = Rc[0] * S_p[39];
-    const real t268 = Rc[1] * S_p[45];
-    const real t269 = t267 + t268;
-    const real t270 = Rc[2] * S_p[51];
-    const real t271 = t269 + t270;
-    T_p[39] = t271;
-    const real t272 = Rc[0] * S_p[40];
-    const real t273 = Rc[1] * S_p[46];
-    const real t274 = t272 + t273;
-    const real t275 = Rc[2] * S_p[52];
-    const real t276 = t274 + t275;
-    T_p[40] = t276;
-    const real t277 = Rc[0] * S_p[41];
-    const real t278 = Rc[1] * S_p[47];
-    const real t279 = t277 + t278;
-    const real t280 = Rc[2] * S_p[53];
-    const real t281 = t279 + t280;
-    T_p[41] = t281;
-    const real t282 = Rc[3] * S_p[36];
-    const real t283 = Rc[4] * S_p[42];
-    const real t284 = t282 + t283;
-    const real t285 = Rc[5] * S_p[48];
-    const real t286 = t284 + t285;
-    T_p[42] = t286;
-    const real t287 = Rc[3] * S_p[37];
-    const real t288 = Rc[4] * S_p[43];
-    const real t289 = t287 + t288;
-    const real t290 = Rc[5] * S_p[49];
-    const real t291 = t289 + t290;
-    T_p[43] = t291;
-    const real t292 = Rc[3] * S_p[38];
-    const real t293 = Rc[4] * S_p[44];
-    const real t294 = t292 + t293;
-    const real t295 = Rc[5] * S_p[50];
-    const real t296 = t294 + t295;
-    T_p[44] = t296;
-    const real t297 = Rc[3] * S_p[39];
-    const real t298 = Rc[4] * S_p[45];
-    const real t299 = t297 + t298;
-    const real t300 = Rc[5] * S_p[51];
-    const real t301 = t299 + t300;
-    T_p[45] = t301;
-    const real t302 = Rc[3] * S_p[40];
-    const real t303 = Rc[4] * S_p[46];
-    const real t304 = t302 + t303;
-    const real t305 = Rc[5] * S_p[52];
-    const real t306 = t304 + t305;
-    T_p[46] = t306;
-    const real t307 = Rc[3] * S_p[41];
-    const real t308 = Rc[4] * S_p[47];
-    const real t309 = t307 + t308;
-    const real t310 = Rc[5] * S_p[53];
-    const real t311 = t309 + t310;
-    T_p[47] = t311;
-    const real t312 = Rc[6] * S_p[36];
-    const real t313 = Rc[7] * S_p[42];
-    const real t314 = t312 + t313;
-    const real t315 = Rc[8] * S_p[48];
-    const real t316 = t314 + t315;
-    T_p[48] = t316;
-    const real t317 = Rc[6] * S_p[37];
-    const real t318 = Rc[7] * S_p[43];
-    const real t319 = t317 + t318;
-    const real t320 = Rc[8] * S_p[49];
-    const real t321 = t319 + t320;
-    T_p[49] = t321;
-    const real t322 = Rc[6] * S_p[38];
-    const real t323 = Rc[7] * S_p[44];
-    const real t324 = t322 + t323;
-    const real t325 = Rc[8] * S_p[50];
-    const real t326 = t324 + t325;
-    T_p[50] = t326;
-    const real t327 = Rc[6] * S_p[39];
-    const real t328 = Rc[7] * S_p[45];
-    const real t329 = t327 + t328;
-    const real t330 = Rc[8] * S_p[51];
-    const real t331 = t329 + t330;
-    T_p[51] = t331;
-    const real t332 = Rc[6] * S_p[40];
-    const real t333 = Rc[7] * S_p[46];
-    const real t334 = t332 + t333;
-    const real t335 = Rc[8] * S_p[52];
-    const real t336 = t334 + t335;
-    T_p[52] = t336;
-    const real t337 = Rc[6] * S_p[41];
-    const real t338 = Rc[7] * S_p[47];
-    const real t339 = t337 + t338;
-    const real t340 = Rc[8] * S_p[53];
-    const real t341 = t339 + t340;
-    T_p[53] = t341;
-    const real t342 = r[1] * t316;
-    const real t343 = r[2] * t286;
-    const real t344 = t342 - t343;
-    T_w[0] += t344;
-    const real t345 = r[1] * t321;
-    const real t346 = r[2] * t291;
-    const real t347 = t345 - t346;
-    T_w[1] += t347;
-    const real t348 = r[1] * t326;
-    const real t349 = r[2] * t296;
-    const real t350 = t348 - t349;
-    T_w[2] += t350;
-    const real t351 = r[1] * t331;
-    const real t352 = r[2] * t301;
-    const real t353 = t351 - t352;
-    T_w[3] += t353;
-    const real t354 = r[1] * t336;
-    const real t355 = r[2] * t306;
-    const real t356 = t354 - t355;
-    T_w[4] += t356;
-    const real t357 = r[1] * t341;
-    const real t358 = r[2] * t311;
-    const real t359 = t357 - t358;
-    T_w[5] += t359;
-    const real t360 = r[2] * t256;
-    const real t361 = r[0] * t316;
-    const real t362 = t360 - t361;
-    T_w[6] += t362;
-    const real t363 = r[2] * t261;
-    const real t364 = r[0] * t321;
-    const real t365 = t363 - t364;
-    T_w[7] += t365;
-    const real t366 = r[2] * t266;
-    const real t367 = r[0] * t326;
-    const real t368 = t366 - t367;
-    T_w[8] += t368;
-    const real t369 = r[2] * t271;
-    const real t370 = r[0] * t331;
-    const real t371 = t369 - t370;
-    T_w[9] += t371;
-    const real t372 = r[2] * t276;
-    const real t373 = r[0] * t336;
-    const real t374 = t372 - t373;
-    T_w[10] += t374;
-    const real t375 = r[2] * t281;
-    const real t376 = r[0] * t341;
-    const real t377 = t375 - t376;
-    T_w[11] += t377;
-    const real t378 = r[0] * t286;
-    const real t379 = r[1] * t256;
-    const real t380 = t378 - t379;
-    T_w[12] += t380;
-    const real t381 = r[0] * t291;
-    const real t382 = r[1] * t261;
-    const real t383 = t381 - t382;
-    T_w[13] += t383;
-    const real t384 = r[0] * t296;
-    const real t385 = r[1] * t266;
-    const real t386 = t384 - t385;
-    T_w[14] += t386;
-    const real t387 = r[0] * t301;
-    const real t388 = r[1] * t271;
-    const real t389 = t387 - t388;
-    T_w[15] += t389;
-    const real t390 = r[0] * t306;
-    const real t391 = r[1] * t276;
-    const real t392 = t390 - t391;
-    T_w[16] += t392;
-    const real t393 = r[0] * t311;
-    const real t394 = r[1] * t281;
-    const real t395 = t393 - t394;
-    T_w[17] += t395;
-    const real t396 = Rc[0] * t18;
-    const real t397 = Rc[1] * t37;
-    const real t398 = t396 + t397;
-    const real t399 = Rc[2] * t56;
-    const real t400 = t398 + t399;
-    S_pI[0] += t400;
-    const real t401 = Rc[3] * t18;
-    const real t402 = Rc[4] * t37;
-    const real t403 = t401 + t402;
-    const real t404 = Rc[5] * t56;
-    const real t405 = t403 + t404;
-    S_pI[1] += t405;
-    const real t406 = Rc[6] * t18;
-    const real t407 = Rc[7] * t37;
-    const real t408 = t406 + t407;
-    const real t409 = Rc[8] * t56;
-    const real t410 = t408 + t409;
-    S_pI[2] += t410;
-    const real t411 = r[1] * t410;
-    const real t412 = r[2] * t405;
-    const real t413 = t411 - t412;
-    const real t414 = Rc[0] * t75;
-    const real t415 = Rc[1] * t94;
-    const real t416 = t414 + t415;
-    const real t417 = Rc[2] * t113;
-    const real t418 = t416 + t417;
-    const real t419 = t413 + t418;
-    S_pI[3] += t419;
-    const real t420 = r[2] * t400;
-    const real t421 = r[0] * t410;
-    const real t422 = t420 - t421;
-    const real t423 = Rc[3] * t75;
-    const real t424 = Rc[4] * t94;
-    const real t425 = t423 + t424;
-    const real t426 = Rc[5] * t113;
-    const real t427 = t425 + t426;
-    const real t428 = t422 + t427;
-    S_pI[4] += t428;
-    const real t429 = r[0] * t405;
-    const real t430 = r[1] * t400;
-    const real t431 = t429 - t430;
-    const real t432 = Rc[6] * t75;
-    const real t433 = Rc[7] * t94;
-    const real t434 = t432 + t433;
-    const real t435 = Rc[8] * t113;
-    const real t436 = t434 + t435;
-    const real t437 = t431 + t436;
-    S_pI[5] += t437;
-    const real t438 = Rc[0] * t127;
-    const real t439 = Rc[1] * t141;
-    const real t440 = t438 + t439;
-    const real t441 = Rc[2] * t155;
-    const real t442 = t440 + t441;
-    S_pI[6] += t442;
-    const real t443 = Rc[3] * t127;
-    const real t444 = Rc[4] * t141;
-    const real t445 = t443 + t444;
-    const real t446 = Rc[5] * t155;
-    const real t447 = t445 + t446;
-    S_pI[7] += t447;
-    const real t448 = Rc[6] * t127;
-    const real t449 = Rc[7] * t141;
-    const real t450 = t448 + t449;
-    const real t451 = Rc[8] * t155;
-    const real t452 = t450 + t451;
-    S_pI[8] += t452;
-    const real t453 = r[1] * t452;
-    const real t454 = r[2] * t447;
-    const real t455 = t453 - t454;
-    const real t456 = Rc[0] * t169;
-    const real t457 = Rc[1] * t183;
-    const real t458 = t456 + t457;
-    const real t459 = Rc[2] * t197;
-    const real t460 = t458 + t459;
-    const real t461 = t455 + t460;
-    S_pI[9] += t461;
-    const real t462 = r[2] * t442;
-    const real t463 = r[0] * t452;
-    const real t464 = t462 - t463;
-    const real t465 = Rc[3] * t169;
-    const real t466 = Rc[4] * t183;
-    const real t467 = t465 + t466;
-    const real t468 = Rc[5] * t197;
-    const real t469 = t467 + t468;
-    const real t470 = t464 + t469;
-    S_pI[10] += t470;
-    const real t471 = r[0] * t447;
-    const real t472 = r[1] * t442;
-    const real t473 = t471 - t472;
-    const real t474 = Rc[6] * t169;
-    const real t475 = Rc[7] * t183;
-    const real t476 = t474 + t475;
-    const real t477 = Rc[8] * t197;
-    const real t478 = t476 + t477;
-    const real t479 = t473 + t478;
-    S_pI[11] += t479;
-    const real t480 = Rc[0] * t206;
-    const real t481 = Rc[1] * t215;
-    const real t482 = t480 + t481;
-    const real t483 = Rc[2] * t224;
-    const real t484 = t482 + t483;
-    S_pI[12] += t484;
-    const real t485 = Rc[3] * t206;
-    const real t486 = Rc[4] * t215;
-    const real t487 = t485 + t486;
-    const real t488 = Rc[5] * t224;
-    const real t489 = t487 + t488;
-    S_pI[13] += t489;
-    const real t490 = Rc[6] * t206;
-    const real t491 = Rc[7] * t215;
-    const real t492 = t490 + t491;
-    const real t493 = Rc[8] * t224;
-    const real t494 = t492 + t493;
-    S_pI[14] += t494;
-    const real t495 = r[1] * t494;
-    const real t496 = r[2] * t489;
-    const real t497 = t495 - t496;
-    const real t498 = Rc[0] * t233;
-    const real t499 = Rc[1] * t242;
-    const real t500 = t498 + t499;
-    const real t501 = Rc[2] * t251;
-    const real t502 = t500 + t501;
-    const real t503 = t497 + t502;
-    S_pI[15] += t503;
-    const real t504 = r[2] * t484;
-    const real t505 = r[0] * t494;
-    const real t506 = t504 - t505;
-    const real t507 = Rc[3] * t233;
-    const real t508 = Rc[4] * t242;
-    const real t509 = t507 + t508;
-    const real t510 = Rc[5] * t251;
-    const real t511 = t509 + t510;
-    const real t512 = t506 + t511;
-    S_pI[16] += t512;
-    const real t513 = r[0] * t489;
-    const real t514 = r[1] * t484;
-    const real t515 = t513 - t514;
-    const real t516 = Rc[6] * t233;
-    const real t517 = Rc[7] * t242;
-    const real t518 = t516 + t517;
-    const real t519 = Rc[8] * t251;
-    const real t520 = t518 + t519;
-    const real t521 = t515 + t520;
-    S_pI[17] += t521;
-    const real t522 = Rc[0] * t123;
-    const real t523 = Rc[1] * t137;
-    const real t524 = t522 + t523;
-    const real t525 = Rc[2] * t151;
-    const real t526 = t524 + t525;
-    S_pI[18] += t526;
-    const real t527 = Rc[3] * t123;
-    const real t528 = Rc[4] * t137;
-    const real t529 = t527 + t528;
-    const real t530 = Rc[5] * t151;
-    const real t531 = t529 + t530;
-    S_pI[19] += t531;
-    const real t532 = Rc[6] * t123;
-    const real t533 = Rc[7] * t137;
-    const real t534 = t532 + t533;
-    const real t535 = Rc[8] * t151;
-    const real t536 = t534 + t535;
-    S_pI[20] += t536;
-    const real t537 = r[1] * t536;
-    const real t538 = r[2] * t531;
-    const real t539 = t537 - t538;
-    const real t540 = Rc[0] * t165;
-    const real t541 = Rc[1] * t179;
-    const real t542 = t540 + t541;
-    const real t543 = Rc[2] * t193;
-    const real t544 = t542 + t543;
-    const real t545 = t539 + t544;
-    S_pI[21] += t545;
-    const real t546 = r[2] * t526;
-    const real t547 = r[0] * t536;
-    const real t548 = t546 - t547;
-    const real t549 = Rc[3] * t165;
-    const real t550 = Rc[4] * t179;
-    const real t551 = t549 + t550;
-    const real t552 = Rc[5] * t193;
-    const real t553 = t551 + t552;
-    const real t554 = t548 + t553;
-    S_pI[22] += t554;
-    const real t555 = r[0] * t531;
-    const real t556 = r[1] * t526;
-    const real t557 = t555 - t556;
-    const real t558 = Rc[6] * t165;
-    const real t559 = Rc[7] * t179;
-    const real t560 = t558 + t559;
-    const real t561 = Rc[8] * t193;
-    const real t562 = t560 + t561;
-    const real t563 = t557 + t562;
-    S_pI[23] += t563;
-    const real t564 = Rc[0] * t15;
-    const real t565 = Rc[1] * t34;
-    const real t566 = t564 + t565;
-    const real t567 = Rc[2] * t53;
-    const real t568 = t566 + t567;
-    S_pI[24] += t568;
-    const real t569 = Rc[3] * t15;
-    const real t570 = Rc[4] * t34;
-    const real t571 = t569 + t570;
-    const real t572 = Rc[5] * t53;
-    const real t573 = t571 + t572;
-    S_pI[25] += t573;
-    const real t574 = Rc[6] * t15;
-    const real t575 = Rc[7] * t34;
-    const real t576 = t574 + t575;
-    const real t577 = Rc[8] * t53;
-    const real t578 = t576 + t577;
-    S_pI[26] += t578;
-    const real t579 = r[1] * t578;
-    const real t580 = r[2] * t573;
-    const real t581 = t579 - t580;
-    const real t582 = Rc[0] * t72;
-    const real t583 = Rc[1] * t91;
-    const real t584 = t582 + t583;
-    const real t585 = Rc[2] * t110;
-    const real t586 = t584 + t585;
-    const real t587 = t581 + t586;
-    S_pI[27] += t587;
-    const real t588 = r[2] * t568;
-    const real t589 = r[0] * t578;
-    const real t590 = t588 - t589;
-    const real t591 = Rc[3] * t72;
-    const real t592 = Rc[4] * t91;
-    const real t593 = t591 + t592;
-    const real t594 = Rc[5] * t110;
-    const real t595 = t593 + t594;
-    const real t596 = t590 + t595;
-    S_pI[28] += t596;
-    const real t597 = r[0] * t573;
-    const real t598 = r[1] * t568;
-    const real t599 = t597 - t598;
-    const real t600 = Rc[6] * t72;
-    const real t601 = Rc[7] * t91;
-    const real t602 = t600 + t601;
-    const real t603 = Rc[8] * t110;
-    const real t604 = t602 + t603;
-    const real t605 = t599 + t604;
-    S_pI[29] += t605;
-    const real t606 = Rc[0] * t9;
-    const real t607 = Rc[1] * t28;
-    const real t608 = t606 + t607;
-    const real t609 = Rc[2] * t47;
-    const real t610 = t608 + t609;
-    S_pI[30] += t610;
-    const real t611 = Rc[3] * t9;
-    const real t612 = Rc[4] * t28;
-    const real t613 = t611 + t612;
-    const real t614 = Rc[5] * t47;
-    const real t615 = t613 + t614;
-    S_pI[31] += t615;
-    const real t616 = Rc[6] * t9;
-    const real t617 = Rc[7] * t28;
-    const real t618 = t616 + t617;
-    const real t619 = Rc[8] * t47;
-    const real t620 = t618 + t619;
-    S_pI[32] += t620;
-    const real t621 = r[1] * t620;
-    const real t622 = r[2] * t615;
-    const real t623 = t621 - t622;
-    const real t624 = Rc[0] * t66;
-    const real t625 = Rc[1] * t85;
-    const real t626 = t624 + t625;
-    const real t627 = Rc[2] * t104;
-    const real t628 = t626 + t627;
-    const real t629 = t623 + t628;
-    S_pI[33] += t629;
-    const real t630 = r[2] * t610;
-    const real t631 = r[0] * t620;
-    const real t632 = t630 - t631;
-    const real t633 = Rc[3] * t66;
-    const real t634 = Rc[4] * t85;
-    const real t635 = t633 + t634;
-    const real t636 = Rc[5] * t104;
-    const real t637 = t635 + t636;
-    const real t638 = t632 + t637;
-    S_pI[34] += t638;
-    const real t639 = r[0] * t615;
-    const real t640 = r[1] * t610;
-    const real t641 = t639 - t640;
-    const real t642 = Rc[6] * t66;
-    const real t643 = Rc[7] * t85;
-    const real t644 = t642 + t643;
-    const real t645 = Rc[8] * t104;
-    const real t646 = t644 + t645;
-    const real t647 = t641 + t646;
-    S_pI[35] += t647;
-    const real t648 = Rc[0] * t256;
-    const real t649 = Rc[1] * t261;
-    const real t650 = t648 + t649;
-    const real t651 = Rc[2] * t266;
-    const real t652 = t650 + t651;
-    S_pI[36] += t652;
-    const real t653 = Rc[3] * t256;
-    const real t654 = Rc[4] * t261;
-    const real t655 = t653 + t654;
-    const real t656 = Rc[5] * t266;
-    const real t657 = t655 + t656;
-    S_pI[37] += t657;
-    const real t658 = Rc[6] * t256;
-    const real t659 = Rc[7] * t261;
-    const real t660 = t658 + t659;
-    const real t661 = Rc[8] * t266;
-    const real t662 = t660 + t661;
-    S_pI[38] += t662;
-    const real t663 = r[1] * t662;
-    const real t664 = r[2] * t657;
-    const real t665 = t663 - t664;
-    const real t666 = Rc[0] * t271;
-    const real t667 = Rc[1] * t276;
-    const real t668 = t666 + t667;
-    const real t669 = Rc[2] * t281;
-    const real t670 = t668 + t669;
-    const real t671 = t665 + t670;
-    S_pI[39] += t671;
-    const real t672 = r[2] * t652;
-    const real t673 = r[0] * t662;
-    const real t674 = t672 - t673;
-    const real t675 = Rc[3] * t271;
-    const real t676 = Rc[4] * t276;
-    const real t677 = t675 + t676;
-    const real t678 = Rc[5] * t281;
-    const real t679 = t677 + t678;
-    const real t680 = t674 + t679;
-    S_pI[40] += t680;
-    const real t681 = r[0] * t657;
-    const real t682 = r[1] * t652;
-    const real t683 = t681 - t682;
-    const real t684 = Rc[6] * t271;
-    const real t685 = Rc[7] * t276;
-    const real t686 = t684 + t685;
-    const real t687 = Rc[8] * t281;
-    const real t688 = t686 + t687;
-    const real t689 = t683 + t688;
-    S_pI[41] += t689;
-    const real t690 = Rc[0] * t286;
-    const real t691 = Rc[1] * t291;
-    const real t692 = t690 + t691;
-    const real t693 = Rc[2] * t296;
-    const real t694 = t692 + t693;
-    S_pI[42] += t694;
-    const real t695 = Rc[3] * t286;
-    const real t696 = Rc[4] * t291;
-    const real t697 = t695 + t696;
-    const real t698 = Rc[5] * t296;
-    const real t699 = t697 + t698;
-    S_pI[43] += t699;
-    const real t700 = Rc[6] * t286;
-    const real t701 = Rc[7] * t291;
-    const real t702 = t700 + t701;
-    const real t703 = Rc[8] * t296;
-    const real t704 = t702 + t703;
-    S_pI[44] += t704;
-    const real t705 = r[1] * t704;
-    const real t706 = r[2] * t699;
-    const real t707 = t705 - t706;
-    const real t708 = Rc[0] * t301;
-    const real t709 = Rc[1] * t306;
-    const real t710 = t708 + t709;
-    const real t711 = Rc[2] * t311;
-    const real t712 = t710 + t711;
-    const real t713 = t707 + t712;
-    S_pI[45] += t713;
-    const real t714 = r[2] * t694;
-    const real t715 = r[0] * t704;
-    const real t716 = t714 - t715;
-    const real t717 = Rc[3] * t301;
-    const real t718 = Rc[4] * t306;
-    const real t719 = t717 + t718;
-    const real t720 = Rc[5] * t311;
-    const real t721 = t719 + t720;
-    const real t722 = t716 + t721;
-    S_pI[46] += t722;
-    const real t723 = r[0] * t699;
-    const real t724 = r[1] * t694;
-    const real t725 = t723 - t724;
-    const real t726 = Rc[6] * t301;
-    const real t727 = Rc[7] * t306;
-    const real t728 = t726 + t727;
-    const real t729 = Rc[8] * t311;
-    const real t730 = t728 + t729;
-    const real t731 = t725 + t730;
-    S_pI[47] += t731;
-    const real t732 = Rc[0] * t316;
-    const real t733 = Rc[1] * t321;
-    const real t734 = t732 + t733;
-    const real t735 = Rc[2] * t326;
-    const real t736 = t734 + t735;
-    S_pI[48] += t736;
-    const real t737 = Rc[3] * t316;
-    const real t738 = Rc[4] * t321;
-    const real t739 = t737 + t738;
-    const real t740 = Rc[5] * t326;
-    const real t741 = t739 + t740;
-    S_pI[49] += t741;
-    const real t742 = Rc[6] * t316;
-    const real t743 = Rc[7] * t321;
-    const real t744 = t742 + t743;
-    const real t745 = Rc[8] * t326;
-    const real t746 = t744 + t745;
-    S_pI[50] += t746;
-    const real t747 = r[1] * t746;
-    const real t748 = r[2] * t741;
-    const real t749 = t747 - t748;
-    const real t750 = Rc[0] * t331;
-    const real t751 = Rc[1] * t336;
-    const real t752 = t750 + t751;
-    const real t753 = Rc[2] * t341;
-    const real t754 = t752 + t753;
-    const real t755 = t749 + t754;
-    S_pI[51] += t755;
-    const real t756 = r[2] * t736;
-    const real t757 = r[0] * t746;
-    const real t758 = t756 - t757;
-    const real t759 = Rc[3] * t331;
-    const real t760 = Rc[4] * t336;
-    const real t761 = t759 + t760;
-    const real t762 = Rc[5] * t341;
-    const real t763 = t761 + t762;
-    const real t764 = t758 + t763;
-    S_pI[52] += t764;
-    const real t765 = r[0] * t741;
-    const real t766 = r[1] * t736;
-    const real t767 = t765 - t766;
-    const real t768 = Rc[6] * t331;
-    const real t769 = Rc[7] * t336;
-    const real t770 = t768 + t769;
-    const real t771 = Rc[8] * t341;
-    const real t772 = t770 + t771;
-    const real t773 = t767 + t772;
-    S_pI[53] += t773;
-    const real t774 = Rc[0] * t344;
-    const real t775 = Rc[1] * t347;
-    const real t776 = t774 + t775;
-    const real t777 = Rc[2] * t350;
-    const real t778 = t776 + t777;
-    S_wI[0] += t778;
-    const real t779 = Rc[3] * t344;
-    const real t780 = Rc[4] * t347;
-    const real t781 = t779 + t780;
-    const real t782 = Rc[5] * t350;
-    const real t783 = t781 + t782;
-    S_wI[1] += t783;
-    const real t784 = Rc[6] * t344;
-    const real t785 = Rc[7] * t347;
-    const real t786 = t784 + t785;
-    const real t787 = Rc[8] * t350;
-    const real t788 = t786 + t787;
-    S_wI[2] += t788;
-    const real t789 = r[1] * t788;
-    const real t790 = r[2] * t783;
-    const real t791 = t789 - t790;
-    const real t792 = Rc[0] * t353;
-    const real t793 = Rc[1] * t356;
-    const real t794 = t792 + t793;
-    const real t795 = Rc[2] * t359;
-    const real t796 = t794 + t795;
-    const real t797 = t791 + t796;
-    S_wI[3] += t797;
-    const real t798 = r[2] * t778;
-    const real t799 = r[0] * t788;
-    const real t800 = t798 - t799;
-    const real t801 = Rc[3] * t353;
-    const real t802 = Rc[4] * t356;
-    const real t803 = t801 + t802;
-    const real t804 = Rc[5] * t359;
-    const real t805 = t803 + t804;
-    const real t806 = t800 + t805;
-    S_wI[4] += t806;
-    const real t807 = r[0] * t783;
-    const real t808 = r[1] * t778;
-    const real t809 = t807 - t808;
-    const real t810 = Rc[6] * t353;
-    const real t811 = Rc[7] * t356;
-    const real t812 = t810 + t811;
-    const real t813 = Rc[8] * t359;
-    const real t814 = t812 + t813;
-    const real t815 = t809 + t814;
-    S_wI[5] += t815;
-    const real t816 = Rc[0] * t362;
-    const real t817 = Rc[1] * t365;
-    const real t818 = t816 + t817;
-    const real t819 = Rc[2] * t368;
-    const real t820 = t818 + t819;
-    S_wI[6] += t820;
-    const real t821 = Rc[3] * t362;
-    const real t822 = Rc[4] * t365;
-    const real t823 = t821 + t822;
-    const real t824 = Rc[5] * t368;
-    const real t825 = t823 + t824;
-    S_wI[7] += t825;
-    const real t826 = Rc[6] * t362;
-    const real t827 = Rc[7] * t365;
-    const real t828 = t826 + t827;
-    const real t829 = Rc[8] * t368;
-    const real t830 = t828 + t829;
-    S_wI[8] += t830;
-    const real t831 = r[1] * t830;
-    const real t832 = r[2] * t825;
-    const real t833 = t831 - t832;
-    const real t834 = Rc[0] * t371;
-    const real t835 = Rc[1] * t374;
-    const real t836 = t834 + t835;
-    const real t837 = Rc[2] * t377;
-    const real t838 = t836 + t837;
-    const real t839 = t833 + t838;
-    S_wI[9] += t839;
-    const real t840 = r[2] * t820;
-    const real t841 = r[0] * t830;
-    const real t842 = t840 - t841;
-    const real t843 = Rc[3] * t371;
-    const real t844 = Rc[4] * t374;
-    const real t845 = t843 + t844;
-    const real t846 = Rc[5] * t377;
-    const real t847 = t845 + t846;
-    const real t848 = t842 + t847;
-    S_wI[10] += t848;
-    const real t849 = r[0] * t825;
-    const real t850 = r[1] * t820;
-    const real t851 = t849 - t850;
-    const real t852 = Rc[6] * t371;
-    const real t853 = Rc[7] * t374;
-    const real t854 = t852 + t853;
-    const real t855 = Rc[8] * t377;
-    const real t856 = t854 + t855;
-    const real t857 = t851 + t856;
-    S_wI[11] += t857;
-    const real t858 = Rc[0] * t380;
-    const real t859 = Rc[1] * t383;
-    const real t860 = t858 + t859;
-    const real t861 = Rc[2] * t386;
-    const real t862 = t860 + t861;
-    S_wI[12] += t862;
-    const real t863 = Rc[3] * t380;
-    const real t864 = Rc[4] * t383;
-    const real t865 = t863 + t864;
-    const real t866 = Rc[5] * t386;
-    const real t867 = t865 + t866;
-    S_wI[13] += t867;
-    const real t868 = Rc[6] * t380;
-    const real t869 = Rc[7] * t383;
-    const real t870 = t868 + t869;
-    const real t871 = Rc[8] * t386;
-    const real t872 = t870 + t871;
-    S_wI[14] += t872;
-    const real t873 = r[1] * t872;
-    const real t874 = r[2] * t867;
-    const real t875 = t873 - t874;
-    const real t876 = Rc[0] * t389;
-    const real t877 = Rc[1] * t392;
-    const real t878 = t876 + t877;
-    const real t879 = Rc[2] * t395;
-    const real t880 = t878 + t879;
-    const real t881 = t875 + t880;
-    S_wI[15] += t881;
-    const real t882 = r[2] * t862;
-    const real t883 = r[0] * t872;
-    const real t884 = t882 - t883;
-    const real t885 = Rc[3] * t389;
-    const real t886 = Rc[4] * t392;
-    const real t887 = t885 + t886;
-    const real t888 = Rc[5] * t395;
-    const real t889 = t887 + t888;
-    const real t890 = t884 + t889;
-    S_wI[16] += t890;
-    const real t891 = r[0] * t867;
-    const real t892 = r[1] * t862;
-    const real t893 = t891 - t892;
-    const real t894 = Rc[6] * t389;
-    const real t895 = Rc[7] * t392;
-    const real t896 = t894 + t895;
-    const real t897 = Rc[8] * t395;
-    const real t898 = t896 + t897;
-    const real t899 = t893 + t898;
-    S_wI[17] += t899;
-    return 0;
+  real t9 = Rc[6] * S_p[18] + Rc[7] * S_p[24] + Rc[8] * S_p[30];
+  real t15 = Rc[3] * S_p[18] + Rc[4] * S_p[24] + Rc[5] * S_p[30];
+  real t18 = Rc[0] * S_p[0] + Rc[1] * S_p[6] + Rc[2] * S_p[12] + (r[1] * t9 - r[2] * t15);
+  T_p[0] = t18;
+  real t28 = Rc[6] * S_p[19] + Rc[7] * S_p[25] + Rc[8] * S_p[31];
+  real t34 = Rc[3] * S_p[19] + Rc[4] * S_p[25] + Rc[5] * S_p[31];
+  real t37 = Rc[0] * S_p[1] + Rc[1] * S_p[7] + Rc[2] * S_p[13] + (r[1] * t28 - r[2] * t34);
+  T_p[1] = t37;
+  real t47 = Rc[6] * S_p[20] + Rc[7] * S_p[26] + Rc[8] * S_p[32];
+  real t53 = Rc[3] * S_p[20] + Rc[4] * S_p[26] + Rc[5] * S_p[32];
+  real t56 = Rc[0] * S_p[2] + Rc[1] * S_p[8] + Rc[2] * S_p[14] + (r[1] * t47 - r[2] * t53);
+  T_p[2] = t56;
+  real t66 = Rc[6] * S_p[21] + Rc[7] * S_p[27] + Rc[8] * S_p[33];
+  real t72 = Rc[3] * S_p[21] + Rc[4] * S_p[27] + Rc[5] * S_p[33];
+  real t75 = Rc[0] * S_p[3] + Rc[1] * S_p[9] + Rc[2] * S_p[15] + (r[1] * t66 - r[2] * t72);
+  T_p[3] = t75;
+  real t85 = Rc[6] * S_p[22] + Rc[7] * S_p[28] + Rc[8] * S_p[34];
+  real t91 = Rc[3] * S_p[22] + Rc[4] * S_p[28] + Rc[5] * S_p[34];
+  real t94 = Rc[0] * S_p[4] + Rc[1] * S_p[10] + Rc[2] * S_p[16] + (r[1] * t85 - r[2] * t91);
+  T_p[4] = t94;
+  real t104 = Rc[6] * S_p[23] + Rc[7] * S_p[29] + Rc[8] * S_p[35];
+  real t110 = Rc[3] * S_p[23] + Rc[4] * S_p[29] + Rc[5] * S_p[35];
+  real t113 = Rc[0] * S_p[5] + Rc[1] * S_p[11] + Rc[2] * S_p[17] + (r[1] * t104 - r[2] * t110);
+  T_p[5] = t113;
+  real t123 = Rc[0] * S_p[18] + Rc[1] * S_p[24] + Rc[2] * S_p[30];
+  real t127 = Rc[3] * S_p[0] + Rc[4] * S_p[6] + Rc[5] * S_p[12] + (r[2] * t123 - r[0] * t9);
+  T_p[6] = t127;
+  real t137 = Rc[0] * S_p[19] + Rc[1] * S_p[25] + Rc[2] * S_p[31];
+  real t141 = Rc[3] * S_p[1] + Rc[4] * S_p[7] + Rc[5] * S_p[13] + (r[2] * t137 - r[0] * t28);
+  T_p[7] = t141;
+  real t151 = Rc[0] * S_p[20] + Rc[1] * S_p[26] + Rc[2] * S_p[32];
+  real t155 = Rc[3] * S_p[2] + Rc[4] * S_p[8] + Rc[5] * S_p[14] + (r[2] * t151 - r[0] * t47);
+  T_p[8] = t155;
+  real t165 = Rc[0] * S_p[21] + Rc[1] * S_p[27] + Rc[2] * S_p[33];
+  real t169 = Rc[3] * S_p[3] + Rc[4] * S_p[9] + Rc[5] * S_p[15] + (r[2] * t165 - r[0] * t66);
+  T_p[9] = t169;
+  real t179 = Rc[0] * S_p[22] + Rc[1] * S_p[28] + Rc[2] * S_p[34];
+  real t183 = Rc[3] * S_p[4] + Rc[4] * S_p[10] + Rc[5] * S_p[16] + (r[2] * t179 - r[0] * t85);
+  T_p[10] = t183;
+  real t193 = Rc[0] * S_p[23] + Rc[1] * S_p[29] + Rc[2] * S_p[35];
+  real t197 = Rc[3] * S_p[5] + Rc[4] * S_p[11] + Rc[5] * S_p[17] + (r[2] * t193 - r[0] * t104);
+  T_p[11] = t197;
+  real t206 = Rc[6] * S_p[0] + Rc[7] * S_p[6] + Rc[8] * S_p[12] + (r[0] * t15 - r[1] * t123);
+  T_p[12] = t206;
+  real t215 = Rc[6] * S_p[1] + Rc[7] * S_p[7] + Rc[8] * S_p[13] + (r[0] * t34 - r[1] * t137);
+  T_p[13] = t215;
+  real t224 = Rc[6] * S_p[2] + Rc[7] * S_p[8] + Rc[8] * S_p[14] + (r[0] * t53 - r[1] * t151);
+  T_p[14] = t224;
+  real t233 = Rc[6] * S_p[3] + Rc[7] * S_p[9] + Rc[8] * S_p[15] + (r[0] * t72 - r[1] * t165);
+  T_p[15] = t233;
+  real t242 = Rc[6] * S_p[4] + Rc[7] * S_p[10] + Rc[8] * S_p[16] + (r[0] * t91 - r[1] * t179);
+  T_p[16] = t242;
+  real t251 = Rc[6] * S_p[5] + Rc[7] * S_p[11] + Rc[8] * S_p[17] + (r[0] * t110 - r[1] * t193);
+  T_p[17] = t251;
+  T_p[18] = t123;
+  T_p[19] = t137;
+  T_p[20] = t151;
+  T_p[21] = t165;
+  T_p[22] = t179;
+  T_p[23] = t193;
+  T_p[24] = t15;
+  T_p[25] = t34;
+  T_p[26] = t53;
+  T_p[27] = t72;
+  T_p[28] = t91;
+  T_p[29] = t110;
+  T_p[30] = t9;
+  T_p[31] = t28;
+  T_p[32] = t47;
+  T_p[33] = t66;
+  T_p[34] = t85;
+  T_p[35] = t104;
+  real t256 = Rc[0] * S_p[36] + Rc[1] * S_p[42] + Rc[2] * S_p[48];
+  T_p[36] = t256;
+  real t261 = Rc[0] * S_p[37] + Rc[1] * S_p[43] + Rc[2] * S_p[49];
+  T_p[37] = t261;
+  real t266 = Rc[0] * S_p[38] + Rc[1] * S_p[44] + Rc[2] * S_p[50];
+  T_p[38] = t266;
+  real t271 = Rc[0] * S_p[39] + Rc[1] * S_p[45] + Rc[2] * S_p[51];
+  T_p[39] = t271;
+  real t276 = Rc[0] * S_p[40] + Rc[1] * S_p[46] + Rc[2] * S_p[52];
+  T_p[40] = t276;
+  real t281 = Rc[0] * S_p[41] + Rc[1] * S_p[47] + Rc[2] * S_p[53];
+  T_p[41] = t281;
+  real t286 = Rc[3] * S_p[36] + Rc[4] * S_p[42] + Rc[5] * S_p[48];
+  T_p[42] = t286;
+  real t291 = Rc[3] * S_p[37] + Rc[4] * S_p[43] + Rc[5] * S_p[49];
+  T_p[43] = t291;
+  real t296 = Rc[3] * S_p[38] + Rc[4] * S_p[44] + Rc[5] * S_p[50];
+  T_p[44] = t296;
+  real t301 = Rc[3] * S_p[39] + Rc[4] * S_p[45] + Rc[5] * S_p[51];
+  T_p[45] = t301;
+  real t306 = Rc[3] * S_p[40] + Rc[4] * S_p[46] + Rc[5] * S_p[52];
+  T_p[46] = t306;
+  real t311 = Rc[3] * S_p[41] + Rc[4] * S_p[47] + Rc[5] * S_p[53];
+  T_p[47] = t311;
+  real t316 = Rc[6] * S_p[36] + Rc[7] * S_p[42] + Rc[8] * S_p[48];
+  T_p[48] = t316;
+  real t321 = Rc[6] * S_p[37] + Rc[7] * S_p[43] + Rc[8] * S_p[49];
+  T_p[49] = t321;
+  real t326 = Rc[6] * S_p[38] + Rc[7] * S_p[44] + Rc[8] * S_p[50];
+  T_p[50] = t326;
+  real t331 = Rc[6] * S_p[39] + Rc[7] * S_p[45] + Rc[8] * S_p[51];
+  T_p[51] = t331;
+  real t336 = Rc[6] * S_p[40] + Rc[7] * S_p[46] + Rc[8] * S_p[52];
+  T_p[52] = t336;
+  real t341 = Rc[6] * S_p[41] + Rc[7] * S_p[47] + Rc[8] * S_p[53];
+  T_p[53] = t341;
+  real t344 = r[1] * t316 - r[2] * t286;
+  T_w[0] += t344;
+  real t347 = r[1] * t321 - r[2] * t291;
+  T_w[1] += t347;
+  real t350 = r[1] * t326 - r[2] * t296;
+  T_w[2] += t350;
+  real t353 = r[1] * t331 - r[2] * t301;
+  T_w[3] += t353;
+  real t356 = r[1] * t336 - r[2] * t306;
+  T_w[4] += t356;
+  real t359 = r[1] * t341 - r[2] * t311;
+  T_w[5] += t359;
+  real t362 = r[2] * t256 - r[0] * t316;
+  T_w[6] += t362;
+  real t365 = r[2] * t261 - r[0] * t321;
+  T_w[7] += t365;
+  real t368 = r[2] * t266 - r[0] * t326;
+  T_w[8] += t368;
+  real t371 = r[2] * t271 - r[0] * t331;
+  T_w[9] += t371;
+  real t374 = r[2] * t276 - r[0] * t336;
+  T_w[10] += t374;
+  real t377 = r[2] * t281 - r[0] * t341;
+  T_w[11] += t377;
+  real t380 = r[0] * t286 - r[1] * t256;
+  T_w[12] += t380;
+  real t383 = r[0] * t291 - r[1] * t261;
+  T_w[13] += t383;
+  real t386 = r[0] * t296 - r[1] * t266;
+  T_w[14] += t386;
+  real t389 = r[0] * t301 - r[1] * t271;
+  T_w[15] += t389;
+  real t392 = r[0] * t306 - r[1] * t276;
+  T_w[16] += t392;
+  real t395 = r[0] * t311 - r[1] * t281;
+  T_w[17] += t395;
+  real t400 = Rc[0] * t18 + Rc[1] * t37 + Rc[2] * t56;
+  S_pI[0] += t400;
+  real t405 = Rc[3] * t18 + Rc[4] * t37 + Rc[5] * t56;
+  S_pI[1] += t405;
+  real t410 = Rc[6] * t18 + Rc[7] * t37 + Rc[8] * t56;
+  S_pI[2] += t410;
+  S_pI[3] += r[1] * t410 - r[2] * t405 + (Rc[0] * t75 + Rc[1] * t94 + Rc[2] * t113);
+  S_pI[4] += r[2] * t400 - r[0] * t410 + (Rc[3] * t75 + Rc[4] * t94 + Rc[5] * t113);
+  S_pI[5] += r[0] * t405 - r[1] * t400 + (Rc[6] * t75 + Rc[7] * t94 + Rc[8] * t113);
+  real t442 = Rc[0] * t127 + Rc[1] * t141 + Rc[2] * t155;
+  S_pI[6] += t442;
+  real t447 = Rc[3] * t127 + Rc[4] * t141 + Rc[5] * t155;
+  S_pI[7] += t447;
+  real t452 = Rc[6] * t127 + Rc[7] * t141 + Rc[8] * t155;
+  S_pI[8] += t452;
+  S_pI[9] += r[1] * t452 - r[2] * t447 + (Rc[0] * t169 + Rc[1] * t183 + Rc[2] * t197);
+  S_pI[10] += r[2] * t442 - r[0] * t452 + (Rc[3] * t169 + Rc[4] * t183 + Rc[5] * t197);
+  S_pI[11] += r[0] * t447 - r[1] * t442 + (Rc[6] * t169 + Rc[7] * t183 + Rc[8] * t197);
+  real t484 = Rc[0] * t206 + Rc[1] * t215 + Rc[2] * t224;
+  S_pI[12] += t484;
+  real t489 = Rc[3] * t206 + Rc[4] * t215 + Rc[5] * t224;
+  S_pI[13] += t489;
+  real t494 = Rc[6] * t206 + Rc[7] * t215 + Rc[8] * t224;
+  S_pI[14] += t494;
+  S_pI[15] += r[1] * t494 - r[2] * t489 + (Rc[0] * t233 + Rc[1] * t242 + Rc[2] * t251);
+  S_pI[16] += r[2] * t484 - r[0] * t494 + (Rc[3] * t233 + Rc[4] * t242 + Rc[5] * t251);
+  S_pI[17] += r[0] * t489 - r[1] * t484 + (Rc[6] * t233 + Rc[7] * t242 + Rc[8] * t251);
+  real t526 = Rc[0] * t123 + Rc[1] * t137 + Rc[2] * t151;
+  S_pI[18] += t526;
+  real t531 = Rc[3] * t123 + Rc[4] * t137 + Rc[5] * t151;
+  S_pI[19] += t531;
+  real t536 = Rc[6] * t123 + Rc[7] * t137 + Rc[8] * t151;
+  S_pI[20] += t536;
+  S_pI[21] += r[1] * t536 - r[2] * t531 + (Rc[0] * t165 + Rc[1] * t179 + Rc[2] * t193);
+  S_pI[22] += r[2] * t526 - r[0] * t536 + (Rc[3] * t165 + Rc[4] * t179 + Rc[5] * t193);
+  S_pI[23] += r[0] * t531 - r[1] * t526 + (Rc[6] * t165 + Rc[7] * t179 + Rc[8] * t193);
+  real t568 = Rc[0] * t15 + Rc[1] * t34 + Rc[2] * t53;
+  S_pI[24] += t568;
+  real t573 = Rc[3] * t15 + Rc[4] * t34 + Rc[5] * t53;
+  S_pI[25] += t573;
+  real t578 = Rc[6] * t15 + Rc[7] * t34 + Rc[8] * t53;
+  S_pI[26] += t578;
+  S_pI[27] += r[1] * t578 - r[2] * t573 + (Rc[0] * t72 + Rc[1] * t91 + Rc[2] * t110);
+  S_pI[28] += r[2] * t568 - r[0] * t578 + (Rc[3] * t72 + Rc[4] * t91 + Rc[5] * t110);
+  S_pI[29] += r[0] * t573 - r[1] * t568 + (Rc[6] * t72 + Rc[7] * t91 + Rc[8] * t110);
+  real t610 = Rc[0] * t9 + Rc[1] * t28 + Rc[2] * t47;
+  S_pI[30] += t610;
+  real t615 = Rc[3] * t9 + Rc[4] * t28 + Rc[5] * t47;
+  S_pI[31] += t615;
+  real t620 = Rc[6] * t9 + Rc[7] * t28 + Rc[8] * t47;
+  S_pI[32] += t620;
+  S_pI[33] += r[1] * t620 - r[2] * t615 + (Rc[0] * t66 + Rc[1] * t85 + Rc[2] * t104);
+  S_pI[34] += r[2] * t610 - r[0] * t620 + (Rc[3] * t66 + Rc[4] * t85 + Rc[5] * t104);
+  S_pI[35] += r[0] * t615 - r[1] * t610 + (Rc[6] * t66 + Rc[7] * t85 + Rc[8] * t104);
+  real t652 = Rc[0] * t256 + Rc[1] * t261 + Rc[2] * t266;
+  S_pI[36] += t652;
+  real t657 = Rc[3] * t256 + Rc[4] * t261 + Rc[5] * t266;
+  S_pI[37] += t657;
+  real t662 = Rc[6] * t256 + Rc[7] * t261 + Rc[8] * t266;
+  S_pI[38] += t662;
+  S_pI[39] += r[1] * t662 - r[2] * t657 + (Rc[0] * t271 + Rc[1] * t276 + Rc[2] * t281);
+  S_pI[40] += r[2] * t652 - r[0] * t662 + (Rc[3] * t271 + Rc[4] * t276 + Rc[5] * t281);
+  S_pI[41] += r[0] * t657 - r[1] * t652 + (Rc[6] * t271 + Rc[7] * t276 + Rc[8] * t281);
+  real t694 = Rc[0] * t286 + Rc[1] * t291 + Rc[2] * t296;
+  S_pI[42] += t694;
+  real t699 = Rc[3] * t286 + Rc[4] * t291 + Rc[5] * t296;
+  S_pI[43] += t699;
+  real t704 = Rc[6] * t286 + Rc[7] * t291 + Rc[8] * t296;
+  S_pI[44] += t704;
+  S_pI[45] += r[1] * t704 - r[2] * t699 + (Rc[0] * t301 + Rc[1] * t306 + Rc[2] * t311);
+  S_pI[46] += r[2] * t694 - r[0] * t704 + (Rc[3] * t301 + Rc[4] * t306 + Rc[5] * t311);
+  S_pI[47] += r[0] * t699 - r[1] * t694 + (Rc[6] * t301 + Rc[7] * t306 + Rc[8] * t311);
+  real t736 = Rc[0] * t316 + Rc[1] * t321 + Rc[2] * t326;
+  S_pI[48] += t736;
+  real t741 = Rc[3] * t316 + Rc[4] * t321 + Rc[5] * t326;
+  S_pI[49] += t741;
+  real t746 = Rc[6] * t316 + Rc[7] * t321 + Rc[8] * t326;
+  S_pI[50] += t746;
+  S_pI[51] += r[1] * t746 - r[2] * t741 + (Rc[0] * t331 + Rc[1] * t336 + Rc[2] * t341);
+  S_pI[52] += r[2] * t736 - r[0] * t746 + (Rc[3] * t331 + Rc[4] * t336 + Rc[5] * t341);
+  S_pI[53] += r[0] * t741 - r[1] * t736 + (Rc[6] * t331 + Rc[7] * t336 + Rc[8] * t341);
+  real t778 = Rc[0] * t344 + Rc[1] * t347 + Rc[2] * t350;
+  S_wI[0] += t778;
+  real t783 = Rc[3] * t344 + Rc[4] * t347 + Rc[5] * t350;
+  S_wI[1] += t783;
+  real t788 = Rc[6] * t344 + Rc[7] * t347 + Rc[8] * t350;
+  S_wI[2] += t788;
+  S_wI[3] += r[1] * t788 - r[2] * t783 + (Rc[0] * t353 + Rc[1] * t356 + Rc[2] * t359);
+  S_wI[4] += r[2] * t778 - r[0] * t788 + (Rc[3] * t353 + Rc[4] * t356 + Rc[5] * t359);
+  S_wI[5] += r[0] * t783 - r[1] * t778 + (Rc[6] * t353 + Rc[7] * t356 + Rc[8] * t359);
+  real t820 = Rc[0] * t362 + Rc[1] * t365 + Rc[2] * t368;
+  S_wI[6] += t820;
+  real t825 = Rc[3] * t362 + Rc[4] * t365 + Rc[5] * t368;
+  S_wI[7] += t825;
+  real t830 = Rc[6] * t362 + Rc[7] * t365 + Rc[8] * t368;
+  S_wI[8] += t830;
+  S_wI[9] += r[1] * t830 - r[2] * t825 + (Rc[0] * t371 + Rc[1] * t374 + Rc[2] * t377);
+  S_wI[10] += r[2] * t820 - r[0] * t830 + (Rc[3] * t371 + Rc[4] * t374 + Rc[5] * t377);
+  S_wI[11] += r[0] * t825 - r[1] * t820 + (Rc[6] * t371 + Rc[7] * t374 + Rc[8] * t377);
+  real t862 = Rc[0] * t380 + Rc[1] * t383 + Rc[2] * t386;
+  S_wI[12] += t862;
+  real t867 = Rc[3] * t380 + Rc[4] * t383 + Rc[5] * t386;
+  S_wI[13] += t867;
+  real t872 = Rc[6] * t380 + Rc[7] * t383 + Rc[8] * t386;
+  S_wI[14] += t872;
+  S_wI[15] += r[1] * t872 - r[2] * t867 + (Rc[0] * t389 + Rc[1] * t392 + Rc[2] * t395);
+  S_wI[16] += r[2] * t862 - r[0] * t872 + (Rc[3] * t389 + Rc[4] * t392 + Rc[5] * t395);
+  S_wI[17] += r[0] * t867 - r[1] * t862 + (Rc[6] * t389 + Rc[7] * t392 + Rc[8] * t395);
+  return 0;
 }
 
-static int mstmm_sweep_frames_placed_carry_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_placed_carry(in[0], in[1], in[2], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_frames_placed_carry_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"S_p", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_placed_carry_outputs[] = {
-    {"T_p", 54, "", 0, 0},
-    {"T_w", 18, "", 1, 0},
-    {"S_pI", 54, "", 1, 0},
-    {"S_wI", 18, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_placed_carry, (in[0], in[1], in[2], out[0], out[1], out[2], out[3]))
 
 /* load due to a known change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3928,141 +1269,36 @@ static const mstmm_port mstmm_sweep_frames_placed_carry_outputs[] = {
  * out e_S[6] (N, N*m) load due to known increments, added to what is there
  * out e_b[6] (N, N*m) carried load due to known increments, added to what is there
  */
-int mstmm_sweep_frames_placed_known_load(const real *restrict S_p, const real *restrict b_p,
-    real *restrict e_S, real *restrict e_b)
+int mstmm_sweep_frames_placed_known_load(in_t S_p, in_t b_p, out_t e_S, out_t e_b)
 {
-    const real t0 = S_p[0] * b_p[0];
-    const real t1 = S_p[6] * b_p[1];
-    const real t2 = t0 + t1;
-    const real t3 = S_p[12] * b_p[2];
-    const real t4 = t2 + t3;
-    const real t5 = S_p[18] * b_p[3];
-    const real t6 = t4 + t5;
-    const real t7 = S_p[24] * b_p[4];
-    const real t8 = t6 + t7;
-    const real t9 = S_p[30] * b_p[5];
-    const real t10 = t8 + t9;
-    const real t11 = S_p[36] * b_p[6];
-    const real t12 = t10 + t11;
-    const real t13 = S_p[42] * b_p[7];
-    const real t14 = t12 + t13;
-    const real t15 = S_p[48] * b_p[8];
-    const real t16 = t14 + t15;
-    e_S[0] += t16;
-    const real t17 = S_p[1] * b_p[0];
-    const real t18 = S_p[7] * b_p[1];
-    const real t19 = t17 + t18;
-    const real t20 = S_p[13] * b_p[2];
-    const real t21 = t19 + t20;
-    const real t22 = S_p[19] * b_p[3];
-    const real t23 = t21 + t22;
-    const real t24 = S_p[25] * b_p[4];
-    const real t25 = t23 + t24;
-    const real t26 = S_p[31] * b_p[5];
-    const real t27 = t25 + t26;
-    const real t28 = S_p[37] * b_p[6];
-    const real t29 = t27 + t28;
-    const real t30 = S_p[43] * b_p[7];
-    const real t31 = t29 + t30;
-    const real t32 = S_p[49] * b_p[8];
-    const real t33 = t31 + t32;
-    e_S[1] += t33;
-    const real t34 = S_p[2] * b_p[0];
-    const real t35 = S_p[8] * b_p[1];
-    const real t36 = t34 + t35;
-    const real t37 = S_p[14] * b_p[2];
-    const real t38 = t36 + t37;
-    const real t39 = S_p[20] * b_p[3];
-    const real t40 = t38 + t39;
-    const real t41 = S_p[26] * b_p[4];
-    const real t42 = t40 + t41;
-    const real t43 = S_p[32] * b_p[5];
-    const real t44 = t42 + t43;
-    const real t45 = S_p[38] * b_p[6];
-    const real t46 = t44 + t45;
-    const real t47 = S_p[44] * b_p[7];
-    const real t48 = t46 + t47;
-    const real t49 = S_p[50] * b_p[8];
-    const real t50 = t48 + t49;
-    e_S[2] += t50;
-    const real t51 = S_p[3] * b_p[0];
-    const real t52 = S_p[9] * b_p[1];
-    const real t53 = t51 + t52;
-    const real t54 = S_p[15] * b_p[2];
-    const real t55 = t53 + t54;
-    const real t56 = S_p[21] * b_p[3];
-    const real t57 = t55 + t56;
-    const real t58 = S_p[27] * b_p[4];
-    const real t59 = t57 + t58;
-    const real t60 = S_p[33] * b_p[5];
-    const real t61 = t59 + t60;
-    const real t62 = S_p[39] * b_p[6];
-    const real t63 = t61 + t62;
-    const real t64 = S_p[45] * b_p[7];
-    const real t65 = t63 + t64;
-    const real t66 = S_p[51] * b_p[8];
-    const real t67 = t65 + t66;
-    e_S[3] += t67;
-    const real t68 = S_p[4] * b_p[0];
-    const real t69 = S_p[10] * b_p[1];
-    const real t70 = t68 + t69;
-    const real t71 = S_p[16] * b_p[2];
-    const real t72 = t70 + t71;
-    const real t73 = S_p[22] * b_p[3];
-    const real t74 = t72 + t73;
-    const real t75 = S_p[28] * b_p[4];
-    const real t76 = t74 + t75;
-    const real t77 = S_p[34] * b_p[5];
-    const real t78 = t76 + t77;
-    const real t79 = S_p[40] * b_p[6];
-    const real t80 = t78 + t79;
-    const real t81 = S_p[46] * b_p[7];
-    const real t82 = t80 + t81;
-    const real t83 = S_p[52] * b_p[8];
-    const real t84 = t82 + t83;
-    e_S[4] += t84;
-    const real t85 = S_p[5] * b_p[0];
-    const real t86 = S_p[11] * b_p[1];
-    const real t87 = t85 + t86;
-    const real t88 = S_p[17] * b_p[2];
-    const real t89 = t87 + t88;
-    const real t90 = S_p[23] * b_p[3];
-    const real t91 = t89 + t90;
-    const real t92 = S_p[29] * b_p[4];
-    const real t93 = t91 + t92;
-    const real t94 = S_p[35] * b_p[5];
-    const real t95 = t93 + t94;
-    const real t96 = S_p[41] * b_p[6];
-    const real t97 = t95 + t96;
-    const real t98 = S_p[47] * b_p[7];
-    const real t99 = t97 + t98;
-    const real t100 = S_p[53] * b_p[8];
-    const real t101 = t99 + t100;
-    e_S[5] += t101;
-    e_b[0] += t16;
-    e_b[1] += t33;
-    e_b[2] += t50;
-    e_b[3] += t67;
-    e_b[4] += t84;
-    e_b[5] += t101;
-    return 0;
+  real t16 = S_p[0] * b_p[0] + S_p[6] * b_p[1] + S_p[12] * b_p[2] + S_p[18] * b_p[3] + S_p[24] *
+    b_p[4] + S_p[30] * b_p[5] + S_p[36] * b_p[6] + S_p[42] * b_p[7] + S_p[48] * b_p[8];
+  e_S[0] += t16;
+  real t33 = S_p[1] * b_p[0] + S_p[7] * b_p[1] + S_p[13] * b_p[2] + S_p[19] * b_p[3] + S_p[25] *
+    b_p[4] + S_p[31] * b_p[5] + S_p[37] * b_p[6] + S_p[43] * b_p[7] + S_p[49] * b_p[8];
+  e_S[1] += t33;
+  real t50 = S_p[2] * b_p[0] + S_p[8] * b_p[1] + S_p[14] * b_p[2] + S_p[20] * b_p[3] + S_p[26] *
+    b_p[4] + S_p[32] * b_p[5] + S_p[38] * b_p[6] + S_p[44] * b_p[7] + S_p[50] * b_p[8];
+  e_S[2] += t50;
+  real t67 = S_p[3] * b_p[0] + S_p[9] * b_p[1] + S_p[15] * b_p[2] + S_p[21] * b_p[3] + S_p[27] *
+    b_p[4] + S_p[33] * b_p[5] + S_p[39] * b_p[6] + S_p[45] * b_p[7] + S_p[51] * b_p[8];
+  e_S[3] += t67;
+  real t84 = S_p[4] * b_p[0] + S_p[10] * b_p[1] + S_p[16] * b_p[2] + S_p[22] * b_p[3] + S_p[28] *
+    b_p[4] + S_p[34] * b_p[5] + S_p[40] * b_p[6] + S_p[46] * b_p[7] + S_p[52] * b_p[8];
+  e_S[4] += t84;
+  real t101 = S_p[5] * b_p[0] + S_p[11] * b_p[1] + S_p[17] * b_p[2] + S_p[23] * b_p[3] + S_p[29] *
+    b_p[4] + S_p[35] * b_p[5] + S_p[41] * b_p[6] + S_p[47] * b_p[7] + S_p[53] * b_p[8];
+  e_S[5] += t101;
+  e_b[0] += t16;
+  e_b[1] += t33;
+  e_b[2] += t50;
+  e_b[3] += t67;
+  e_b[4] += t84;
+  e_b[5] += t101;
+  return 0;
 }
 
-static int mstmm_sweep_frames_placed_known_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_placed_known_load(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_placed_known_load_inputs[] = {
-    {"S_p", 54, "", 0, 0},
-    {"b_p", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_placed_known_load_outputs[] = {
-    {"e_S", 6, "N, N*m", 1, 0},
-    {"e_b", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_placed_known_load, (in[0], in[1], out[0], out[1]))
 
 /* pose and its derivative along a direction
  * in  A_I[3][3] rotation, parent axes to inertial axes
@@ -4076,183 +1312,39 @@ static const mstmm_port mstmm_sweep_frames_placed_known_load_outputs[] = {
  * out d_A[3][3] derivative of A
  * out d_x[3] (m) derivative of x
  */
-int mstmm_sweep_frames_pose_slope(const real *restrict A_I, const real *restrict x_I,
-    const real *restrict Rc, const real *restrict r, const real *restrict d_A_I,
-    const real *restrict d_x_I, const real *restrict d_Rc, const real *restrict d_r,
-    real *restrict d_A, real *restrict d_x)
+int mstmm_sweep_frames_pose_slope(in_t A_I, in_t x_I, in_t Rc, in_t r, in_t d_A_I, in_t d_x_I,
+    in_t d_Rc, in_t d_r, out_t d_A, out_t d_x)
 {
-    (void)x_I;
-    const real t0 = Rc[6] * d_A_I[2];
-    const real t1 = A_I[2] * d_Rc[6];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[3] * d_A_I[1];
-    const real t4 = A_I[1] * d_Rc[3];
-    const real t5 = t3 + t4;
-    const real t6 = Rc[0] * d_A_I[0];
-    const real t7 = A_I[0] * d_Rc[0];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t2 + t9;
-    d_A[0] = t10;
-    const real t11 = Rc[7] * d_A_I[2];
-    const real t12 = A_I[2] * d_Rc[7];
-    const real t13 = t11 + t12;
-    const real t14 = Rc[4] * d_A_I[1];
-    const real t15 = A_I[1] * d_Rc[4];
-    const real t16 = t14 + t15;
-    const real t17 = Rc[1] * d_A_I[0];
-    const real t18 = A_I[0] * d_Rc[1];
-    const real t19 = t17 + t18;
-    const real t20 = t16 + t19;
-    const real t21 = t13 + t20;
-    d_A[1] = t21;
-    const real t22 = Rc[8] * d_A_I[2];
-    const real t23 = A_I[2] * d_Rc[8];
-    const real t24 = t22 + t23;
-    const real t25 = Rc[5] * d_A_I[1];
-    const real t26 = A_I[1] * d_Rc[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rc[2] * d_A_I[0];
-    const real t29 = A_I[0] * d_Rc[2];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t24 + t31;
-    d_A[2] = t32;
-    const real t33 = A_I[5] * d_Rc[6];
-    const real t34 = Rc[6] * d_A_I[5];
-    const real t35 = t33 + t34;
-    const real t36 = A_I[4] * d_Rc[3];
-    const real t37 = Rc[3] * d_A_I[4];
-    const real t38 = t36 + t37;
-    const real t39 = A_I[3] * d_Rc[0];
-    const real t40 = Rc[0] * d_A_I[3];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t35 + t42;
-    d_A[3] = t43;
-    const real t44 = A_I[5] * d_Rc[7];
-    const real t45 = Rc[7] * d_A_I[5];
-    const real t46 = t44 + t45;
-    const real t47 = A_I[4] * d_Rc[4];
-    const real t48 = Rc[4] * d_A_I[4];
-    const real t49 = t47 + t48;
-    const real t50 = A_I[3] * d_Rc[1];
-    const real t51 = Rc[1] * d_A_I[3];
-    const real t52 = t50 + t51;
-    const real t53 = t49 + t52;
-    const real t54 = t46 + t53;
-    d_A[4] = t54;
-    const real t55 = A_I[5] * d_Rc[8];
-    const real t56 = Rc[8] * d_A_I[5];
-    const real t57 = t55 + t56;
-    const real t58 = A_I[4] * d_Rc[5];
-    const real t59 = Rc[5] * d_A_I[4];
-    const real t60 = t58 + t59;
-    const real t61 = A_I[3] * d_Rc[2];
-    const real t62 = Rc[2] * d_A_I[3];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    d_A[5] = t65;
-    const real t66 = A_I[8] * d_Rc[6];
-    const real t67 = Rc[6] * d_A_I[8];
-    const real t68 = t66 + t67;
-    const real t69 = A_I[7] * d_Rc[3];
-    const real t70 = Rc[3] * d_A_I[7];
-    const real t71 = t69 + t70;
-    const real t72 = A_I[6] * d_Rc[0];
-    const real t73 = Rc[0] * d_A_I[6];
-    const real t74 = t72 + t73;
-    const real t75 = t71 + t74;
-    const real t76 = t68 + t75;
-    d_A[6] = t76;
-    const real t77 = A_I[8] * d_Rc[7];
-    const real t78 = Rc[7] * d_A_I[8];
-    const real t79 = t77 + t78;
-    const real t80 = A_I[7] * d_Rc[4];
-    const real t81 = Rc[4] * d_A_I[7];
-    const real t82 = t80 + t81;
-    const real t83 = A_I[6] * d_Rc[1];
-    const real t84 = Rc[1] * d_A_I[6];
-    const real t85 = t83 + t84;
-    const real t86 = t82 + t85;
-    const real t87 = t79 + t86;
-    d_A[7] = t87;
-    const real t88 = A_I[8] * d_Rc[8];
-    const real t89 = Rc[8] * d_A_I[8];
-    const real t90 = t88 + t89;
-    const real t91 = A_I[7] * d_Rc[5];
-    const real t92 = Rc[5] * d_A_I[7];
-    const real t93 = t91 + t92;
-    const real t94 = A_I[6] * d_Rc[2];
-    const real t95 = Rc[2] * d_A_I[6];
-    const real t96 = t94 + t95;
-    const real t97 = t93 + t96;
-    const real t98 = t90 + t97;
-    d_A[8] = t98;
-    const real t99 = r[2] * d_A_I[2];
-    const real t100 = A_I[2] * d_r[2];
-    const real t101 = t99 + t100;
-    const real t102 = r[1] * d_A_I[1];
-    const real t103 = A_I[1] * d_r[1];
-    const real t104 = t102 + t103;
-    const real t105 = r[0] * d_A_I[0];
-    const real t106 = A_I[0] * d_r[0];
-    const real t107 = t105 + t106;
-    const real t108 = t104 + t107;
-    const real t109 = t101 + t108;
-    const real t110 = d_x_I[0] + t109;
-    d_x[0] = t110;
-    const real t111 = r[2] * d_A_I[5];
-    const real t112 = A_I[5] * d_r[2];
-    const real t113 = t111 + t112;
-    const real t114 = r[1] * d_A_I[4];
-    const real t115 = A_I[4] * d_r[1];
-    const real t116 = t114 + t115;
-    const real t117 = r[0] * d_A_I[3];
-    const real t118 = A_I[3] * d_r[0];
-    const real t119 = t117 + t118;
-    const real t120 = t116 + t119;
-    const real t121 = t113 + t120;
-    const real t122 = d_x_I[1] + t121;
-    d_x[1] = t122;
-    const real t123 = r[2] * d_A_I[8];
-    const real t124 = A_I[8] * d_r[2];
-    const real t125 = t123 + t124;
-    const real t126 = r[1] * d_A_I[7];
-    const real t127 = A_I[7] * d_r[1];
-    const real t128 = t126 + t127;
-    const real t129 = r[0] * d_A_I[6];
-    const real t130 = A_I[6] * d_r[0];
-    const real t131 = t129 + t130;
-    const real t132 = t128 + t131;
-    const real t133 = t125 + t132;
-    const real t134 = d_x_I[2] + t133;
-    d_x[2] = t134;
-    return 0;
+  (void)x_I;
+  d_A[0] = Rc[6] * d_A_I[2] + A_I[2] * d_Rc[6] + (Rc[3] * d_A_I[1] + A_I[1] * d_Rc[3] + (Rc[0] *
+    d_A_I[0] + A_I[0] * d_Rc[0]));
+  d_A[1] = Rc[7] * d_A_I[2] + A_I[2] * d_Rc[7] + (Rc[4] * d_A_I[1] + A_I[1] * d_Rc[4] + (Rc[1] *
+    d_A_I[0] + A_I[0] * d_Rc[1]));
+  d_A[2] = Rc[8] * d_A_I[2] + A_I[2] * d_Rc[8] + (Rc[5] * d_A_I[1] + A_I[1] * d_Rc[5] + (Rc[2] *
+    d_A_I[0] + A_I[0] * d_Rc[2]));
+  d_A[3] = A_I[5] * d_Rc[6] + Rc[6] * d_A_I[5] + (A_I[4] * d_Rc[3] + Rc[3] * d_A_I[4] + (A_I[3] *
+    d_Rc[0] + Rc[0] * d_A_I[3]));
+  d_A[4] = A_I[5] * d_Rc[7] + Rc[7] * d_A_I[5] + (A_I[4] * d_Rc[4] + Rc[4] * d_A_I[4] + (A_I[3] *
+    d_Rc[1] + Rc[1] * d_A_I[3]));
+  d_A[5] = A_I[5] * d_Rc[8] + Rc[8] * d_A_I[5] + (A_I[4] * d_Rc[5] + Rc[5] * d_A_I[4] + (A_I[3] *
+    d_Rc[2] + Rc[2] * d_A_I[3]));
+  d_A[6] = A_I[8] * d_Rc[6] + Rc[6] * d_A_I[8] + (A_I[7] * d_Rc[3] + Rc[3] * d_A_I[7] + (A_I[6] *
+    d_Rc[0] + Rc[0] * d_A_I[6]));
+  d_A[7] = A_I[8] * d_Rc[7] + Rc[7] * d_A_I[8] + (A_I[7] * d_Rc[4] + Rc[4] * d_A_I[7] + (A_I[6] *
+    d_Rc[1] + Rc[1] * d_A_I[6]));
+  d_A[8] = A_I[8] * d_Rc[8] + Rc[8] * d_A_I[8] + (A_I[7] * d_Rc[5] + Rc[5] * d_A_I[7] + (A_I[6] *
+    d_Rc[2] + Rc[2] * d_A_I[6]));
+  d_x[0] = d_x_I[0] + (r[2] * d_A_I[2] + A_I[2] * d_r[2] + (r[1] * d_A_I[1] + A_I[1] * d_r[1] +
+    (r[0] * d_A_I[0] + A_I[0] * d_r[0])));
+  d_x[1] = d_x_I[1] + (r[2] * d_A_I[5] + A_I[5] * d_r[2] + (r[1] * d_A_I[4] + A_I[4] * d_r[1] +
+    (r[0] * d_A_I[3] + A_I[3] * d_r[0])));
+  d_x[2] = d_x_I[2] + (r[2] * d_A_I[8] + A_I[8] * d_r[2] + (r[1] * d_A_I[7] + A_I[7] * d_r[1] +
+    (r[0] * d_A_I[6] + A_I[6] * d_r[0])));
+  return 0;
 }
 
-static int mstmm_sweep_frames_pose_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_pose_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_pose_slope_inputs[] = {
-    {"A_I", 9, "", 0, 0},
-    {"x_I", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"d_A_I", 9, "", 0, 0},
-    {"d_x_I", 3, "m", 0, 0},
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_pose_slope_outputs[] = {
-    {"d_A", 9, "", 0, 0},
-    {"d_x", 3, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_pose_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1]))
 
 /* velocity and its derivative along a direction
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -4267,112 +1359,27 @@ static const mstmm_port mstmm_sweep_frames_pose_slope_outputs[] = {
  * in  d_v_rel[3] (m/s) derivative of v_rel
  * out d_v[3] (m/s) derivative of v
  */
-int mstmm_sweep_frames_velocity_slope(const real *restrict Rc, const real *restrict r,
-    const real *restrict v_I, const real *restrict w_I, const real *restrict v_rel,
-    const real *restrict d_Rc, const real *restrict d_r, const real *restrict d_v_I,
-    const real *restrict d_w_I, const real *restrict d_v_rel, real *restrict d_v)
+int mstmm_sweep_frames_velocity_slope(in_t Rc, in_t r, in_t v_I, in_t w_I, in_t v_rel, in_t d_Rc,
+    in_t d_r, in_t d_v_I, in_t d_w_I, in_t d_v_rel, out_t d_v)
 {
-    (void)v_rel;
-    const real t0 = w_I[0] * d_r[1];
-    const real t1 = r[1] * d_w_I[0];
-    const real t2 = t0 + t1;
-    const real t3 = r[0] * d_w_I[1];
-    const real t4 = w_I[1] * d_r[0];
-    const real t5 = t3 + t4;
-    const real t6 = t2 - t5;
-    const real t7 = d_v_I[2] + t6;
-    const real t8 = Rc[6] * t7;
-    const real t9 = r[1] * w_I[0];
-    const real t10 = w_I[1] * r[0];
-    const real t11 = t9 - t10;
-    const real t12 = t11 + v_I[2];
-    const real t13 = t12 * d_Rc[6];
-    const real t14 = t8 + t13;
-    const real t15 = r[0] * d_w_I[2];
-    const real t16 = w_I[2] * d_r[0];
-    const real t17 = t15 + t16;
-    const real t18 = w_I[0] * d_r[2];
-    const real t19 = r[2] * d_w_I[0];
-    const real t20 = t18 + t19;
-    const real t21 = t17 - t20;
-    const real t22 = d_v_I[1] + t21;
-    const real t23 = Rc[3] * t22;
-    const real t24 = w_I[2] * r[0];
-    const real t25 = r[2] * w_I[0];
-    const real t26 = t24 - t25;
-    const real t27 = t26 + v_I[1];
-    const real t28 = t27 * d_Rc[3];
-    const real t29 = t23 + t28;
-    const real t30 = w_I[1] * d_r[2];
-    const real t31 = r[2] * d_w_I[1];
-    const real t32 = t30 + t31;
-    const real t33 = w_I[2] * d_r[1];
-    const real t34 = r[1] * d_w_I[2];
-    const real t35 = t33 + t34;
-    const real t36 = t32 - t35;
-    const real t37 = d_v_I[0] + t36;
-    const real t38 = Rc[0] * t37;
-    const real t39 = r[2] * w_I[1];
-    const real t40 = r[1] * w_I[2];
-    const real t41 = t39 - t40;
-    const real t42 = t41 + v_I[0];
-    const real t43 = t42 * d_Rc[0];
-    const real t44 = t38 + t43;
-    const real t45 = t29 + t44;
-    const real t46 = t14 + t45;
-    const real t47 = d_v_rel[0] + t46;
-    d_v[0] = t47;
-    const real t48 = Rc[7] * t7;
-    const real t49 = t12 * d_Rc[7];
-    const real t50 = t48 + t49;
-    const real t51 = Rc[4] * t22;
-    const real t52 = t27 * d_Rc[4];
-    const real t53 = t51 + t52;
-    const real t54 = Rc[1] * t37;
-    const real t55 = t42 * d_Rc[1];
-    const real t56 = t54 + t55;
-    const real t57 = t53 + t56;
-    const real t58 = t50 + t57;
-    const real t59 = d_v_rel[1] + t58;
-    d_v[1] = t59;
-    const real t60 = Rc[8] * t7;
-    const real t61 = t12 * d_Rc[8];
-    const real t62 = t60 + t61;
-    const real t63 = Rc[5] * t22;
-    const real t64 = t27 * d_Rc[5];
-    const real t65 = t63 + t64;
-    const real t66 = Rc[2] * t37;
-    const real t67 = t42 * d_Rc[2];
-    const real t68 = t66 + t67;
-    const real t69 = t65 + t68;
-    const real t70 = t62 + t69;
-    const real t71 = d_v_rel[2] + t70;
-    d_v[2] = t71;
-    return 0;
+  (void)v_rel;
+  real t7 = d_v_I[2] + (w_I[0] * d_r[1] + r[1] * d_w_I[0] - (r[0] * d_w_I[1] + w_I[1] * d_r[0]));
+  real t12 = r[1] * w_I[0] - w_I[1] * r[0] + v_I[2];
+  real t22 = d_v_I[1] + (r[0] * d_w_I[2] + w_I[2] * d_r[0] - (w_I[0] * d_r[2] + r[2] * d_w_I[0]));
+  real t27 = w_I[2] * r[0] - r[2] * w_I[0] + v_I[1];
+  real t37 = d_v_I[0] + (w_I[1] * d_r[2] + r[2] * d_w_I[1] - (w_I[2] * d_r[1] + r[1] * d_w_I[2]));
+  real t42 = r[2] * w_I[1] - r[1] * w_I[2] + v_I[0];
+  d_v[0] = d_v_rel[0] + (Rc[6] * t7 + t12 * d_Rc[6] + (Rc[3] * t22 + t27 * d_Rc[3] + (Rc[0] * t37 +
+    t42 * d_Rc[0])));
+  d_v[1] = d_v_rel[1] + (Rc[7] * t7 + t12 * d_Rc[7] + (Rc[4] * t22 + t27 * d_Rc[4] + (Rc[1] * t37 +
+    t42 * d_Rc[1])));
+  d_v[2] = d_v_rel[2] + (Rc[8] * t7 + t12 * d_Rc[8] + (Rc[5] * t22 + t27 * d_Rc[5] + (Rc[2] * t37 +
+    t42 * d_Rc[2])));
+  return 0;
 }
 
-static int mstmm_sweep_frames_velocity_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_velocity_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_velocity_slope_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"v_I", 3, "m/s", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v_rel", 3, "m/s", 0, 0},
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_v_I", 3, "m/s", 0, 0},
-    {"d_w_I", 3, "rad/s", 0, 0},
-    {"d_v_rel", 3, "m/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_velocity_slope_outputs[] = {
-    {"d_v", 3, "m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_velocity_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], out[0]))
 
 /* point and its derivative along a direction
  * in  A[3][3] rotation, body axes to inertial axes
@@ -4389,123 +1396,29 @@ static const mstmm_port mstmm_sweep_frames_velocity_slope_outputs[] = {
  * out d_x_K[3] (m) derivative of x_K
  * out d_v_K[3] (m/s) derivative of v_K
  */
-int mstmm_sweep_frames_point_slope(const real *restrict A, const real *restrict x,
-    const real *restrict v, const real *restrict motion, const real *restrict delta,
-    const real *restrict offset, const real *restrict gravity, const real *restrict d_A,
-    const real *restrict d_x, const real *restrict d_v, const real *restrict d_motion,
-    real *restrict d_x_K, real *restrict d_v_K)
+int mstmm_sweep_frames_point_slope(in_t A, in_t x, in_t v, in_t motion, in_t delta, in_t offset,
+    in_t gravity, in_t d_A, in_t d_x, in_t d_v, in_t d_motion, out_t d_x_K, out_t d_v_K)
 {
-    (void)x;
-    (void)delta;
-    (void)gravity;
-    const real t0 = offset[2] * d_A[2];
-    const real t1 = offset[1] * d_A[1];
-    const real t2 = offset[0] * d_A[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = d_x[0] + t4;
-    d_x_K[0] = t5;
-    const real t6 = offset[2] * d_A[5];
-    const real t7 = offset[1] * d_A[4];
-    const real t8 = offset[0] * d_A[3];
-    const real t9 = t7 + t8;
-    const real t10 = t6 + t9;
-    const real t11 = d_x[1] + t10;
-    d_x_K[1] = t11;
-    const real t12 = offset[2] * d_A[8];
-    const real t13 = offset[1] * d_A[7];
-    const real t14 = offset[0] * d_A[6];
-    const real t15 = t13 + t14;
-    const real t16 = t12 + t15;
-    const real t17 = d_x[2] + t16;
-    d_x_K[2] = t17;
-    const real t18 = offset[1] * motion[0];
-    const real t19 = offset[0] * motion[1];
-    const real t20 = t18 - t19;
-    const real t21 = t20 + v[2];
-    const real t22 = t21 * d_A[2];
-    const real t23 = offset[1] * d_motion[0];
-    const real t24 = offset[0] * d_motion[1];
-    const real t25 = t23 - t24;
-    const real t26 = d_v[2] + t25;
-    const real t27 = A[2] * t26;
-    const real t28 = t22 + t27;
-    const real t29 = offset[0] * motion[2];
-    const real t30 = offset[2] * motion[0];
-    const real t31 = t29 - t30;
-    const real t32 = t31 + v[1];
-    const real t33 = t32 * d_A[1];
-    const real t34 = offset[0] * d_motion[2];
-    const real t35 = offset[2] * d_motion[0];
-    const real t36 = t34 - t35;
-    const real t37 = d_v[1] + t36;
-    const real t38 = A[1] * t37;
-    const real t39 = t33 + t38;
-    const real t40 = offset[2] * motion[1];
-    const real t41 = offset[1] * motion[2];
-    const real t42 = t40 - t41;
-    const real t43 = t42 + v[0];
-    const real t44 = t43 * d_A[0];
-    const real t45 = offset[2] * d_motion[1];
-    const real t46 = offset[1] * d_motion[2];
-    const real t47 = t45 - t46;
-    const real t48 = d_v[0] + t47;
-    const real t49 = A[0] * t48;
-    const real t50 = t44 + t49;
-    const real t51 = t39 + t50;
-    const real t52 = t28 + t51;
-    d_v_K[0] = t52;
-    const real t53 = t21 * d_A[5];
-    const real t54 = A[5] * t26;
-    const real t55 = t53 + t54;
-    const real t56 = t32 * d_A[4];
-    const real t57 = A[4] * t37;
-    const real t58 = t56 + t57;
-    const real t59 = t43 * d_A[3];
-    const real t60 = A[3] * t48;
-    const real t61 = t59 + t60;
-    const real t62 = t58 + t61;
-    const real t63 = t55 + t62;
-    d_v_K[1] = t63;
-    const real t64 = t21 * d_A[8];
-    const real t65 = A[8] * t26;
-    const real t66 = t64 + t65;
-    const real t67 = t32 * d_A[7];
-    const real t68 = A[7] * t37;
-    const real t69 = t67 + t68;
-    const real t70 = t43 * d_A[6];
-    const real t71 = A[6] * t48;
-    const real t72 = t70 + t71;
-    const real t73 = t69 + t72;
-    const real t74 = t66 + t73;
-    d_v_K[2] = t74;
-    return 0;
+  (void)x;
+  (void)delta;
+  (void)gravity;
+  d_x_K[0] = d_x[0] + (offset[2] * d_A[2] + (offset[1] * d_A[1] + offset[0] * d_A[0]));
+  d_x_K[1] = d_x[1] + (offset[2] * d_A[5] + (offset[1] * d_A[4] + offset[0] * d_A[3]));
+  d_x_K[2] = d_x[2] + (offset[2] * d_A[8] + (offset[1] * d_A[7] + offset[0] * d_A[6]));
+  real t21 = offset[1] * motion[0] - offset[0] * motion[1] + v[2];
+  real t26 = d_v[2] + (offset[1] * d_motion[0] - offset[0] * d_motion[1]);
+  real t32 = offset[0] * motion[2] - offset[2] * motion[0] + v[1];
+  real t37 = d_v[1] + (offset[0] * d_motion[2] - offset[2] * d_motion[0]);
+  real t43 = offset[2] * motion[1] - offset[1] * motion[2] + v[0];
+  real t48 = d_v[0] + (offset[2] * d_motion[1] - offset[1] * d_motion[2]);
+  d_v_K[0] = t21 * d_A[2] + A[2] * t26 + (t32 * d_A[1] + A[1] * t37 + (t43 * d_A[0] + A[0] * t48));
+  d_v_K[1] = t21 * d_A[5] + A[5] * t26 + (t32 * d_A[4] + A[4] * t37 + (t43 * d_A[3] + A[3] * t48));
+  d_v_K[2] = t21 * d_A[8] + A[8] * t26 + (t32 * d_A[7] + A[7] * t37 + (t43 * d_A[6] + A[6] * t48));
+  return 0;
 }
 
-static int mstmm_sweep_frames_point_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_point_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_point_slope_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-    {"gravity", 3, "m/s2", 0, 0},
-    {"d_A", 9, "", 0, 0},
-    {"d_x", 3, "m", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_point_slope_outputs[] = {
-    {"d_x_K", 3, "m", 0, 0},
-    {"d_v_K", 3, "m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_point_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], out[0], out[1]))
 
 /* angular_motion and its derivative along a direction
  * in  A[3][3] rotation, body axes to inertial axes
@@ -4515,67 +1428,20 @@ static const mstmm_port mstmm_sweep_frames_point_slope_outputs[] = {
  * in  d_motion[9] derivative of motion
  * out d_w_K[3] (rad/s) derivative of w_K
  */
-int mstmm_sweep_frames_angular_motion_slope(const real *restrict A, const real *restrict motion,
-    const real *restrict delta, const real *restrict d_A, const real *restrict d_motion,
-    real *restrict d_w_K)
+int mstmm_sweep_frames_angular_motion_slope(in_t A, in_t motion, in_t delta, in_t d_A,
+    in_t d_motion, out_t d_w_K)
 {
-    (void)delta;
-    const real t0 = motion[2] * d_A[2];
-    const real t1 = A[2] * d_motion[2];
-    const real t2 = t0 + t1;
-    const real t3 = motion[1] * d_A[1];
-    const real t4 = A[1] * d_motion[1];
-    const real t5 = t3 + t4;
-    const real t6 = motion[0] * d_A[0];
-    const real t7 = A[0] * d_motion[0];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t2 + t9;
-    d_w_K[0] = t10;
-    const real t11 = A[5] * d_motion[2];
-    const real t12 = motion[2] * d_A[5];
-    const real t13 = t11 + t12;
-    const real t14 = A[4] * d_motion[1];
-    const real t15 = motion[1] * d_A[4];
-    const real t16 = t14 + t15;
-    const real t17 = A[3] * d_motion[0];
-    const real t18 = motion[0] * d_A[3];
-    const real t19 = t17 + t18;
-    const real t20 = t16 + t19;
-    const real t21 = t13 + t20;
-    d_w_K[1] = t21;
-    const real t22 = A[8] * d_motion[2];
-    const real t23 = motion[2] * d_A[8];
-    const real t24 = t22 + t23;
-    const real t25 = A[7] * d_motion[1];
-    const real t26 = motion[1] * d_A[7];
-    const real t27 = t25 + t26;
-    const real t28 = A[6] * d_motion[0];
-    const real t29 = motion[0] * d_A[6];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t24 + t31;
-    d_w_K[2] = t32;
-    return 0;
+  (void)delta;
+  d_w_K[0] = motion[2] * d_A[2] + A[2] * d_motion[2] + (motion[1] * d_A[1] + A[1] * d_motion[1] +
+    (motion[0] * d_A[0] + A[0] * d_motion[0]));
+  d_w_K[1] = A[5] * d_motion[2] + motion[2] * d_A[5] + (A[4] * d_motion[1] + motion[1] * d_A[4] +
+    (A[3] * d_motion[0] + motion[0] * d_A[3]));
+  d_w_K[2] = A[8] * d_motion[2] + motion[2] * d_A[8] + (A[7] * d_motion[1] + motion[1] * d_A[7] +
+    (A[6] * d_motion[0] + motion[0] * d_A[6]));
+  return 0;
 }
 
-static int mstmm_sweep_frames_angular_motion_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_angular_motion_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_angular_motion_slope_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"d_A", 9, "", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_angular_motion_slope_outputs[] = {
-    {"d_w_K", 3, "rad/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_angular_motion_slope, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* end_frame and its derivative along a direction
  * in  A[3][3] rotation, body axes to inertial axes
@@ -4583,82 +1449,22 @@ static const mstmm_port mstmm_sweep_frames_angular_motion_slope_outputs[] = {
  * in  d_A[3][3] derivative of A
  * out d_A_end[3][3] derivative of A_end
  */
-int mstmm_sweep_frames_end_frame_slope(const real *restrict A, const real *restrict R_end,
-    const real *restrict d_A, real *restrict d_A_end)
+int mstmm_sweep_frames_end_frame_slope(in_t A, in_t R_end, in_t d_A, out_t d_A_end)
 {
-    (void)A;
-    const real t0 = R_end[6] * d_A[2];
-    const real t1 = R_end[3] * d_A[1];
-    const real t2 = R_end[0] * d_A[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_A_end[0] = t4;
-    const real t5 = R_end[7] * d_A[2];
-    const real t6 = R_end[4] * d_A[1];
-    const real t7 = R_end[1] * d_A[0];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_A_end[1] = t9;
-    const real t10 = R_end[8] * d_A[2];
-    const real t11 = R_end[5] * d_A[1];
-    const real t12 = R_end[2] * d_A[0];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_A_end[2] = t14;
-    const real t15 = R_end[6] * d_A[5];
-    const real t16 = R_end[3] * d_A[4];
-    const real t17 = R_end[0] * d_A[3];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_A_end[3] = t19;
-    const real t20 = R_end[7] * d_A[5];
-    const real t21 = R_end[4] * d_A[4];
-    const real t22 = R_end[1] * d_A[3];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_A_end[4] = t24;
-    const real t25 = R_end[8] * d_A[5];
-    const real t26 = R_end[5] * d_A[4];
-    const real t27 = R_end[2] * d_A[3];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_A_end[5] = t29;
-    const real t30 = R_end[6] * d_A[8];
-    const real t31 = R_end[3] * d_A[7];
-    const real t32 = R_end[0] * d_A[6];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_A_end[6] = t34;
-    const real t35 = R_end[7] * d_A[8];
-    const real t36 = R_end[4] * d_A[7];
-    const real t37 = R_end[1] * d_A[6];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_A_end[7] = t39;
-    const real t40 = R_end[8] * d_A[8];
-    const real t41 = R_end[5] * d_A[7];
-    const real t42 = R_end[2] * d_A[6];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_A_end[8] = t44;
-    return 0;
+  (void)A;
+  d_A_end[0] = R_end[6] * d_A[2] + (R_end[3] * d_A[1] + R_end[0] * d_A[0]);
+  d_A_end[1] = R_end[7] * d_A[2] + (R_end[4] * d_A[1] + R_end[1] * d_A[0]);
+  d_A_end[2] = R_end[8] * d_A[2] + (R_end[5] * d_A[1] + R_end[2] * d_A[0]);
+  d_A_end[3] = R_end[6] * d_A[5] + (R_end[3] * d_A[4] + R_end[0] * d_A[3]);
+  d_A_end[4] = R_end[7] * d_A[5] + (R_end[4] * d_A[4] + R_end[1] * d_A[3]);
+  d_A_end[5] = R_end[8] * d_A[5] + (R_end[5] * d_A[4] + R_end[2] * d_A[3]);
+  d_A_end[6] = R_end[6] * d_A[8] + (R_end[3] * d_A[7] + R_end[0] * d_A[6]);
+  d_A_end[7] = R_end[7] * d_A[8] + (R_end[4] * d_A[7] + R_end[1] * d_A[6]);
+  d_A_end[8] = R_end[8] * d_A[8] + (R_end[5] * d_A[7] + R_end[2] * d_A[6]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_end_frame_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_end_frame_slope(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_end_frame_slope_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"R_end", 9, "", 0, 0},
-    {"d_A", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_end_frame_slope_outputs[] = {
-    {"d_A_end", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_end_frame_slope, (in[0], in[1], in[2], out[0]))
 
 /* applied_load and its derivative along a direction
  * in  A[3][3] rotation, body axes to inertial axes
@@ -4672,266 +1478,55 @@ static const mstmm_port mstmm_sweep_frames_end_frame_slope_outputs[] = {
  * in  d_M[3] (N*m) derivative of M
  * out d_e[6] (N, N*m) derivative of e, added to what is there
  */
-int mstmm_sweep_frames_applied_load_slope(const real *restrict A, const real *restrict A_F,
-    const real *restrict offset, const real *restrict F, const real *restrict M,
-    const real *restrict d_A, const real *restrict d_A_F, const real *restrict d_F,
-    const real *restrict d_M, real *restrict d_e)
+int mstmm_sweep_frames_applied_load_slope(in_t A, in_t A_F, in_t offset, in_t F, in_t M, in_t d_A,
+    in_t d_A_F, in_t d_F, in_t d_M, out_t d_e)
 {
-    const real t0 = A_F[8] * d_A[6];
-    const real t1 = A[6] * d_A_F[8];
-    const real t2 = t0 + t1;
-    const real t3 = A_F[5] * d_A[3];
-    const real t4 = A[3] * d_A_F[5];
-    const real t5 = t3 + t4;
-    const real t6 = A_F[2] * d_A[0];
-    const real t7 = A[0] * d_A_F[2];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t2 + t9;
-    const real t11 = F[2] * t10;
-    const real t12 = A[0] * A_F[2];
-    const real t13 = A[3] * A_F[5];
-    const real t14 = t12 + t13;
-    const real t15 = A[6] * A_F[8];
-    const real t16 = t14 + t15;
-    const real t17 = t16 * d_F[2];
-    const real t18 = t11 + t17;
-    const real t19 = A_F[7] * d_A[6];
-    const real t20 = A[6] * d_A_F[7];
-    const real t21 = t19 + t20;
-    const real t22 = A_F[4] * d_A[3];
-    const real t23 = A[3] * d_A_F[4];
-    const real t24 = t22 + t23;
-    const real t25 = A_F[1] * d_A[0];
-    const real t26 = A[0] * d_A_F[1];
-    const real t27 = t25 + t26;
-    const real t28 = t24 + t27;
-    const real t29 = t21 + t28;
-    const real t30 = F[1] * t29;
-    const real t31 = A[0] * A_F[1];
-    const real t32 = A[3] * A_F[4];
-    const real t33 = t31 + t32;
-    const real t34 = A[6] * A_F[7];
-    const real t35 = t33 + t34;
-    const real t36 = t35 * d_F[1];
-    const real t37 = t30 + t36;
-    const real t38 = A_F[6] * d_A[6];
-    const real t39 = A[6] * d_A_F[6];
-    const real t40 = t38 + t39;
-    const real t41 = A_F[3] * d_A[3];
-    const real t42 = A[3] * d_A_F[3];
-    const real t43 = t41 + t42;
-    const real t44 = A_F[0] * d_A[0];
-    const real t45 = A[0] * d_A_F[0];
-    const real t46 = t44 + t45;
-    const real t47 = t43 + t46;
-    const real t48 = t40 + t47;
-    const real t49 = F[0] * t48;
-    const real t50 = A[0] * A_F[0];
-    const real t51 = A[3] * A_F[3];
-    const real t52 = t50 + t51;
-    const real t53 = A[6] * A_F[6];
-    const real t54 = t52 + t53;
-    const real t55 = t54 * d_F[0];
-    const real t56 = t49 + t55;
-    const real t57 = t37 + t56;
-    const real t58 = t18 + t57;
-    const real t59 = -t58;
-    d_e[0] += t59;
-    const real t60 = A_F[2] * A[1];
-    const real t61 = A_F[5] * A[4];
-    const real t62 = t60 + t61;
-    const real t63 = A_F[8] * A[7];
-    const real t64 = t62 + t63;
-    const real t65 = t64 * d_F[2];
-    const real t66 = A[7] * d_A_F[8];
-    const real t67 = A_F[8] * d_A[7];
-    const real t68 = t66 + t67;
-    const real t69 = A[4] * d_A_F[5];
-    const real t70 = A_F[5] * d_A[4];
-    const real t71 = t69 + t70;
-    const real t72 = A[1] * d_A_F[2];
-    const real t73 = A_F[2] * d_A[1];
-    const real t74 = t72 + t73;
-    const real t75 = t71 + t74;
-    const real t76 = t68 + t75;
-    const real t77 = F[2] * t76;
-    const real t78 = t65 + t77;
-    const real t79 = A_F[1] * A[1];
-    const real t80 = A_F[4] * A[4];
-    const real t81 = t79 + t80;
-    const real t82 = A_F[7] * A[7];
-    const real t83 = t81 + t82;
-    const real t84 = t83 * d_F[1];
-    const real t85 = A[7] * d_A_F[7];
-    const real t86 = A_F[7] * d_A[7];
-    const real t87 = t85 + t86;
-    const real t88 = A[4] * d_A_F[4];
-    const real t89 = A_F[4] * d_A[4];
-    const real t90 = t88 + t89;
-    const real t91 = A[1] * d_A_F[1];
-    const real t92 = A_F[1] * d_A[1];
-    const real t93 = t91 + t92;
-    const real t94 = t90 + t93;
-    const real t95 = t87 + t94;
-    const real t96 = F[1] * t95;
-    const real t97 = t84 + t96;
-    const real t98 = A_F[0] * A[1];
-    const real t99 = A_F[3] * A[4];
-    const real t100 = t98 + t99;
-    const real t101 = A_F[6] * A[7];
-    const real t102 = t100 + t101;
-    const real t103 = t102 * d_F[0];
-    const real t104 = A[7] * d_A_F[6];
-    const real t105 = A_F[6] * d_A[7];
-    const real t106 = t104 + t105;
-    const real t107 = A[4] * d_A_F[3];
-    const real t108 = A_F[3] * d_A[4];
-    const real t109 = t107 + t108;
-    const real t110 = A[1] * d_A_F[0];
-    const real t111 = A_F[0] * d_A[1];
-    const real t112 = t110 + t111;
-    const real t113 = t109 + t112;
-    const real t114 = t106 + t113;
-    const real t115 = F[0] * t114;
-    const real t116 = t103 + t115;
-    const real t117 = t97 + t116;
-    const real t118 = t78 + t117;
-    const real t119 = -t118;
-    d_e[1] += t119;
-    const real t120 = A_F[2] * A[2];
-    const real t121 = A_F[5] * A[5];
-    const real t122 = t120 + t121;
-    const real t123 = A_F[8] * A[8];
-    const real t124 = t122 + t123;
-    const real t125 = t124 * d_F[2];
-    const real t126 = A[8] * d_A_F[8];
-    const real t127 = A_F[8] * d_A[8];
-    const real t128 = t126 + t127;
-    const real t129 = A[5] * d_A_F[5];
-    const real t130 = A_F[5] * d_A[5];
-    const real t131 = t129 + t130;
-    const real t132 = A[2] * d_A_F[2];
-    const real t133 = A_F[2] * d_A[2];
-    const real t134 = t132 + t133;
-    const real t135 = t131 + t134;
-    const real t136 = t128 + t135;
-    const real t137 = F[2] * t136;
-    const real t138 = t125 + t137;
-    const real t139 = A_F[1] * A[2];
-    const real t140 = A_F[4] * A[5];
-    const real t141 = t139 + t140;
-    const real t142 = A_F[7] * A[8];
-    const real t143 = t141 + t142;
-    const real t144 = t143 * d_F[1];
-    const real t145 = A[8] * d_A_F[7];
-    const real t146 = A_F[7] * d_A[8];
-    const real t147 = t145 + t146;
-    const real t148 = A[5] * d_A_F[4];
-    const real t149 = A_F[4] * d_A[5];
-    const real t150 = t148 + t149;
-    const real t151 = A[2] * d_A_F[1];
-    const real t152 = A_F[1] * d_A[2];
-    const real t153 = t151 + t152;
-    const real t154 = t150 + t153;
-    const real t155 = t147 + t154;
-    const real t156 = F[1] * t155;
-    const real t157 = t144 + t156;
-    const real t158 = A_F[0] * A[2];
-    const real t159 = A_F[3] * A[5];
-    const real t160 = t158 + t159;
-    const real t161 = A_F[6] * A[8];
-    const real t162 = t160 + t161;
-    const real t163 = t162 * d_F[0];
-    const real t164 = A[8] * d_A_F[6];
-    const real t165 = A_F[6] * d_A[8];
-    const real t166 = t164 + t165;
-    const real t167 = A[5] * d_A_F[3];
-    const real t168 = A_F[3] * d_A[5];
-    const real t169 = t167 + t168;
-    const real t170 = A[2] * d_A_F[0];
-    const real t171 = A_F[0] * d_A[2];
-    const real t172 = t170 + t171;
-    const real t173 = t169 + t172;
-    const real t174 = t166 + t173;
-    const real t175 = F[0] * t174;
-    const real t176 = t163 + t175;
-    const real t177 = t157 + t176;
-    const real t178 = t138 + t177;
-    const real t179 = -t178;
-    d_e[2] += t179;
-    const real t180 = offset[2] * t118;
-    const real t181 = offset[1] * t178;
-    const real t182 = t180 - t181;
-    const real t183 = M[2] * t10;
-    const real t184 = t16 * d_M[2];
-    const real t185 = t183 + t184;
-    const real t186 = M[1] * t29;
-    const real t187 = t35 * d_M[1];
-    const real t188 = t186 + t187;
-    const real t189 = M[0] * t48;
-    const real t190 = t54 * d_M[0];
-    const real t191 = t189 + t190;
-    const real t192 = t188 + t191;
-    const real t193 = t185 + t192;
-    const real t194 = t182 - t193;
-    d_e[3] += t194;
-    const real t195 = offset[0] * t178;
-    const real t196 = offset[2] * t58;
-    const real t197 = t195 - t196;
-    const real t198 = M[2] * t76;
-    const real t199 = t64 * d_M[2];
-    const real t200 = t198 + t199;
-    const real t201 = M[1] * t95;
-    const real t202 = t83 * d_M[1];
-    const real t203 = t201 + t202;
-    const real t204 = M[0] * t114;
-    const real t205 = t102 * d_M[0];
-    const real t206 = t204 + t205;
-    const real t207 = t203 + t206;
-    const real t208 = t200 + t207;
-    const real t209 = t197 - t208;
-    d_e[4] += t209;
-    const real t210 = offset[1] * t58;
-    const real t211 = offset[0] * t118;
-    const real t212 = t210 - t211;
-    const real t213 = M[2] * t136;
-    const real t214 = t124 * d_M[2];
-    const real t215 = t213 + t214;
-    const real t216 = M[1] * t155;
-    const real t217 = t143 * d_M[1];
-    const real t218 = t216 + t217;
-    const real t219 = M[0] * t174;
-    const real t220 = t162 * d_M[0];
-    const real t221 = t219 + t220;
-    const real t222 = t218 + t221;
-    const real t223 = t215 + t222;
-    const real t224 = t212 - t223;
-    d_e[5] += t224;
-    return 0;
+  real t10 = A_F[8] * d_A[6] + A[6] * d_A_F[8] + (A_F[5] * d_A[3] + A[3] * d_A_F[5] + (A_F[2] *
+    d_A[0] + A[0] * d_A_F[2]));
+  real t16 = A[0] * A_F[2] + A[3] * A_F[5] + A[6] * A_F[8];
+  real t29 = A_F[7] * d_A[6] + A[6] * d_A_F[7] + (A_F[4] * d_A[3] + A[3] * d_A_F[4] + (A_F[1] *
+    d_A[0] + A[0] * d_A_F[1]));
+  real t35 = A[0] * A_F[1] + A[3] * A_F[4] + A[6] * A_F[7];
+  real t48 = A_F[6] * d_A[6] + A[6] * d_A_F[6] + (A_F[3] * d_A[3] + A[3] * d_A_F[3] + (A_F[0] *
+    d_A[0] + A[0] * d_A_F[0]));
+  real t54 = A[0] * A_F[0] + A[3] * A_F[3] + A[6] * A_F[6];
+  real t58 = F[2] * t10 + t16 * d_F[2] + (F[1] * t29 + t35 * d_F[1] + (F[0] * t48 + t54 * d_F[0]));
+  d_e[0] += -t58;
+  real t64 = A_F[2] * A[1] + A_F[5] * A[4] + A_F[8] * A[7];
+  real t76 = A[7] * d_A_F[8] + A_F[8] * d_A[7] + (A[4] * d_A_F[5] + A_F[5] * d_A[4] + (A[1] *
+    d_A_F[2] + A_F[2] * d_A[1]));
+  real t83 = A_F[1] * A[1] + A_F[4] * A[4] + A_F[7] * A[7];
+  real t95 = A[7] * d_A_F[7] + A_F[7] * d_A[7] + (A[4] * d_A_F[4] + A_F[4] * d_A[4] + (A[1] *
+    d_A_F[1] + A_F[1] * d_A[1]));
+  real t102 = A_F[0] * A[1] + A_F[3] * A[4] + A_F[6] * A[7];
+  real t114 = A[7] * d_A_F[6] + A_F[6] * d_A[7] + (A[4] * d_A_F[3] + A_F[3] * d_A[4] + (A[1] *
+    d_A_F[0] + A_F[0] * d_A[1]));
+  real t118 = t64 * d_F[2] + F[2] * t76 + (t83 * d_F[1] + F[1] * t95 + (t102 * d_F[0] + F[0] *
+    t114));
+  d_e[1] += -t118;
+  real t124 = A_F[2] * A[2] + A_F[5] * A[5] + A_F[8] * A[8];
+  real t136 = A[8] * d_A_F[8] + A_F[8] * d_A[8] + (A[5] * d_A_F[5] + A_F[5] * d_A[5] + (A[2] *
+    d_A_F[2] + A_F[2] * d_A[2]));
+  real t143 = A_F[1] * A[2] + A_F[4] * A[5] + A_F[7] * A[8];
+  real t155 = A[8] * d_A_F[7] + A_F[7] * d_A[8] + (A[5] * d_A_F[4] + A_F[4] * d_A[5] + (A[2] *
+    d_A_F[1] + A_F[1] * d_A[2]));
+  real t162 = A_F[0] * A[2] + A_F[3] * A[5] + A_F[6] * A[8];
+  real t174 = A[8] * d_A_F[6] + A_F[6] * d_A[8] + (A[5] * d_A_F[3] + A_F[3] * d_A[5] + (A[2] *
+    d_A_F[0] + A_F[0] * d_A[2]));
+  real t178 = t124 * d_F[2] + F[2] * t136 + (t143 * d_F[1] + F[1] * t155 + (t162 * d_F[0] + F[0] *
+    t174));
+  d_e[2] += -t178;
+  d_e[3] += offset[2] * t118 - offset[1] * t178 - (M[2] * t10 + t16 * d_M[2] + (M[1] * t29 + t35 *
+    d_M[1] + (M[0] * t48 + t54 * d_M[0])));
+  d_e[4] += offset[0] * t178 - offset[2] * t58 - (M[2] * t76 + t64 * d_M[2] + (M[1] * t95 + t83 *
+    d_M[1] + (M[0] * t114 + t102 * d_M[0])));
+  d_e[5] += offset[1] * t58 - offset[0] * t118 - (M[2] * t136 + t124 * d_M[2] + (M[1] * t155 + t143
+    * d_M[1] + (M[0] * t174 + t162 * d_M[0])));
+  return 0;
 }
 
-static int mstmm_sweep_frames_applied_load_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_applied_load_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_applied_load_slope_inputs[] = {
-    {"A", 9, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-    {"F", 3, "N", 0, 0},
-    {"M", 3, "N*m", 0, 0},
-    {"d_A", 9, "", 0, 0},
-    {"d_A_F", 9, "", 0, 0},
-    {"d_F", 3, "N", 0, 0},
-    {"d_M", 3, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_applied_load_slope_outputs[] = {
-    {"d_e", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_applied_load_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0]))
 
 /* reaction_wrench and its derivative along a direction
  * in  x_F[3]
@@ -4945,76 +1540,27 @@ static const mstmm_port mstmm_sweep_frames_applied_load_slope_outputs[] = {
  * out d_F_back[3] (N) derivative of F_back
  * out d_M_back[3] (N*m) derivative of M_back
  */
-int mstmm_sweep_frames_reaction_wrench_slope(const real *restrict x_F, const real *restrict x_T,
-    const real *restrict F, const real *restrict M, const real *restrict d_x_F,
-    const real *restrict d_x_T, const real *restrict d_F, const real *restrict d_M,
-    real *restrict d_F_back, real *restrict d_M_back)
+int mstmm_sweep_frames_reaction_wrench_slope(in_t x_F, in_t x_T, in_t F, in_t M, in_t d_x_F,
+    in_t d_x_T, in_t d_F, in_t d_M, out_t d_F_back, out_t d_M_back)
 {
-    (void)M;
-    const real t0 = -d_F[0];
-    d_F_back[0] = t0;
-    const real t1 = -d_F[1];
-    d_F_back[1] = t1;
-    const real t2 = -d_F[2];
-    d_F_back[2] = t2;
-    const real t3 = x_F[1] - x_T[1];
-    const real t4 = t3 * d_F[2];
-    const real t5 = d_x_F[1] - d_x_T[1];
-    const real t6 = F[2] * t5;
-    const real t7 = t4 + t6;
-    const real t8 = x_T[2] - x_F[2];
-    const real t9 = t8 * d_F[1];
-    const real t10 = d_x_T[2] - d_x_F[2];
-    const real t11 = F[1] * t10;
-    const real t12 = t9 + t11;
-    const real t13 = t7 + t12;
-    const real t14 = t13 - d_M[0];
-    d_M_back[0] = t14;
-    const real t15 = x_T[0] - x_F[0];
-    const real t16 = t15 * d_F[2];
-    const real t17 = d_x_T[0] - d_x_F[0];
-    const real t18 = F[2] * t17;
-    const real t19 = t16 + t18;
-    const real t20 = t8 * d_F[0];
-    const real t21 = F[0] * t10;
-    const real t22 = t20 + t21;
-    const real t23 = t19 - t22;
-    const real t24 = t23 - d_M[1];
-    d_M_back[1] = t24;
-    const real t25 = t15 * d_F[1];
-    const real t26 = F[1] * t17;
-    const real t27 = t25 + t26;
-    const real t28 = t3 * d_F[0];
-    const real t29 = F[0] * t5;
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = d_M[2] + t31;
-    const real t33 = -t32;
-    d_M_back[2] = t33;
-    return 0;
+  (void)M;
+  d_F_back[0] = -d_F[0];
+  d_F_back[1] = -d_F[1];
+  d_F_back[2] = -d_F[2];
+  real t3 = x_F[1] - x_T[1];
+  real t5 = d_x_F[1] - d_x_T[1];
+  real t8 = x_T[2] - x_F[2];
+  real t10 = d_x_T[2] - d_x_F[2];
+  d_M_back[0] = t3 * d_F[2] + F[2] * t5 + (t8 * d_F[1] + F[1] * t10) - d_M[0];
+  real t15 = x_T[0] - x_F[0];
+  real t17 = d_x_T[0] - d_x_F[0];
+  d_M_back[1] = t15 * d_F[2] + F[2] * t17 - (t8 * d_F[0] + F[0] * t10) - d_M[1];
+  d_M_back[2] = -(d_M[2] + (t15 * d_F[1] + F[1] * t17 + (t3 * d_F[0] + F[0] * t5)));
+  return 0;
 }
 
-static int mstmm_sweep_frames_reaction_wrench_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_reaction_wrench_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_frames_reaction_wrench_slope_inputs[] = {
-    {"x_F", 3, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"F", 3, "", 0, 0},
-    {"M", 3, "", 0, 0},
-    {"d_x_F", 3, "", 0, 0},
-    {"d_x_T", 3, "", 0, 0},
-    {"d_F", 3, "", 0, 0},
-    {"d_M", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_reaction_wrench_slope_outputs[] = {
-    {"d_F_back", 3, "N", 0, 0},
-    {"d_M_back", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_reaction_wrench_slope, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], out[0], out[1]))
 
 /* transport and its derivative along a direction
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -5025,142 +1571,31 @@ static const mstmm_port mstmm_sweep_frames_reaction_wrench_slope_outputs[] = {
  * in  d_e[6] (N, N*m) derivative of e
  * out d_e_I[6] (N, N*m) derivative of e_I, added to what is there
  */
-int mstmm_sweep_frames_transport_slope(const real *restrict Rc, const real *restrict r,
-    const real *restrict e, const real *restrict d_Rc, const real *restrict d_r,
-    const real *restrict d_e, real *restrict d_e_I)
+int mstmm_sweep_frames_transport_slope(in_t Rc, in_t r, in_t e, in_t d_Rc, in_t d_r, in_t d_e,
+    out_t d_e_I)
 {
-    const real t0 = e[2] * d_Rc[2];
-    const real t1 = Rc[2] * d_e[2];
-    const real t2 = t0 + t1;
-    const real t3 = e[1] * d_Rc[1];
-    const real t4 = Rc[1] * d_e[1];
-    const real t5 = t3 + t4;
-    const real t6 = e[0] * d_Rc[0];
-    const real t7 = Rc[0] * d_e[0];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t2 + t9;
-    d_e_I[0] += t10;
-    const real t11 = Rc[5] * d_e[2];
-    const real t12 = e[2] * d_Rc[5];
-    const real t13 = t11 + t12;
-    const real t14 = Rc[4] * d_e[1];
-    const real t15 = e[1] * d_Rc[4];
-    const real t16 = t14 + t15;
-    const real t17 = Rc[3] * d_e[0];
-    const real t18 = e[0] * d_Rc[3];
-    const real t19 = t17 + t18;
-    const real t20 = t16 + t19;
-    const real t21 = t13 + t20;
-    d_e_I[1] += t21;
-    const real t22 = Rc[8] * d_e[2];
-    const real t23 = e[2] * d_Rc[8];
-    const real t24 = t22 + t23;
-    const real t25 = Rc[7] * d_e[1];
-    const real t26 = e[1] * d_Rc[7];
-    const real t27 = t25 + t26;
-    const real t28 = Rc[6] * d_e[0];
-    const real t29 = e[0] * d_Rc[6];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t24 + t31;
-    d_e_I[2] += t32;
-    const real t33 = e[5] * d_Rc[2];
-    const real t34 = Rc[2] * d_e[5];
-    const real t35 = t33 + t34;
-    const real t36 = e[4] * d_Rc[1];
-    const real t37 = Rc[1] * d_e[4];
-    const real t38 = t36 + t37;
-    const real t39 = e[3] * d_Rc[0];
-    const real t40 = Rc[0] * d_e[3];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t35 + t42;
-    const real t44 = r[1] * t32;
-    const real t45 = e[0] * Rc[6];
-    const real t46 = e[1] * Rc[7];
-    const real t47 = t45 + t46;
-    const real t48 = e[2] * Rc[8];
-    const real t49 = t47 + t48;
-    const real t50 = t49 * d_r[1];
-    const real t51 = t44 + t50;
-    const real t52 = r[2] * t21;
-    const real t53 = e[0] * Rc[3];
-    const real t54 = e[1] * Rc[4];
-    const real t55 = t53 + t54;
-    const real t56 = e[2] * Rc[5];
-    const real t57 = t55 + t56;
-    const real t58 = t57 * d_r[2];
-    const real t59 = t52 + t58;
-    const real t60 = t51 - t59;
-    const real t61 = t43 + t60;
-    d_e_I[3] += t61;
-    const real t62 = e[5] * d_Rc[5];
-    const real t63 = Rc[5] * d_e[5];
-    const real t64 = t62 + t63;
-    const real t65 = e[4] * d_Rc[4];
-    const real t66 = Rc[4] * d_e[4];
-    const real t67 = t65 + t66;
-    const real t68 = e[3] * d_Rc[3];
-    const real t69 = Rc[3] * d_e[3];
-    const real t70 = t68 + t69;
-    const real t71 = t67 + t70;
-    const real t72 = t64 + t71;
-    const real t73 = r[2] * t10;
-    const real t74 = Rc[0] * e[0];
-    const real t75 = Rc[1] * e[1];
-    const real t76 = t74 + t75;
-    const real t77 = Rc[2] * e[2];
-    const real t78 = t76 + t77;
-    const real t79 = t78 * d_r[2];
-    const real t80 = t73 + t79;
-    const real t81 = r[0] * t32;
-    const real t82 = t49 * d_r[0];
-    const real t83 = t81 + t82;
-    const real t84 = t80 - t83;
-    const real t85 = t72 + t84;
-    d_e_I[4] += t85;
-    const real t86 = e[5] * d_Rc[8];
-    const real t87 = Rc[8] * d_e[5];
-    const real t88 = t86 + t87;
-    const real t89 = e[4] * d_Rc[7];
-    const real t90 = Rc[7] * d_e[4];
-    const real t91 = t89 + t90;
-    const real t92 = e[3] * d_Rc[6];
-    const real t93 = Rc[6] * d_e[3];
-    const real t94 = t92 + t93;
-    const real t95 = t91 + t94;
-    const real t96 = t88 + t95;
-    const real t97 = r[0] * t21;
-    const real t98 = t57 * d_r[0];
-    const real t99 = t97 + t98;
-    const real t100 = r[1] * t10;
-    const real t101 = t78 * d_r[1];
-    const real t102 = t100 + t101;
-    const real t103 = t99 - t102;
-    const real t104 = t96 + t103;
-    d_e_I[5] += t104;
-    return 0;
+  real t10 = e[2] * d_Rc[2] + Rc[2] * d_e[2] + (e[1] * d_Rc[1] + Rc[1] * d_e[1] + (e[0] * d_Rc[0] +
+    Rc[0] * d_e[0]));
+  d_e_I[0] += t10;
+  real t21 = Rc[5] * d_e[2] + e[2] * d_Rc[5] + (Rc[4] * d_e[1] + e[1] * d_Rc[4] + (Rc[3] * d_e[0] +
+    e[0] * d_Rc[3]));
+  d_e_I[1] += t21;
+  real t32 = Rc[8] * d_e[2] + e[2] * d_Rc[8] + (Rc[7] * d_e[1] + e[1] * d_Rc[7] + (Rc[6] * d_e[0] +
+    e[0] * d_Rc[6]));
+  d_e_I[2] += t32;
+  real t49 = e[0] * Rc[6] + e[1] * Rc[7] + e[2] * Rc[8];
+  real t57 = e[0] * Rc[3] + e[1] * Rc[4] + e[2] * Rc[5];
+  d_e_I[3] += e[5] * d_Rc[2] + Rc[2] * d_e[5] + (e[4] * d_Rc[1] + Rc[1] * d_e[4] + (e[3] * d_Rc[0] +
+    Rc[0] * d_e[3])) + (r[1] * t32 + t49 * d_r[1] - (r[2] * t21 + t57 * d_r[2]));
+  real t78 = Rc[0] * e[0] + Rc[1] * e[1] + Rc[2] * e[2];
+  d_e_I[4] += e[5] * d_Rc[5] + Rc[5] * d_e[5] + (e[4] * d_Rc[4] + Rc[4] * d_e[4] + (e[3] * d_Rc[3] +
+    Rc[3] * d_e[3])) + (r[2] * t10 + t78 * d_r[2] - (r[0] * t32 + t49 * d_r[0]));
+  d_e_I[5] += e[5] * d_Rc[8] + Rc[8] * d_e[5] + (e[4] * d_Rc[7] + Rc[7] * d_e[4] + (e[3] * d_Rc[6] +
+    Rc[6] * d_e[3])) + (r[0] * t21 + t57 * d_r[0] - (r[1] * t10 + t78 * d_r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_frames_transport_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_transport_slope(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_transport_slope_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_e", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_transport_slope_outputs[] = {
-    {"d_e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_transport_slope, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* driven_effort and its derivative along a direction
  * in  load[1] (N, N*m) effort along the speed of the load at P, H^T f
@@ -5172,39 +1607,18 @@ static const mstmm_port mstmm_sweep_frames_transport_slope_outputs[] = {
  * in  d_tau[1] (N, N*m) derivative of tau
  * out d_tau_d[1] (N, N*m) derivative of tau_d
  */
-int mstmm_sweep_frames_driven_effort_slope(const real *restrict load, const real *restrict J,
-    const real *restrict udot, const real *restrict tau, const real *restrict d_load,
-    const real *restrict d_udot, const real *restrict d_tau, real *restrict d_tau_d)
+int mstmm_sweep_frames_driven_effort_slope(in_t load, in_t J, in_t udot, in_t tau, in_t d_load,
+    in_t d_udot, in_t d_tau, out_t d_tau_d)
 {
-    (void)load;
-    (void)udot;
-    (void)tau;
-    const real t0 = J[0] * d_udot[0];
-    const real t1 = t0 - d_tau[0];
-    const real t2 = d_load[0] + t1;
-    d_tau_d[0] = t2;
-    return 0;
+  (void)load;
+  (void)udot;
+  (void)tau;
+  d_tau_d[0] = d_load[0] + (J[0] * d_udot[0] - d_tau[0]);
+  return 0;
 }
 
-static int mstmm_sweep_frames_driven_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_driven_effort_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_driven_effort_slope_inputs[] = {
-    {"load", 1, "N, N*m", 0, 0},
-    {"J", 1, "kg or kg*m2", 0, 0},
-    {"udot", 1, "", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-    {"d_load", 1, "N, N*m", 0, 0},
-    {"d_udot", 1, "", 0, 0},
-    {"d_tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_driven_effort_slope_outputs[] = {
-    {"d_tau_d", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_driven_effort_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0]))
 
 /* length and its derivative along a direction
  * in  x_F[3]
@@ -5217,587 +1631,214 @@ static const mstmm_port mstmm_sweep_frames_driven_effort_slope_outputs[] = {
  * in  d_v_T[3] derivative of v_T
  * out d_l[2] (m, m/s) derivative of l
  */
-int mstmm_sweep_frames_length_slope(const real *restrict x_F, const real *restrict v_F,
-    const real *restrict x_T, const real *restrict v_T, const real *restrict d_x_F,
-    const real *restrict d_v_F, const real *restrict d_x_T, const real *restrict d_v_T,
-    real *restrict d_l)
+int mstmm_sweep_frames_length_slope(in_t x_F, in_t v_F, in_t x_T, in_t v_T, in_t d_x_F, in_t d_v_F,
+    in_t d_x_T, in_t d_v_T, out_t d_l)
 {
-    const real t0 = x_T[1] - x_F[1];
-    const real t1 = d_x_T[1] - d_x_F[1];
-    const real t2 = t0 * t1;
-    const real t3 = t2 + t2;
-    const real t4 = x_T[0] - x_F[0];
-    const real t5 = d_x_T[0] - d_x_F[0];
-    const real t6 = t4 * t5;
-    const real t7 = t6 + t6;
-    const real t8 = t3 + t7;
-    const real t9 = x_T[2] - x_F[2];
-    const real t10 = d_x_T[2] - d_x_F[2];
-    const real t11 = t9 * t10;
-    const real t12 = t11 + t11;
-    const real t13 = t8 + t12;
-    const real t14 = t9 * t9;
-    const real t15 = t4 * t4;
-    const real t16 = t0 * t0;
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = sqrt(t18);
-    const real t20 = t19 * 2.0;
-    const real t21 = t13 / t20;
-    d_l[0] = t21;
-    const real t22 = 1.0 / t19;
-    const real t23 = v_T[1] - v_F[1];
-    const real t24 = t23 * t1;
-    const real t25 = d_v_T[1] - d_v_F[1];
-    const real t26 = t0 * t25;
-    const real t27 = t24 + t26;
-    const real t28 = v_T[0] - v_F[0];
-    const real t29 = t28 * t5;
-    const real t30 = d_v_T[0] - d_v_F[0];
-    const real t31 = t4 * t30;
-    const real t32 = t29 + t31;
-    const real t33 = t27 + t32;
-    const real t34 = v_T[2] - v_F[2];
-    const real t35 = t34 * t10;
-    const real t36 = d_v_T[2] - d_v_F[2];
-    const real t37 = t9 * t36;
-    const real t38 = t35 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = t22 * t39;
-    const real t41 = t9 * t34;
-    const real t42 = t4 * t28;
-    const real t43 = t0 * t23;
-    const real t44 = t42 + t43;
-    const real t45 = t41 + t44;
-    const real t46 = t22 * t21;
-    const real t47 = t46 / t19;
-    const real t48 = t45 * t47;
-    const real t49 = t40 - t48;
-    d_l[1] = t49;
-    return 0;
+  real t0 = x_T[1] - x_F[1];
+  real t1 = d_x_T[1] - d_x_F[1];
+  real t2 = t0 * t1;
+  real t4 = x_T[0] - x_F[0];
+  real t5 = d_x_T[0] - d_x_F[0];
+  real t6 = t4 * t5;
+  real t9 = x_T[2] - x_F[2];
+  real t10 = d_x_T[2] - d_x_F[2];
+  real t11 = t9 * t10;
+  real t19 = sqrt(t9 * t9 + (t4 * t4 + t0 * t0));
+  real t21 = (t2 + t2 + (t6 + t6) + (t11 + t11)) / (t19 * 2.0);
+  d_l[0] = t21;
+  real t22 = 1.0 / t19;
+  real t23 = v_T[1] - v_F[1];
+  real t28 = v_T[0] - v_F[0];
+  real t34 = v_T[2] - v_F[2];
+  d_l[1] = t22 * (t23 * t1 + t0 * (d_v_T[1] - d_v_F[1]) + (t28 * t5 + t4 * (d_v_T[0] - d_v_F[0])) +
+    (t34 * t10 + t9 * (d_v_T[2] - d_v_F[2]))) - (t9 * t34 + (t4 * t28 + t0 * t23)) * (t22 * t21 /
+    t19);
+  return 0;
 }
 
-static int mstmm_sweep_frames_length_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_frames_length_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_frames_length_slope_inputs[] = {
-    {"x_F", 3, "", 0, 0},
-    {"v_F", 3, "", 0, 0},
-    {"x_T", 3, "", 0, 0},
-    {"v_T", 3, "", 0, 0},
-    {"d_x_F", 3, "", 0, 0},
-    {"d_v_F", 3, "", 0, 0},
-    {"d_x_T", 3, "", 0, 0},
-    {"d_v_T", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_frames_length_slope_outputs[] = {
-    {"d_l", 2, "m, m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_frames_length_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0]))
 
 static const mstmm_kernel mstmm_sweep_frames_kernels[] = {
-    {
-        .name = "pose",
-        .function = (void (*)(void))mstmm_sweep_frames_pose,
-        .call = mstmm_sweep_frames_pose_call,
-        .n_inputs = 4,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_pose_inputs,
-        .outputs = mstmm_sweep_frames_pose_outputs,
-        .ir_hash = "b10276c89975f3f9eb84297d303a79970d956abf12bb239abd70d600fbe69f88",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "velocity",
-        .function = (void (*)(void))mstmm_sweep_frames_velocity,
-        .call = mstmm_sweep_frames_velocity_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_velocity_inputs,
-        .outputs = mstmm_sweep_frames_velocity_outputs,
-        .ir_hash = "00276e9700c44ae7299a8a67f570e73c73f5b5bf0e13042339fcece0c93db7d7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "point",
-        .function = (void (*)(void))mstmm_sweep_frames_point,
-        .call = mstmm_sweep_frames_point_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_frames_point_inputs,
-        .outputs = mstmm_sweep_frames_point_outputs,
-        .ir_hash = "00066b1c0dbbe92037f30c012f848a0557805ce102670d9fdd18df1401f27529",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "angular_motion",
-        .function = (void (*)(void))mstmm_sweep_frames_angular_motion,
-        .call = mstmm_sweep_frames_angular_motion_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_angular_motion_inputs,
-        .outputs = mstmm_sweep_frames_angular_motion_outputs,
-        .ir_hash = "0250706f499fe7d4f654d599df312e1443a39b8b417f1582880d9bdc2d819e58",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "end_frame",
-        .function = (void (*)(void))mstmm_sweep_frames_end_frame,
-        .call = mstmm_sweep_frames_end_frame_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_end_frame_inputs,
-        .outputs = mstmm_sweep_frames_end_frame_outputs,
-        .ir_hash = "8334832a787af1b6de9356fa22c49bf7fafae5335c8b0b6194a37e26a1a65638",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "applied_load",
-        .function = (void (*)(void))mstmm_sweep_frames_applied_load,
-        .call = mstmm_sweep_frames_applied_load_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_applied_load_inputs,
-        .outputs = mstmm_sweep_frames_applied_load_outputs,
-        .ir_hash = "acc8b3e9209d06164b2d2a4fa7cb341f00e205057ba5e9f99a7c691cb240fdd4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "reaction_wrench",
-        .function = (void (*)(void))mstmm_sweep_frames_reaction_wrench,
-        .call = mstmm_sweep_frames_reaction_wrench_call,
-        .n_inputs = 4,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_reaction_wrench_inputs,
-        .outputs = mstmm_sweep_frames_reaction_wrench_outputs,
-        .ir_hash = "a1b94378833cc02524146d1b677e3faf612fec131e370bb067db23f2ddfbc065",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "power",
-        .function = (void (*)(void))mstmm_sweep_frames_power,
-        .call = mstmm_sweep_frames_power_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_power_inputs,
-        .outputs = mstmm_sweep_frames_power_outputs,
-        .ir_hash = "3dbb43dd9349126cc06750920b88a1b1ecc0b9115deb7131dad2765328b4e1d2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "momentum",
-        .function = (void (*)(void))mstmm_sweep_frames_momentum,
-        .call = mstmm_sweep_frames_momentum_call,
-        .n_inputs = 5,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_momentum_inputs,
-        .outputs = mstmm_sweep_frames_momentum_outputs,
-        .ir_hash = "2b233db468695899d1da09f312455f3c57201c54d9648aaf5965ed772a668e16",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "carried_momentum",
-        .function = (void (*)(void))mstmm_sweep_frames_carried_momentum,
-        .call = mstmm_sweep_frames_carried_momentum_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_carried_momentum_inputs,
-        .outputs = mstmm_sweep_frames_carried_momentum_outputs,
-        .ir_hash = "1f1532e7555a73995fe2cb0edcd51e3778770dde948f50170477951d6ff1eaf0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "gravity_energy",
-        .function = (void (*)(void))mstmm_sweep_frames_gravity_energy,
-        .call = mstmm_sweep_frames_gravity_energy_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_gravity_energy_inputs,
-        .outputs = mstmm_sweep_frames_gravity_energy_outputs,
-        .ir_hash = "608dbda484d6b2e4d2c412e020d5110d889ff6bd3520065b9e38e1735e5e5054",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "pivot_floor",
-        .function = (void (*)(void))mstmm_sweep_frames_pivot_floor,
-        .call = mstmm_sweep_frames_pivot_floor_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_pivot_floor_inputs,
-        .outputs = mstmm_sweep_frames_pivot_floor_outputs,
-        .ir_hash = "b88e01906d33320ac040aadabee66b29adf3af6439475e571ca4c124eed2d27b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "reaction",
-        .function = (void (*)(void))mstmm_sweep_frames_reaction,
-        .call = mstmm_sweep_frames_reaction_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_frames_reaction_inputs,
-        .outputs = mstmm_sweep_frames_reaction_outputs,
-        .ir_hash = "61685d2402d343fa1ab7a10a471271038e3e24547a5970841beb39c6030df067",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "moment_about",
-        .function = (void (*)(void))mstmm_sweep_frames_moment_about,
-        .call = mstmm_sweep_frames_moment_about_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_moment_about_inputs,
-        .outputs = mstmm_sweep_frames_moment_about_outputs,
-        .ir_hash = "da8fba9ec31e864f34c34c7e132fb3de5f243fde1fe4f8d061ec97f505d671ab",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "transport",
-        .function = (void (*)(void))mstmm_sweep_frames_transport,
-        .call = mstmm_sweep_frames_transport_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_transport_inputs,
-        .outputs = mstmm_sweep_frames_transport_outputs,
-        .ir_hash = "3e08e8946f1d4b1bb9a73d370ae119d030808d41a58783bcbfb98fcff373958c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rotor_energy",
-        .function = (void (*)(void))mstmm_sweep_frames_rotor_energy,
-        .call = mstmm_sweep_frames_rotor_energy_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_rotor_energy_inputs,
-        .outputs = mstmm_sweep_frames_rotor_energy_outputs,
-        .ir_hash = "4f79e101edf8247841fd7786bb6808e47ce69fb065499ad56f8eda0bbc2868a7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "driven_effort",
-        .function = (void (*)(void))mstmm_sweep_frames_driven_effort,
-        .call = mstmm_sweep_frames_driven_effort_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_driven_effort_inputs,
-        .outputs = mstmm_sweep_frames_driven_effort_outputs,
-        .ir_hash = "68eb1f27d2d6f50c80268769a96d84a7e8cd60e009d35272130427be53247635",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "speed_power",
-        .function = (void (*)(void))mstmm_sweep_frames_speed_power,
-        .call = mstmm_sweep_frames_speed_power_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_speed_power_inputs,
-        .outputs = mstmm_sweep_frames_speed_power_outputs,
-        .ir_hash = "195bcd5a7115098d4cc2a3faed583e8c5a6701c8817f260cc5a3691f2d85e231",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "length",
-        .function = (void (*)(void))mstmm_sweep_frames_length,
-        .call = mstmm_sweep_frames_length_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_length_inputs,
-        .outputs = mstmm_sweep_frames_length_outputs,
-        .ir_hash = "acc96b57c32ce85a504c7664ce96ce869e88630dd17dc81970e0aae2ac4d045b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "to_inertial",
-        .function = (void (*)(void))mstmm_sweep_frames_to_inertial,
-        .call = mstmm_sweep_frames_to_inertial_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_to_inertial_inputs,
-        .outputs = mstmm_sweep_frames_to_inertial_outputs,
-        .ir_hash = "018a59b07f0ceaa91481dc3b1e14e7e30ebfa51e93e8c3e6dc99c98bc1d267b7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "classical_body",
-        .function = (void (*)(void))mstmm_sweep_frames_classical_body,
-        .call = mstmm_sweep_frames_classical_body_call,
-        .n_inputs = 5,
-        .n_outputs = 7,
-        .inputs = mstmm_sweep_frames_classical_body_inputs,
-        .outputs = mstmm_sweep_frames_classical_body_outputs,
-        .ir_hash = "c090364b284f4639b2c20617f53a7b4d3491a6082966bbe659438feeb11ab69d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "state_deviation",
-        .function = (void (*)(void))mstmm_sweep_frames_state_deviation,
-        .call = mstmm_sweep_frames_state_deviation_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_state_deviation_inputs,
-        .outputs = mstmm_sweep_frames_state_deviation_outputs,
-        .ir_hash = "12eb6a870ab59d82f57c2713bcd91a691f2a6e2dddaf711e8032564cd6b710ce",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_carry",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_carry,
-        .call = mstmm_sweep_frames_tangent_carry_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_tangent_carry_inputs,
-        .outputs = mstmm_sweep_frames_tangent_carry_outputs,
-        .ir_hash = "9af23a4f702b6beb85cf6baaece9ccedf424251d8e5baa2237cdda9c253d4259",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_motion",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_motion,
-        .call = mstmm_sweep_frames_tangent_motion_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_tangent_motion_inputs,
-        .outputs = mstmm_sweep_frames_tangent_motion_outputs,
-        .ir_hash = "7b01799fd504547335d56db387b52a513f1ec2194c97dd4505d1d0ba090acfc6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_pose_change",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_pose_change,
-        .call = mstmm_sweep_frames_tangent_pose_change_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_tangent_pose_change_inputs,
-        .outputs = mstmm_sweep_frames_tangent_pose_change_outputs,
-        .ir_hash = "c485cc7188f09546bd4cc16b74cea7324ca25f972ac444efaf35a8735f8680e4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_known_load",
-        .function = (void (*)(void))mstmm_sweep_frames_tangent_known_load,
-        .call = mstmm_sweep_frames_tangent_known_load_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_tangent_known_load_inputs,
-        .outputs = mstmm_sweep_frames_tangent_known_load_outputs,
-        .ir_hash = "525a71eda97a6c2e27fe1a25870b20224b900d8dbfbf716632cb6547d825a2cc",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_displacement",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_displacement,
-        .call = mstmm_sweep_frames_placed_displacement_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_placed_displacement_inputs,
-        .outputs = mstmm_sweep_frames_placed_displacement_outputs,
-        .ir_hash = "a545bc94b4b02ab7c10495f2005930b0e2d6e2ec3474020cb8ba0dd166ab3d20",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_pose",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_pose,
-        .call = mstmm_sweep_frames_placed_pose_call,
-        .n_inputs = 2,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_frames_placed_pose_inputs,
-        .outputs = mstmm_sweep_frames_placed_pose_outputs,
-        .ir_hash = "72680f60f5249d9951c3c2d9d1098b152b87f5323eb7d5c2db251b57e8b66061",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_column",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_column,
-        .call = mstmm_sweep_frames_placed_column_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_placed_column_inputs,
-        .outputs = mstmm_sweep_frames_placed_column_outputs,
-        .ir_hash = "07f9fc918fcece10909d2160199d2e74884ddf18d00e9f6a6a6278a39ae2a205",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_carry",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_carry,
-        .call = mstmm_sweep_frames_placed_carry_call,
-        .n_inputs = 3,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_frames_placed_carry_inputs,
-        .outputs = mstmm_sweep_frames_placed_carry_outputs,
-        .ir_hash = "4234ac3870588bdb8d8c34002519f522b7cdeffe10be1d789078fcf488043ae0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_known_load",
-        .function = (void (*)(void))mstmm_sweep_frames_placed_known_load,
-        .call = mstmm_sweep_frames_placed_known_load_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_placed_known_load_inputs,
-        .outputs = mstmm_sweep_frames_placed_known_load_outputs,
-        .ir_hash = "b21dae1bdfdd35b2e33b9acdafcc824a5904c68d35691d1e25827792b2362fab",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "pose_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_pose_slope,
-        .call = mstmm_sweep_frames_pose_slope_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_pose_slope_inputs,
-        .outputs = mstmm_sweep_frames_pose_slope_outputs,
-        .ir_hash = "ca7add206df2fd97e654853c696c446da43e2b405b988e1610f7033bc393c249",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "velocity_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_velocity_slope,
-        .call = mstmm_sweep_frames_velocity_slope_call,
-        .n_inputs = 10,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_velocity_slope_inputs,
-        .outputs = mstmm_sweep_frames_velocity_slope_outputs,
-        .ir_hash = "7e8d18fc974f0af072fbcb8dee7eae74a943631e006bc634cc6d4f118da96ae3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "point_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_point_slope,
-        .call = mstmm_sweep_frames_point_slope_call,
-        .n_inputs = 11,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_point_slope_inputs,
-        .outputs = mstmm_sweep_frames_point_slope_outputs,
-        .ir_hash = "3fabb20b567e0348c8bf1b4c54cc536fb16e66baa3d16bd0d92018731ab3e1dd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "angular_motion_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_angular_motion_slope,
-        .call = mstmm_sweep_frames_angular_motion_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_angular_motion_slope_inputs,
-        .outputs = mstmm_sweep_frames_angular_motion_slope_outputs,
-        .ir_hash = "a91f6dcee4b06ced7fe979f82c57505d04612ed5e073b3a619c666654eb27348",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "end_frame_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_end_frame_slope,
-        .call = mstmm_sweep_frames_end_frame_slope_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_end_frame_slope_inputs,
-        .outputs = mstmm_sweep_frames_end_frame_slope_outputs,
-        .ir_hash = "e103505ffafcd11b133645cc587fa6e0f20433cdb055af7583e1dfc1d6cc9640",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "applied_load_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_applied_load_slope,
-        .call = mstmm_sweep_frames_applied_load_slope_call,
-        .n_inputs = 9,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_applied_load_slope_inputs,
-        .outputs = mstmm_sweep_frames_applied_load_slope_outputs,
-        .ir_hash = "b0feb08d2cdf4413da67c86e618ede5c66080f20f9802dc69629c71a89ee09c7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "reaction_wrench_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_reaction_wrench_slope,
-        .call = mstmm_sweep_frames_reaction_wrench_slope_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_frames_reaction_wrench_slope_inputs,
-        .outputs = mstmm_sweep_frames_reaction_wrench_slope_outputs,
-        .ir_hash = "bd428f3495c3da3d008f1bf4953d71c26f03749360e55056c0b5e2d5deecc851",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "transport_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_transport_slope,
-        .call = mstmm_sweep_frames_transport_slope_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_transport_slope_inputs,
-        .outputs = mstmm_sweep_frames_transport_slope_outputs,
-        .ir_hash = "1646ce7b4da554c820deab060f44c001c12907851b37214450dd0fe30309ef6f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "driven_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_driven_effort_slope,
-        .call = mstmm_sweep_frames_driven_effort_slope_call,
-        .n_inputs = 7,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_driven_effort_slope_inputs,
-        .outputs = mstmm_sweep_frames_driven_effort_slope_outputs,
-        .ir_hash = "75afc84d29471e5f09c6237ff6067bbe714afc1511321716610885f4f81824a8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "length_slope",
-        .function = (void (*)(void))mstmm_sweep_frames_length_slope,
-        .call = mstmm_sweep_frames_length_slope_call,
-        .n_inputs = 8,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_frames_length_slope_inputs,
-        .outputs = mstmm_sweep_frames_length_slope_outputs,
-        .ir_hash = "02263d65636bc80a013c69aac9aac1f963d1cb56acca8fbe2452ea7f7f05bd7c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"pose", MSTMM_FUNCTIONS(mstmm_sweep_frames_pose), 4, 2, (const mstmm_port[]){{"A_I", 9, "", 0,
+    0}, {"x_I", 3, "m", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}}, (const mstmm_port[]){{"A",
+    9, "", 0, 0}, {"x", 3, "m", 0, 0}},
+    "48e4c31e436f67bb647f5371efa7a2c441bd2fceb5921bbcc3a2fac22f9c9ed0", 0, NULL},
+  {"velocity", MSTMM_FUNCTIONS(mstmm_sweep_frames_velocity), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"v_I", 3, "m/s", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v_rel", 3,
+    "m/s", 0, 0}}, (const mstmm_port[]){{"v", 3, "m/s", 0, 0}},
+    "1120a5844eda9c285bc071d052367a9f5a2bd129ad66d9250eb5c838ef7e6efd", 0, NULL},
+  {"point", MSTMM_FUNCTIONS(mstmm_sweep_frames_point), 7, 3, (const mstmm_port[]){{"A", 9, "", 0,
+    0}, {"x", 3, "m", 0, 0}, {"v", 3, "m/s", 0, 0}, {"motion", 9, "", 0, 0}, {"delta", 6, "", 0, 0},
+    {"offset", 3, "m", 0, 0}, {"gravity", 3, "m/s2", 0, 0}}, (const mstmm_port[]){{"x_K", 3, "m", 0,
+    0}, {"v_K", 3, "m/s", 0, 0}, {"a_K", 3, "m/s2", 0, 0}},
+    "257a422be9816069a5452f0f32bdb84aad11aa7a994e6307c8393556bdbaad03", 0, NULL},
+  {"angular_motion", MSTMM_FUNCTIONS(mstmm_sweep_frames_angular_motion), 3, 2, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"motion", 9, "", 0, 0}, {"delta", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"w_K", 3, "rad/s", 0, 0}, {"alpha_K", 3, "rad/s2", 0, 0}},
+    "8bbc084cd778ea89006c56855bbbbcf6257ad95f0d851e7f4ca75a13966f46b3", 0, NULL},
+  {"end_frame", MSTMM_FUNCTIONS(mstmm_sweep_frames_end_frame), 2, 1, (const mstmm_port[]){{"A", 9,
+    "", 0, 0}, {"R_end", 9, "", 0, 0}}, (const mstmm_port[]){{"A_end", 9, "", 0, 0}},
+    "2fd02f65c162e0033264753286d5c0a1b170cc7c4f8036efdf1983df647e54d1", 0, NULL},
+  {"applied_load", MSTMM_FUNCTIONS(mstmm_sweep_frames_applied_load), 5, 1, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"A_F", 9, "", 0, 0}, {"offset", 3, "m", 0, 0}, {"F", 3, "N",
+    0, 0}, {"M", 3, "N*m", 0, 0}}, (const mstmm_port[]){{"e", 6, "N, N*m", 1, 0}},
+    "a4703331bba76bb6860e52231cb94d24e63a3c53aab857536a877c3c54cbcf37", 0, NULL},
+  {"reaction_wrench", MSTMM_FUNCTIONS(mstmm_sweep_frames_reaction_wrench), 4, 2, (const
+    mstmm_port[]){{"x_F", 3, "", 0, 0}, {"x_T", 3, "", 0, 0}, {"F", 3, "", 0, 0}, {"M", 3, "", 0,
+    0}}, (const mstmm_port[]){{"F_back", 3, "N", 0, 0}, {"M_back", 3, "N*m", 0, 0}},
+    "53114746c27ac9cac5da6aa0e000d07c29f4a4a4fdedc1b03ef44a932f72f31b", 0, NULL},
+  {"power", MSTMM_FUNCTIONS(mstmm_sweep_frames_power), 5, 1, (const mstmm_port[]){{"A_F", 9, "", 0,
+    0}, {"F", 3, "N", 0, 0}, {"M", 3, "N*m", 0, 0}, {"v_K", 3, "m/s", 0, 0}, {"w_K", 3, "rad/s", 0,
+    0}}, (const mstmm_port[]){{"P", 1, "W", 0, 0}},
+    "059e70165233bcf18aa7da8115b01bb1154fc19042045b9a63f43ce510b9bb1c", 0, NULL},
+  {"momentum", MSTMM_FUNCTIONS(mstmm_sweep_frames_momentum), 5, 2, (const mstmm_port[]){{"S", 21,
+    "", 0, 0}, {"A", 9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0,
+    0}}, (const mstmm_port[]){{"L", 3, "kg*m/s", 1, 0}, {"K", 3, "kg*m2/s", 1, 0}},
+    "d1536bfaf67a387bf05200e34e15532ad982880c2300b531a4462a6064f7a1a4", 0, NULL},
+  {"carried_momentum", MSTMM_FUNCTIONS(mstmm_sweep_frames_carried_momentum), 3, 2, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"h", 6, "N*s, N*m*s", 0, 0}}, (const
+    mstmm_port[]){{"p", 3, "N*s", 1, 0}, {"L", 3, "N*m*s", 1, 0}},
+    "48af7a13e308a8db26afb801f9548d7933c6a7d83d696970483ba5867f33fff8", 0, NULL},
+  {"gravity_energy", MSTMM_FUNCTIONS(mstmm_sweep_frames_gravity_energy), 4, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"A", 9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"gravity", 3,
+    "m/s2", 0, 0}}, (const mstmm_port[]){{"V", 1, "J", 0, 0}},
+    "3e571400aabe08f1b9cff948ec4e430861448fa65e12a558d95f8a80ee9f69ec", 0, NULL},
+  {"pivot_floor", MSTMM_FUNCTIONS(mstmm_sweep_frames_pivot_floor), 1, 1, (const mstmm_port[]){{"S",
+    21, "", 0, 0}}, (const mstmm_port[]){{"floor", 2, "kg, kg*m2", 0, 0}},
+    "1020b051180dd4352fb26977f4374b55148b9b38625a2cc82b5d0ec7a6db0361", 0, NULL},
+  {"reaction", MSTMM_FUNCTIONS(mstmm_sweep_frames_reaction), 4, 3, (const mstmm_port[]){{"S", 21,
+    "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"delta", 6, "", 0, 0}, {"A", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"f", 6, "N, N*m", 0, 0}, {"force", 3, "N", 0, 0}, {"moment", 3, "N*m", 0, 0}},
+    "83d0c9780e583c26a7c5f1dec82c535d3ab5d8d2c522ea94ba2e9dad346fe7f5", 0, NULL},
+  {"moment_about", MSTMM_FUNCTIONS(mstmm_sweep_frames_moment_about), 3, 1, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"offset", 3, "m", 0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"moment", 3, "N*m", 0, 0}},
+    "dd2f2ed5ee80e3f33d4010b9691a199af01b7292055c6dde3d2588edc7e79956", 0, NULL},
+  {"transport", MSTMM_FUNCTIONS(mstmm_sweep_frames_transport), 3, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"e", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"e_I", 6,
+    "N, N*m", 1, 0}}, "b598cebd8c23ba3576b2d404e4f4e77dbdf4b36602362a66c5ee90bccba267b2", 0, NULL},
+  {"rotor_energy", MSTMM_FUNCTIONS(mstmm_sweep_frames_rotor_energy), 2, 1, (const
+    mstmm_port[]){{"J", 1, "kg*m2", 0, 0}, {"u", 1, "rad/s", 0, 0}}, (const mstmm_port[]){{"T", 1,
+    "J", 0, 0}}, "1eef6c1d6e621e00fb46f951879c7e2c1297717262fe9c8f45510f31063414ec", 0, NULL},
+  {"driven_effort", MSTMM_FUNCTIONS(mstmm_sweep_frames_driven_effort), 4, 1, (const
+    mstmm_port[]){{"load", 1, "N, N*m", 0, 0}, {"J", 1, "kg or kg*m2", 0, 0}, {"udot", 1, "", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau_d", 1, "N, N*m", 0, 0}},
+    "fac17221f4328970b38d90399f5aa076d05ca0fce844bb9f4a74a166bf3432b7", 0, NULL},
+  {"speed_power", MSTMM_FUNCTIONS(mstmm_sweep_frames_speed_power), 2, 1, (const
+    mstmm_port[]){{"tau", 1, "N, N*m", 0, 0}, {"u", 1, "m/s, rad/s", 0, 0}}, (const
+    mstmm_port[]){{"P", 1, "W", 0, 0}},
+    "8193749e610408bae747cbfee9117da7d5bf520afbe63a0c5be6d638f0ac7a93", 0, NULL},
+  {"length", MSTMM_FUNCTIONS(mstmm_sweep_frames_length), 4, 1, (const mstmm_port[]){{"x_F", 3, "",
+    0, 0}, {"v_F", 3, "", 0, 0}, {"x_T", 3, "", 0, 0}, {"v_T", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"l", 2, "m, m/s", 0, 0}},
+    "e66a73c4ee3f02e5415e86b03b9804dfb010e04aa1826a555932f7a10207017c", 0, NULL},
+  {"to_inertial", MSTMM_FUNCTIONS(mstmm_sweep_frames_to_inertial), 2, 1, (const mstmm_port[]){{"A",
+    9, "", 0, 0}, {"b", 3, "", 0, 0}}, (const mstmm_port[]){{"b_0", 3, "", 0, 0}},
+    "e8c43acaa5c5418096f7433e31338ebb2d0e01f1b7f2b98d9c991a32aa11f646", 0, NULL},
+  {"classical_body", MSTMM_FUNCTIONS(mstmm_sweep_frames_classical_body), 5, 7, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"p", 10, "", 0, 0}, {"motion", 9, "", 0, 0}, {"load", 6,
+    "N, N*m", 0, 0}, {"ro_n", 3, "m", 0, 0}}, (const mstmm_port[]){{"M", 1, "kg", 0, 0}, {"r_IO", 3,
+    "m", 0, 0}, {"r_IC", 3, "m", 0, 0}, {"J_I", 6, "kg*m2", 0, 0}, {"omega", 3, "rad/s", 0, 0},
+    {"f_C", 3, "N", 0, 0}, {"m_C", 3, "N*m", 0, 0}},
+    "d42f85bbcd0e2edccf2d587daea9067eb3e13d04ba39dcd13c27280de45c1b6c", 0, NULL},
+  {"state_deviation", MSTMM_FUNCTIONS(mstmm_sweep_frames_state_deviation), 3, 1, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"motion", 9, "", 0, 0}, {"z", 13, "", 0, 0}}, (const
+    mstmm_port[]){{"delta", 6, "", 0, 0}},
+    "2a0c3bdd6d6828b0056f6146eff9306711802fc8f20198450d6a150cb902019a", 0, NULL},
+  {"tangent_carry", MSTMM_FUNCTIONS(mstmm_sweep_frames_tangent_carry), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"S", 54, "", 0, 0}}, (const mstmm_port[]){{"T", 54, "",
+    0, 0}, {"S_I", 54, "", 1, 0}},
+    "e8c26593f9577532f3a8ff704026af6963a3530c45a672af00b53fa9e20b7174", 0, NULL},
+  {"tangent_motion", MSTMM_FUNCTIONS(mstmm_sweep_frames_tangent_motion), 6, 1, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}}, (const mstmm_port[]){{"z", 9, "",
+    0, 0}}, "ddd695e99b4e3d920471000ce00c4003f16fd2876bd2b0a36520489326dfc4e9", 0, NULL},
+  {"tangent_pose_change", MSTMM_FUNCTIONS(mstmm_sweep_frames_tangent_pose_change), 3, 2, (const
+    mstmm_port[]){{"R", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "b8aa01e5fe164e0ffd37a66ac0fe3d6ddd2528d22e732f3f929d8a3769a6d2b1", 0, NULL},
+  {"tangent_known_load", MSTMM_FUNCTIONS(mstmm_sweep_frames_tangent_known_load), 3, 2, (const
+    mstmm_port[]){{"S", 54, "", 0, 0}, {"b", 9, "", 0, 0}, {"g", 6, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"e_S", 6, "N, N*m", 0, 0}, {"e_b", 6, "N, N*m", 0, 0}},
+    "076be561c0799b35f386dd310845ae37415577e4b480dbfec813d00ebcd79068", 0, NULL},
+  {"placed_displacement", MSTMM_FUNCTIONS(mstmm_sweep_frames_placed_displacement), 4, 1, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"z_I", 9, "", 0, 0}, {"p_I", 9, "", 0,
+    0}}, (const mstmm_port[]){{"p", 9, "", 0, 0}},
+    "1c35e0cc86bdaa4c396d31f306f3d006ed4137992383bd7d619ba33d4d5ad7bc", 0, NULL},
+  {"placed_pose", MSTMM_FUNCTIONS(mstmm_sweep_frames_placed_pose), 2, 3, (const mstmm_port[]){{"A",
+    9, "", 0, 0}, {"p", 9, "", 0, 0}}, (const mstmm_port[]){{"d_A", 9, "", 0, 0}, {"d_x", 3, "m", 0,
+    0}, {"d_v", 3, "m/s", 0, 0}},
+    "0d3005c2d7ad79f3beb5bc75924ccd2db52656df90ea367d481f62de3be9d4c5", 0, NULL},
+  {"placed_column", MSTMM_FUNCTIONS(mstmm_sweep_frames_placed_column), 6, 1, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"v_P", 3, "m/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"d_v", 3, "m/s", 0, 0}, {"Q", 9, "", 0, 0}}, (const mstmm_port[]){{"B_p", 9, "",
+    0, 0}}, "bf84a6ddf6cdb7c527f05f08a7e54f687ecc99759f1af8aaa63aeea4720b0da1", 0, NULL},
+  {"placed_carry", MSTMM_FUNCTIONS(mstmm_sweep_frames_placed_carry), 3, 4, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"S_p", 54, "", 0, 0}}, (const
+    mstmm_port[]){{"T_p", 54, "", 0, 0}, {"T_w", 18, "", 1, 0}, {"S_pI", 54, "", 1, 0}, {"S_wI", 18,
+    "", 1, 0}}, "4e672f2e3800d48b39b5c1fb8be53b66a2245e249d0264cfc8b83e04ba3433bb", 0, NULL},
+  {"placed_known_load", MSTMM_FUNCTIONS(mstmm_sweep_frames_placed_known_load), 2, 2, (const
+    mstmm_port[]){{"S_p", 54, "", 0, 0}, {"b_p", 9, "", 0, 0}}, (const mstmm_port[]){{"e_S", 6,
+    "N, N*m", 1, 0}, {"e_b", 6, "N, N*m", 1, 0}},
+    "0524998523a59896d0476c223c97d1afd370f2ec8e763129e709829a62774c5c", 0, NULL},
+  {"pose_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_pose_slope), 8, 2, (const mstmm_port[]){{"A_I",
+    9, "", 0, 0}, {"x_I", 3, "m", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"d_A_I", 9, "",
+    0, 0}, {"d_x_I", 3, "m", 0, 0}, {"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0}}, (const
+    mstmm_port[]){{"d_A", 9, "", 0, 0}, {"d_x", 3, "m", 0, 0}},
+    "31abb5c7b006a779de0146e8cd75b916ce9e0f954f23d23e27f0184f11e756b9", 0, NULL},
+  {"velocity_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_velocity_slope), 10, 1, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"v_I", 3, "m/s", 0, 0}, {"w_I", 3,
+    "rad/s", 0, 0}, {"v_rel", 3, "m/s", 0, 0}, {"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_v_I", 3, "m/s", 0, 0}, {"d_w_I", 3, "rad/s", 0, 0}, {"d_v_rel", 3, "m/s", 0, 0}}, (const
+    mstmm_port[]){{"d_v", 3, "m/s", 0, 0}},
+    "1f8e2b28af6ca5272d6010832b6f0e5ff1e3b234b953a9358da076f109f868c3", 0, NULL},
+  {"point_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_point_slope), 11, 2, (const mstmm_port[]){{"A",
+    9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"v", 3, "m/s", 0, 0}, {"motion", 9, "", 0, 0}, {"delta", 6,
+    "", 0, 0}, {"offset", 3, "m", 0, 0}, {"gravity", 3, "m/s2", 0, 0}, {"d_A", 9, "", 0, 0}, {"d_x",
+    3, "m", 0, 0}, {"d_v", 3, "m/s", 0, 0}, {"d_motion", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d_x_K", 3, "m", 0, 0}, {"d_v_K", 3, "m/s", 0, 0}},
+    "649267f8d0c3f7c55b27d950038970a4eba8641e8c0085d186224b88d095d49f", 0, NULL},
+  {"angular_motion_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_angular_motion_slope), 5, 1, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"motion", 9, "", 0, 0}, {"delta", 6, "", 0, 0}, {"d_A", 9,
+    "", 0, 0}, {"d_motion", 9, "", 0, 0}}, (const mstmm_port[]){{"d_w_K", 3, "rad/s", 0, 0}},
+    "df151e7f2c85d1a8a9b3732c367d2ea155c157822adefe9dc3cbe157034affe0", 0, NULL},
+  {"end_frame_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_end_frame_slope), 3, 1, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"R_end", 9, "", 0, 0}, {"d_A", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d_A_end", 9, "", 0, 0}},
+    "c8ea0ab8cd00a55881305cf79b6354508778f836fe19615d02d29f97ba79d980", 0, NULL},
+  {"applied_load_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_applied_load_slope), 9, 1, (const
+    mstmm_port[]){{"A", 9, "", 0, 0}, {"A_F", 9, "", 0, 0}, {"offset", 3, "m", 0, 0}, {"F", 3, "N",
+    0, 0}, {"M", 3, "N*m", 0, 0}, {"d_A", 9, "", 0, 0}, {"d_A_F", 9, "", 0, 0}, {"d_F", 3, "N", 0,
+    0}, {"d_M", 3, "N*m", 0, 0}}, (const mstmm_port[]){{"d_e", 6, "N, N*m", 1, 0}},
+    "c32fdec2e126ae495effb7d0e97b88283bbe4f1b2654af991df224d9053a1015", 0, NULL},
+  {"reaction_wrench_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_reaction_wrench_slope), 8, 2, (const
+    mstmm_port[]){{"x_F", 3, "", 0, 0}, {"x_T", 3, "", 0, 0}, {"F", 3, "", 0, 0}, {"M", 3, "", 0,
+    0}, {"d_x_F", 3, "", 0, 0}, {"d_x_T", 3, "", 0, 0}, {"d_F", 3, "", 0, 0}, {"d_M", 3, "", 0, 0}},
+    (const mstmm_port[]){{"d_F_back", 3, "N", 0, 0}, {"d_M_back", 3, "N*m", 0, 0}},
+    "26666da8e469d3fb53e91b170022ba0091f1b87842481fbb5d288a38efcd590a", 0, NULL},
+  {"transport_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_transport_slope), 6, 1, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"d_Rc", 9,
+    "", 0, 0}, {"d_r", 3, "m", 0, 0}, {"d_e", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_e_I", 6,
+    "N, N*m", 1, 0}}, "5fe75a78df16dac09e914cfc365310eab94cccb50fcf9bdb352424404dcedf03", 0, NULL},
+  {"driven_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_driven_effort_slope), 7, 1, (const
+    mstmm_port[]){{"load", 1, "N, N*m", 0, 0}, {"J", 1, "kg or kg*m2", 0, 0}, {"udot", 1, "", 0, 0},
+    {"tau", 1, "N, N*m", 0, 0}, {"d_load", 1, "N, N*m", 0, 0}, {"d_udot", 1, "", 0, 0}, {"d_tau", 1,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau_d", 1, "N, N*m", 0, 0}},
+    "7e20a7ec64c321bddb49221f44ef3008823c42d43026f1aab94f91e3e2f3bfc2", 0, NULL},
+  {"length_slope", MSTMM_FUNCTIONS(mstmm_sweep_frames_length_slope), 8, 1, (const
+    mstmm_port[]){{"x_F", 3, "", 0, 0}, {"v_F", 3, "", 0, 0}, {"x_T", 3, "", 0, 0}, {"v_T", 3, "",
+    0, 0}, {"d_x_F", 3, "", 0, 0}, {"d_v_F", 3, "", 0, 0}, {"d_x_T", 3, "", 0, 0}, {"d_v_T", 3, "",
+    0, 0}}, (const mstmm_port[]){{"d_l", 2, "m, m/s", 0, 0}},
+    "1e04d4e71e8661528a2c4e5a9d4b74dcc5a0204cc14264f3db78094c9f8b66d2", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_frames = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "frames",
-    .hash = "78dac46d7b79c14e942a49ddf3844a65cc59192113efb649da963c92a0b65f4e",
+    .hash = "596fed11e5453879be18734948ece7c747e7f2b8f81ea7a09b44a713e6528923",
     .nq = 0,
     .nu = 0,
     .np = 0,

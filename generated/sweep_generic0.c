@@ -9,61 +9,7 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic0;
-int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic0_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic0_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic0_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic0_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic0_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-
 /* bias motion outboard of a hinge with 0 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -78,245 +24,72 @@ int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *re
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic0_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic0_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    (void)H;
-    (void)s;
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = w[2] * t73;
-    const real t87 = w[1] * t79;
-    const real t88 = t86 - t87;
-    const real t89 = c[3] + t88;
-    const real t90 = t85 + t89;
-    motion[3] = t90;
-    const real t91 = motion_I[3] * t9;
-    const real t92 = motion_I[4] * t24;
-    const real t93 = t91 + t92;
-    const real t94 = motion_I[5] * t39;
-    const real t95 = t93 + t94;
-    const real t96 = w[0] * t79;
-    const real t97 = w[2] * t67;
-    const real t98 = t96 - t97;
-    const real t99 = c[4] + t98;
-    const real t100 = t95 + t99;
-    motion[4] = t100;
-    const real t101 = motion_I[3] * t14;
-    const real t102 = motion_I[4] * t29;
-    const real t103 = t101 + t102;
-    const real t104 = motion_I[5] * t44;
-    const real t105 = t103 + t104;
-    const real t106 = w[1] * t67;
-    const real t107 = w[0] * t73;
-    const real t108 = t106 - t107;
-    const real t109 = c[5] + t108;
-    const real t110 = t105 + t109;
-    motion[5] = t110;
-    const real t111 = motion_I[0] * motion_I[1];
-    const real t112 = t111 - motion_I[5];
-    const real t113 = t56 * t112;
-    const real t114 = motion_I[1] * motion_I[1];
-    const real t115 = motion_I[2] * motion_I[2];
-    const real t116 = t114 + t115;
-    const real t117 = t50 * t116;
-    const real t118 = t113 - t117;
-    const real t119 = motion_I[0] * motion_I[2];
-    const real t120 = motion_I[4] + t119;
-    const real t121 = t62 * t120;
-    const real t122 = t118 + t121;
-    const real t123 = motion_I[6] + t122;
-    const real t124 = t4 * t123;
-    const real t125 = motion_I[5] + t111;
-    const real t126 = t50 * t125;
-    const real t127 = motion_I[0] * motion_I[0];
-    const real t128 = t115 + t127;
-    const real t129 = t56 * t128;
-    const real t130 = t126 - t129;
-    const real t131 = motion_I[1] * motion_I[2];
-    const real t132 = t131 - motion_I[3];
-    const real t133 = t62 * t132;
-    const real t134 = t130 + t133;
-    const real t135 = motion_I[7] + t134;
-    const real t136 = t19 * t135;
-    const real t137 = t124 + t136;
-    const real t138 = t119 - motion_I[4];
-    const real t139 = t50 * t138;
-    const real t140 = motion_I[3] + t131;
-    const real t141 = t56 * t140;
-    const real t142 = t139 + t141;
-    const real t143 = t114 + t127;
-    const real t144 = t62 * t143;
-    const real t145 = t142 - t144;
-    const real t146 = motion_I[8] + t145;
-    const real t147 = t34 * t146;
-    const real t148 = t137 + t147;
-    const real t149 = v[2] * t73;
-    const real t150 = 2.0 * t149;
-    const real t151 = v[1] * t79;
-    const real t152 = 2.0 * t151;
-    const real t153 = t150 - t152;
-    const real t154 = c[0] + t153;
-    const real t155 = t148 + t154;
-    motion[6] = t155;
-    const real t156 = t9 * t123;
-    const real t157 = t24 * t135;
-    const real t158 = t156 + t157;
-    const real t159 = t39 * t146;
-    const real t160 = t158 + t159;
-    const real t161 = v[0] * t79;
-    const real t162 = 2.0 * t161;
-    const real t163 = v[2] * t67;
-    const real t164 = 2.0 * t163;
-    const real t165 = t162 - t164;
-    const real t166 = c[1] + t165;
-    const real t167 = t160 + t166;
-    motion[7] = t167;
-    const real t168 = t14 * t123;
-    const real t169 = t29 * t135;
-    const real t170 = t168 + t169;
-    const real t171 = t44 * t146;
-    const real t172 = t170 + t171;
-    const real t173 = v[1] * t67;
-    const real t174 = 2.0 * t173;
-    const real t175 = v[0] * t73;
-    const real t176 = 2.0 * t175;
-    const real t177 = t174 - t176;
-    const real t178 = c[2] + t177;
-    const real t179 = t172 + t178;
-    motion[8] = t179;
-    return 0;
+  (void)H;
+  (void)s;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + (w[2] * t73 - w[1]
+    * t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + (w[0] * t79 - w[2]
+    * t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + (w[1] * t67 - w[0]
+    * t73));
+  real t111 = motion_I[0] * motion_I[1];
+  real t114 = motion_I[1] * motion_I[1];
+  real t115 = motion_I[2] * motion_I[2];
+  real t119 = motion_I[0] * motion_I[2];
+  real t123 = motion_I[6] + (t56 * (t111 - motion_I[5]) - t50 * (t114 + t115) + t62 * (motion_I[4] +
+    t119));
+  real t127 = motion_I[0] * motion_I[0];
+  real t131 = motion_I[1] * motion_I[2];
+  real t135 = motion_I[7] + (t50 * (motion_I[5] + t111) - t56 * (t115 + t127) + t62 * (t131 -
+    motion_I[3]));
+  real t146 = motion_I[8] + (t50 * (t119 - motion_I[4]) + t56 * (motion_I[3] + t131) - t62 * (t114 +
+    t127));
+  motion[6] = t4 * t123 + t19 * t135 + t34 * t146 + (c[0] + (2.0 * (v[2] * t73) - 2.0 * (v[1] *
+    t79)));
+  motion[7] = t9 * t123 + t24 * t135 + t39 * t146 + (c[1] + (2.0 * (v[0] * t79) - 2.0 * (v[2] *
+    t67)));
+  motion[8] = t14 * t123 + t29 * t135 + t44 * t146 + (c[2] + (2.0 * (v[1] * t67) - 2.0 * (v[0] *
+    t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic0_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 0, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with no free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
@@ -330,470 +103,106 @@ static const mstmm_port mstmm_sweep_generic0_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic0_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic0_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)H;
-    (void)J;
-    (void)floor_;
-    (void)tau;
-    (void)G;
-    (void)g;
-    const real t0 = Rc[0] * S[0];
-    const real t1 = Rc[1] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[2] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = Rc[0] * t4;
-    const real t6 = Rc[0] * S[1];
-    const real t7 = Rc[1] * S[6];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[2] * S[7];
-    const real t10 = t8 + t9;
-    const real t11 = Rc[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[0] * S[2];
-    const real t14 = Rc[1] * S[7];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[2] * S[11];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[2] * t17;
-    const real t19 = t12 + t18;
-    S_I[0] += t19;
-    const real t20 = Rc[3] * t4;
-    const real t21 = Rc[4] * t10;
-    const real t22 = t20 + t21;
-    const real t23 = Rc[5] * t17;
-    const real t24 = t22 + t23;
-    S_I[1] += t24;
-    const real t25 = Rc[6] * t4;
-    const real t26 = Rc[7] * t10;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t17;
-    const real t29 = t27 + t28;
-    S_I[2] += t29;
-    const real t30 = Rc[0] * S[3];
-    const real t31 = Rc[1] * S[8];
-    const real t32 = t30 + t31;
-    const real t33 = Rc[2] * S[12];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[0] * t34;
-    const real t36 = Rc[0] * S[4];
-    const real t37 = Rc[1] * S[9];
-    const real t38 = t36 + t37;
-    const real t39 = Rc[2] * S[13];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[1] * t40;
-    const real t42 = t35 + t41;
-    const real t43 = Rc[0] * S[5];
-    const real t44 = Rc[1] * S[10];
-    const real t45 = t43 + t44;
-    const real t46 = Rc[2] * S[14];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[2] * t47;
-    const real t49 = t42 + t48;
-    const real t50 = r[1] * t29;
-    const real t51 = r[2] * t24;
-    const real t52 = t50 - t51;
-    const real t53 = t49 + t52;
-    S_I[3] += t53;
-    const real t54 = Rc[3] * t34;
-    const real t55 = Rc[4] * t40;
-    const real t56 = t54 + t55;
-    const real t57 = Rc[5] * t47;
-    const real t58 = t56 + t57;
-    const real t59 = r[2] * t19;
-    const real t60 = r[0] * t29;
-    const real t61 = t59 - t60;
-    const real t62 = t58 + t61;
-    S_I[4] += t62;
-    const real t63 = Rc[6] * t34;
-    const real t64 = Rc[7] * t40;
-    const real t65 = t63 + t64;
-    const real t66 = Rc[8] * t47;
-    const real t67 = t65 + t66;
-    const real t68 = r[0] * t24;
-    const real t69 = r[1] * t19;
-    const real t70 = t68 - t69;
-    const real t71 = t67 + t70;
-    S_I[5] += t71;
-    const real t72 = Rc[3] * S[0];
-    const real t73 = Rc[4] * S[1];
-    const real t74 = t72 + t73;
-    const real t75 = Rc[5] * S[2];
-    const real t76 = t74 + t75;
-    const real t77 = Rc[3] * t76;
-    const real t78 = Rc[3] * S[1];
-    const real t79 = Rc[4] * S[6];
-    const real t80 = t78 + t79;
-    const real t81 = Rc[5] * S[7];
-    const real t82 = t80 + t81;
-    const real t83 = Rc[4] * t82;
-    const real t84 = t77 + t83;
-    const real t85 = Rc[3] * S[2];
-    const real t86 = Rc[4] * S[7];
-    const real t87 = t85 + t86;
-    const real t88 = Rc[5] * S[11];
-    const real t89 = t87 + t88;
-    const real t90 = Rc[5] * t89;
-    const real t91 = t84 + t90;
-    S_I[6] += t91;
-    const real t92 = Rc[6] * t76;
-    const real t93 = Rc[7] * t82;
-    const real t94 = t92 + t93;
-    const real t95 = Rc[8] * t89;
-    const real t96 = t94 + t95;
-    S_I[7] += t96;
-    const real t97 = Rc[3] * S[3];
-    const real t98 = Rc[4] * S[8];
-    const real t99 = t97 + t98;
-    const real t100 = Rc[5] * S[12];
-    const real t101 = t99 + t100;
-    const real t102 = Rc[0] * t101;
-    const real t103 = Rc[3] * S[4];
-    const real t104 = Rc[4] * S[9];
-    const real t105 = t103 + t104;
-    const real t106 = Rc[5] * S[13];
-    const real t107 = t105 + t106;
-    const real t108 = Rc[1] * t107;
-    const real t109 = t102 + t108;
-    const real t110 = Rc[3] * S[5];
-    const real t111 = Rc[4] * S[10];
-    const real t112 = t110 + t111;
-    const real t113 = Rc[5] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = Rc[2] * t114;
-    const real t116 = t109 + t115;
-    const real t117 = r[1] * t96;
-    const real t118 = r[2] * t91;
-    const real t119 = t117 - t118;
-    const real t120 = t116 + t119;
-    S_I[8] += t120;
-    const real t121 = Rc[3] * t101;
-    const real t122 = Rc[4] * t107;
-    const real t123 = t121 + t122;
-    const real t124 = Rc[5] * t114;
-    const real t125 = t123 + t124;
-    const real t126 = r[0] * t96;
-    const real t127 = t51 - t126;
-    const real t128 = t125 + t127;
-    S_I[9] += t128;
-    const real t129 = Rc[6] * t101;
-    const real t130 = Rc[7] * t107;
-    const real t131 = t129 + t130;
-    const real t132 = Rc[8] * t114;
-    const real t133 = t131 + t132;
-    const real t134 = r[0] * t91;
-    const real t135 = r[1] * t24;
-    const real t136 = t134 - t135;
-    const real t137 = t133 + t136;
-    S_I[10] += t137;
-    const real t138 = Rc[6] * S[0];
-    const real t139 = Rc[7] * S[1];
-    const real t140 = t138 + t139;
-    const real t141 = Rc[8] * S[2];
-    const real t142 = t140 + t141;
-    const real t143 = Rc[6] * t142;
-    const real t144 = Rc[6] * S[1];
-    const real t145 = Rc[7] * S[6];
-    const real t146 = t144 + t145;
-    const real t147 = Rc[8] * S[7];
-    const real t148 = t146 + t147;
-    const real t149 = Rc[7] * t148;
-    const real t150 = t143 + t149;
-    const real t151 = Rc[6] * S[2];
-    const real t152 = Rc[7] * S[7];
-    const real t153 = t151 + t152;
-    const real t154 = Rc[8] * S[11];
-    const real t155 = t153 + t154;
-    const real t156 = Rc[8] * t155;
-    const real t157 = t150 + t156;
-    S_I[11] += t157;
-    const real t158 = Rc[6] * S[3];
-    const real t159 = Rc[7] * S[8];
-    const real t160 = t158 + t159;
-    const real t161 = Rc[8] * S[12];
-    const real t162 = t160 + t161;
-    const real t163 = Rc[0] * t162;
-    const real t164 = Rc[6] * S[4];
-    const real t165 = Rc[7] * S[9];
-    const real t166 = t164 + t165;
-    const real t167 = Rc[8] * S[13];
-    const real t168 = t166 + t167;
-    const real t169 = Rc[1] * t168;
-    const real t170 = t163 + t169;
-    const real t171 = Rc[6] * S[5];
-    const real t172 = Rc[7] * S[10];
-    const real t173 = t171 + t172;
-    const real t174 = Rc[8] * S[14];
-    const real t175 = t173 + t174;
-    const real t176 = Rc[2] * t175;
-    const real t177 = t170 + t176;
-    const real t178 = r[1] * t157;
-    const real t179 = r[2] * t96;
-    const real t180 = t178 - t179;
-    const real t181 = t177 + t180;
-    S_I[12] += t181;
-    const real t182 = Rc[3] * t162;
-    const real t183 = Rc[4] * t168;
-    const real t184 = t182 + t183;
-    const real t185 = Rc[5] * t175;
-    const real t186 = t184 + t185;
-    const real t187 = r[2] * t29;
-    const real t188 = r[0] * t157;
-    const real t189 = t187 - t188;
-    const real t190 = t186 + t189;
-    S_I[13] += t190;
-    const real t191 = Rc[6] * t162;
-    const real t192 = Rc[7] * t168;
-    const real t193 = t191 + t192;
-    const real t194 = Rc[8] * t175;
-    const real t195 = t193 + t194;
-    const real t196 = t126 - t50;
-    const real t197 = t195 + t196;
-    S_I[14] += t197;
-    const real t198 = Rc[0] * S[15];
-    const real t199 = Rc[1] * S[16];
-    const real t200 = t198 + t199;
-    const real t201 = Rc[2] * S[17];
-    const real t202 = t200 + t201;
-    const real t203 = Rc[0] * t202;
-    const real t204 = Rc[0] * S[16];
-    const real t205 = Rc[1] * S[18];
-    const real t206 = t204 + t205;
-    const real t207 = Rc[2] * S[19];
-    const real t208 = t206 + t207;
-    const real t209 = Rc[1] * t208;
-    const real t210 = t203 + t209;
-    const real t211 = Rc[0] * S[17];
-    const real t212 = Rc[1] * S[19];
-    const real t213 = t211 + t212;
-    const real t214 = Rc[2] * S[20];
-    const real t215 = t213 + t214;
-    const real t216 = Rc[2] * t215;
-    const real t217 = t210 + t216;
-    const real t218 = r[1] * t181;
-    const real t219 = r[2] * t120;
-    const real t220 = t218 - t219;
-    const real t221 = r[1] * t177;
-    const real t222 = r[2] * t116;
-    const real t223 = t221 - t222;
-    const real t224 = t220 + t223;
-    const real t225 = t217 + t224;
-    S_I[15] += t225;
-    const real t226 = Rc[3] * t202;
-    const real t227 = Rc[4] * t208;
-    const real t228 = t226 + t227;
-    const real t229 = Rc[5] * t215;
-    const real t230 = t228 + t229;
-    const real t231 = r[1] * t190;
-    const real t232 = r[2] * t128;
-    const real t233 = t231 - t232;
-    const real t234 = r[2] * t49;
-    const real t235 = r[0] * t177;
-    const real t236 = t234 - t235;
-    const real t237 = t233 + t236;
-    const real t238 = t230 + t237;
-    S_I[16] += t238;
-    const real t239 = Rc[6] * t202;
-    const real t240 = Rc[7] * t208;
-    const real t241 = t239 + t240;
-    const real t242 = Rc[8] * t215;
-    const real t243 = t241 + t242;
-    const real t244 = r[1] * t197;
-    const real t245 = r[2] * t137;
-    const real t246 = t244 - t245;
-    const real t247 = r[0] * t116;
-    const real t248 = r[1] * t49;
-    const real t249 = t247 - t248;
-    const real t250 = t246 + t249;
-    const real t251 = t243 + t250;
-    S_I[17] += t251;
-    const real t252 = Rc[3] * S[15];
-    const real t253 = Rc[4] * S[16];
-    const real t254 = t252 + t253;
-    const real t255 = Rc[5] * S[17];
-    const real t256 = t254 + t255;
-    const real t257 = Rc[3] * t256;
-    const real t258 = Rc[3] * S[16];
-    const real t259 = Rc[4] * S[18];
-    const real t260 = t258 + t259;
-    const real t261 = Rc[5] * S[19];
-    const real t262 = t260 + t261;
-    const real t263 = Rc[4] * t262;
-    const real t264 = t257 + t263;
-    const real t265 = Rc[3] * S[17];
-    const real t266 = Rc[4] * S[19];
-    const real t267 = t265 + t266;
-    const real t268 = Rc[5] * S[20];
-    const real t269 = t267 + t268;
-    const real t270 = Rc[5] * t269;
-    const real t271 = t264 + t270;
-    const real t272 = r[2] * t62;
-    const real t273 = r[0] * t190;
-    const real t274 = t272 - t273;
-    const real t275 = r[2] * t58;
-    const real t276 = r[0] * t186;
-    const real t277 = t275 - t276;
-    const real t278 = t274 + t277;
-    const real t279 = t271 + t278;
-    S_I[18] += t279;
-    const real t280 = Rc[6] * t256;
-    const real t281 = Rc[7] * t262;
-    const real t282 = t280 + t281;
-    const real t283 = Rc[8] * t269;
-    const real t284 = t282 + t283;
-    const real t285 = r[2] * t71;
-    const real t286 = r[0] * t197;
-    const real t287 = t285 - t286;
-    const real t288 = r[0] * t125;
-    const real t289 = r[1] * t58;
-    const real t290 = t288 - t289;
-    const real t291 = t287 + t290;
-    const real t292 = t284 + t291;
-    S_I[19] += t292;
-    const real t293 = Rc[6] * S[15];
-    const real t294 = Rc[7] * S[16];
-    const real t295 = t293 + t294;
-    const real t296 = Rc[8] * S[17];
-    const real t297 = t295 + t296;
-    const real t298 = Rc[6] * t297;
-    const real t299 = Rc[6] * S[16];
-    const real t300 = Rc[7] * S[18];
-    const real t301 = t299 + t300;
-    const real t302 = Rc[8] * S[19];
-    const real t303 = t301 + t302;
-    const real t304 = Rc[7] * t303;
-    const real t305 = t298 + t304;
-    const real t306 = Rc[6] * S[17];
-    const real t307 = Rc[7] * S[19];
-    const real t308 = t306 + t307;
-    const real t309 = Rc[8] * S[20];
-    const real t310 = t308 + t309;
-    const real t311 = Rc[8] * t310;
-    const real t312 = t305 + t311;
-    const real t313 = r[0] * t137;
-    const real t314 = r[1] * t71;
-    const real t315 = t313 - t314;
-    const real t316 = r[0] * t133;
-    const real t317 = r[1] * t67;
-    const real t318 = t316 - t317;
-    const real t319 = t315 + t318;
-    const real t320 = t312 + t319;
-    S_I[20] += t320;
-    const real t321 = Rc[0] * e[0];
-    const real t322 = Rc[1] * e[1];
-    const real t323 = t321 + t322;
-    const real t324 = Rc[2] * e[2];
-    const real t325 = t323 + t324;
-    e_I[0] += t325;
-    const real t326 = Rc[3] * e[0];
-    const real t327 = Rc[4] * e[1];
-    const real t328 = t326 + t327;
-    const real t329 = Rc[5] * e[2];
-    const real t330 = t328 + t329;
-    e_I[1] += t330;
-    const real t331 = Rc[6] * e[0];
-    const real t332 = Rc[7] * e[1];
-    const real t333 = t331 + t332;
-    const real t334 = Rc[8] * e[2];
-    const real t335 = t333 + t334;
-    e_I[2] += t335;
-    const real t336 = Rc[0] * e[3];
-    const real t337 = Rc[1] * e[4];
-    const real t338 = t336 + t337;
-    const real t339 = Rc[2] * e[5];
-    const real t340 = t338 + t339;
-    const real t341 = Rc[6] * r[1];
-    const real t342 = Rc[3] * r[2];
-    const real t343 = t341 - t342;
-    const real t344 = e[0] * t343;
-    const real t345 = Rc[7] * r[1];
-    const real t346 = Rc[4] * r[2];
-    const real t347 = t345 - t346;
-    const real t348 = e[1] * t347;
-    const real t349 = t344 + t348;
-    const real t350 = Rc[8] * r[1];
-    const real t351 = Rc[5] * r[2];
-    const real t352 = t350 - t351;
-    const real t353 = e[2] * t352;
-    const real t354 = t349 + t353;
-    const real t355 = t340 + t354;
-    e_I[3] += t355;
-    const real t356 = Rc[3] * e[3];
-    const real t357 = Rc[4] * e[4];
-    const real t358 = t356 + t357;
-    const real t359 = Rc[5] * e[5];
-    const real t360 = t358 + t359;
-    const real t361 = Rc[0] * r[2];
-    const real t362 = Rc[6] * r[0];
-    const real t363 = t361 - t362;
-    const real t364 = e[0] * t363;
-    const real t365 = Rc[1] * r[2];
-    const real t366 = Rc[7] * r[0];
-    const real t367 = t365 - t366;
-    const real t368 = e[1] * t367;
-    const real t369 = t364 + t368;
-    const real t370 = Rc[2] * r[2];
-    const real t371 = Rc[8] * r[0];
-    const real t372 = t370 - t371;
-    const real t373 = e[2] * t372;
-    const real t374 = t369 + t373;
-    const real t375 = t360 + t374;
-    e_I[4] += t375;
-    const real t376 = Rc[6] * e[3];
-    const real t377 = Rc[7] * e[4];
-    const real t378 = t376 + t377;
-    const real t379 = Rc[8] * e[5];
-    const real t380 = t378 + t379;
-    const real t381 = Rc[3] * r[0];
-    const real t382 = Rc[0] * r[1];
-    const real t383 = t381 - t382;
-    const real t384 = e[0] * t383;
-    const real t385 = Rc[4] * r[0];
-    const real t386 = Rc[1] * r[1];
-    const real t387 = t385 - t386;
-    const real t388 = e[1] * t387;
-    const real t389 = t384 + t388;
-    const real t390 = Rc[5] * r[0];
-    const real t391 = Rc[2] * r[1];
-    const real t392 = t390 - t391;
-    const real t393 = e[2] * t392;
-    const real t394 = t389 + t393;
-    const real t395 = t380 + t394;
-    e_I[5] += t395;
-    return 0;
+  (void)H;
+  (void)J;
+  (void)floor_;
+  (void)tau;
+  (void)G;
+  (void)g;
+  real t4 = Rc[0] * S[0] + Rc[1] * S[1] + Rc[2] * S[2];
+  real t10 = Rc[0] * S[1] + Rc[1] * S[6] + Rc[2] * S[7];
+  real t17 = Rc[0] * S[2] + Rc[1] * S[7] + Rc[2] * S[11];
+  real t19 = Rc[0] * t4 + Rc[1] * t10 + Rc[2] * t17;
+  S_I[0] += t19;
+  real t24 = Rc[3] * t4 + Rc[4] * t10 + Rc[5] * t17;
+  S_I[1] += t24;
+  real t29 = Rc[6] * t4 + Rc[7] * t10 + Rc[8] * t17;
+  S_I[2] += t29;
+  real t34 = Rc[0] * S[3] + Rc[1] * S[8] + Rc[2] * S[12];
+  real t40 = Rc[0] * S[4] + Rc[1] * S[9] + Rc[2] * S[13];
+  real t47 = Rc[0] * S[5] + Rc[1] * S[10] + Rc[2] * S[14];
+  real t49 = Rc[0] * t34 + Rc[1] * t40 + Rc[2] * t47;
+  real t50 = r[1] * t29;
+  real t51 = r[2] * t24;
+  S_I[3] += t49 + (t50 - t51);
+  real t58 = Rc[3] * t34 + Rc[4] * t40 + Rc[5] * t47;
+  real t62 = t58 + (r[2] * t19 - r[0] * t29);
+  S_I[4] += t62;
+  real t67 = Rc[6] * t34 + Rc[7] * t40 + Rc[8] * t47;
+  real t71 = t67 + (r[0] * t24 - r[1] * t19);
+  S_I[5] += t71;
+  real t76 = Rc[3] * S[0] + Rc[4] * S[1] + Rc[5] * S[2];
+  real t82 = Rc[3] * S[1] + Rc[4] * S[6] + Rc[5] * S[7];
+  real t89 = Rc[3] * S[2] + Rc[4] * S[7] + Rc[5] * S[11];
+  real t91 = Rc[3] * t76 + Rc[4] * t82 + Rc[5] * t89;
+  S_I[6] += t91;
+  real t96 = Rc[6] * t76 + Rc[7] * t82 + Rc[8] * t89;
+  S_I[7] += t96;
+  real t101 = Rc[3] * S[3] + Rc[4] * S[8] + Rc[5] * S[12];
+  real t107 = Rc[3] * S[4] + Rc[4] * S[9] + Rc[5] * S[13];
+  real t114 = Rc[3] * S[5] + Rc[4] * S[10] + Rc[5] * S[14];
+  real t116 = Rc[0] * t101 + Rc[1] * t107 + Rc[2] * t114;
+  real t120 = t116 + (r[1] * t96 - r[2] * t91);
+  S_I[8] += t120;
+  real t125 = Rc[3] * t101 + Rc[4] * t107 + Rc[5] * t114;
+  real t126 = r[0] * t96;
+  real t128 = t125 + (t51 - t126);
+  S_I[9] += t128;
+  real t133 = Rc[6] * t101 + Rc[7] * t107 + Rc[8] * t114;
+  real t137 = t133 + (r[0] * t91 - r[1] * t24);
+  S_I[10] += t137;
+  real t157 = Rc[6] * (Rc[6] * S[0] + Rc[7] * S[1] + Rc[8] * S[2]) + Rc[7] * (Rc[6] * S[1] + Rc[7] *
+    S[6] + Rc[8] * S[7]) + Rc[8] * (Rc[6] * S[2] + Rc[7] * S[7] + Rc[8] * S[11]);
+  S_I[11] += t157;
+  real t162 = Rc[6] * S[3] + Rc[7] * S[8] + Rc[8] * S[12];
+  real t168 = Rc[6] * S[4] + Rc[7] * S[9] + Rc[8] * S[13];
+  real t175 = Rc[6] * S[5] + Rc[7] * S[10] + Rc[8] * S[14];
+  real t177 = Rc[0] * t162 + Rc[1] * t168 + Rc[2] * t175;
+  real t181 = t177 + (r[1] * t157 - r[2] * t96);
+  S_I[12] += t181;
+  real t186 = Rc[3] * t162 + Rc[4] * t168 + Rc[5] * t175;
+  real t190 = t186 + (r[2] * t29 - r[0] * t157);
+  S_I[13] += t190;
+  real t197 = Rc[6] * t162 + Rc[7] * t168 + Rc[8] * t175 + (t126 - t50);
+  S_I[14] += t197;
+  real t202 = Rc[0] * S[15] + Rc[1] * S[16] + Rc[2] * S[17];
+  real t208 = Rc[0] * S[16] + Rc[1] * S[18] + Rc[2] * S[19];
+  real t215 = Rc[0] * S[17] + Rc[1] * S[19] + Rc[2] * S[20];
+  S_I[15] += Rc[0] * t202 + Rc[1] * t208 + Rc[2] * t215 + (r[1] * t181 - r[2] * t120 + (r[1] * t177
+    - r[2] * t116));
+  S_I[16] += Rc[3] * t202 + Rc[4] * t208 + Rc[5] * t215 + (r[1] * t190 - r[2] * t128 + (r[2] * t49 -
+    r[0] * t177));
+  S_I[17] += Rc[6] * t202 + Rc[7] * t208 + Rc[8] * t215 + (r[1] * t197 - r[2] * t137 + (r[0] * t116
+    - r[1] * t49));
+  real t256 = Rc[3] * S[15] + Rc[4] * S[16] + Rc[5] * S[17];
+  real t262 = Rc[3] * S[16] + Rc[4] * S[18] + Rc[5] * S[19];
+  real t269 = Rc[3] * S[17] + Rc[4] * S[19] + Rc[5] * S[20];
+  S_I[18] += Rc[3] * t256 + Rc[4] * t262 + Rc[5] * t269 + (r[2] * t62 - r[0] * t190 + (r[2] * t58 -
+    r[0] * t186));
+  S_I[19] += Rc[6] * t256 + Rc[7] * t262 + Rc[8] * t269 + (r[2] * t71 - r[0] * t197 + (r[0] * t125 -
+    r[1] * t58));
+  S_I[20] += Rc[6] * (Rc[6] * S[15] + Rc[7] * S[16] + Rc[8] * S[17]) + Rc[7] * (Rc[6] * S[16] +
+    Rc[7] * S[18] + Rc[8] * S[19]) + Rc[8] * (Rc[6] * S[17] + Rc[7] * S[19] + Rc[8] * S[20]) + (r[0]
+    * t137 - r[1] * t71 + (r[0] * t133 - r[1] * t67));
+  e_I[0] += Rc[0] * e[0] + Rc[1] * e[1] + Rc[2] * e[2];
+  e_I[1] += Rc[3] * e[0] + Rc[4] * e[1] + Rc[5] * e[2];
+  e_I[2] += Rc[6] * e[0] + Rc[7] * e[1] + Rc[8] * e[2];
+  e_I[3] += Rc[0] * e[3] + Rc[1] * e[4] + Rc[2] * e[5] + (e[0] * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    e[1] * (Rc[7] * r[1] - Rc[4] * r[2]) + e[2] * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * e[3] + Rc[4] * e[4] + Rc[5] * e[5] + (e[0] * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    e[1] * (Rc[1] * r[2] - Rc[7] * r[0]) + e[2] * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * e[3] + Rc[7] * e[4] + Rc[8] * e[5] + (e[0] * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    e[1] * (Rc[4] * r[0] - Rc[1] * r[1]) + e[2] * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic0_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"J", 0, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 0, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_condense_outputs[] = {
-    {"G", 0, "", 0, 0},
-    {"g", 0, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with no free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
@@ -803,112 +212,41 @@ static const mstmm_port mstmm_sweep_generic0_condense_outputs[] = {
  * out udot[0] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic0_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic0_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    (void)H;
-    (void)G;
-    (void)g;
-    (void)udot;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    delta[0] = t16;
-    const real t17 = Rc[1] * t3;
-    const real t18 = Rc[4] * t8;
-    const real t19 = t17 + t18;
-    const real t20 = Rc[7] * t14;
-    const real t21 = t19 + t20;
-    delta[1] = t21;
-    const real t22 = Rc[2] * t3;
-    const real t23 = Rc[5] * t8;
-    const real t24 = t22 + t23;
-    const real t25 = Rc[8] * t14;
-    const real t26 = t24 + t25;
-    delta[2] = t26;
-    const real t27 = Rc[0] * delta_I[3];
-    const real t28 = Rc[3] * delta_I[4];
-    const real t29 = t27 + t28;
-    const real t30 = Rc[6] * delta_I[5];
-    const real t31 = t29 + t30;
-    delta[3] = t31;
-    const real t32 = Rc[1] * delta_I[3];
-    const real t33 = Rc[4] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[7] * delta_I[5];
-    const real t36 = t34 + t35;
-    delta[4] = t36;
-    const real t37 = Rc[2] * delta_I[3];
-    const real t38 = Rc[5] * delta_I[4];
-    const real t39 = t37 + t38;
-    const real t40 = Rc[8] * delta_I[5];
-    const real t41 = t39 + t40;
-    delta[5] = t41;
-    return 0;
+  (void)H;
+  (void)G;
+  (void)g;
+  (void)udot;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  delta[0] = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  delta[1] = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  delta[2] = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  delta[3] = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  delta[4] = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  delta[5] = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic0_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"G", 0, "", 0, 0},
-    {"g", 0, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_recover_outputs[] = {
-    {"udot", 0, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 0 speeds
  * in  H[6][0] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[0] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic0_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic0_effort(in_t H, in_t f, out_t tau)
 {
-    (void)H;
-    (void)f;
-    (void)tau;
-    return 0;
+  (void)H;
+  (void)f;
+  (void)tau;
+  return 0;
 }
 
-static int mstmm_sweep_generic0_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_effort_inputs[] = {
-    {"H", 0, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_effort_outputs[] = {
-    {"tau", 0, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 0 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -918,40 +256,20 @@ static const mstmm_port mstmm_sweep_generic0_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[0] accelerations of the coordinates
  */
-int mstmm_sweep_generic0_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic0_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    (void)Rc;
-    (void)r;
-    (void)H;
-    (void)delta;
-    (void)delta_I;
-    (void)udot;
-    return 0;
+  (void)Rc;
+  (void)r;
+  (void)H;
+  (void)delta;
+  (void)delta_I;
+  (void)udot;
+  return 0;
 }
 
-static int mstmm_sweep_generic0_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_project_outputs[] = {
-    {"udot", 0, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with no free speeds, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
@@ -963,387 +281,97 @@ static const mstmm_port mstmm_sweep_generic0_project_outputs[] = {
  * out G[0][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic0_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic0_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    (void)H;
-    (void)J;
-    (void)W;
-    (void)floor_;
-    (void)F;
-    (void)G;
-    const real t0 = Rc[0] * S[0];
-    const real t1 = Rc[1] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[2] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = Rc[0] * t4;
-    const real t6 = Rc[0] * S[1];
-    const real t7 = Rc[1] * S[6];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[2] * S[7];
-    const real t10 = t8 + t9;
-    const real t11 = Rc[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[0] * S[2];
-    const real t14 = Rc[1] * S[7];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[2] * S[11];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[2] * t17;
-    const real t19 = t12 + t18;
-    S_I[0] += t19;
-    const real t20 = Rc[3] * t4;
-    const real t21 = Rc[4] * t10;
-    const real t22 = t20 + t21;
-    const real t23 = Rc[5] * t17;
-    const real t24 = t22 + t23;
-    S_I[1] += t24;
-    const real t25 = Rc[6] * t4;
-    const real t26 = Rc[7] * t10;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t17;
-    const real t29 = t27 + t28;
-    S_I[2] += t29;
-    const real t30 = Rc[0] * S[3];
-    const real t31 = Rc[1] * S[8];
-    const real t32 = t30 + t31;
-    const real t33 = Rc[2] * S[12];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[0] * t34;
-    const real t36 = Rc[0] * S[4];
-    const real t37 = Rc[1] * S[9];
-    const real t38 = t36 + t37;
-    const real t39 = Rc[2] * S[13];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[1] * t40;
-    const real t42 = t35 + t41;
-    const real t43 = Rc[0] * S[5];
-    const real t44 = Rc[1] * S[10];
-    const real t45 = t43 + t44;
-    const real t46 = Rc[2] * S[14];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[2] * t47;
-    const real t49 = t42 + t48;
-    const real t50 = r[1] * t29;
-    const real t51 = r[2] * t24;
-    const real t52 = t50 - t51;
-    const real t53 = t49 + t52;
-    S_I[3] += t53;
-    const real t54 = Rc[3] * t34;
-    const real t55 = Rc[4] * t40;
-    const real t56 = t54 + t55;
-    const real t57 = Rc[5] * t47;
-    const real t58 = t56 + t57;
-    const real t59 = r[2] * t19;
-    const real t60 = r[0] * t29;
-    const real t61 = t59 - t60;
-    const real t62 = t58 + t61;
-    S_I[4] += t62;
-    const real t63 = Rc[6] * t34;
-    const real t64 = Rc[7] * t40;
-    const real t65 = t63 + t64;
-    const real t66 = Rc[8] * t47;
-    const real t67 = t65 + t66;
-    const real t68 = r[0] * t24;
-    const real t69 = r[1] * t19;
-    const real t70 = t68 - t69;
-    const real t71 = t67 + t70;
-    S_I[5] += t71;
-    const real t72 = Rc[3] * S[0];
-    const real t73 = Rc[4] * S[1];
-    const real t74 = t72 + t73;
-    const real t75 = Rc[5] * S[2];
-    const real t76 = t74 + t75;
-    const real t77 = Rc[3] * t76;
-    const real t78 = Rc[3] * S[1];
-    const real t79 = Rc[4] * S[6];
-    const real t80 = t78 + t79;
-    const real t81 = Rc[5] * S[7];
-    const real t82 = t80 + t81;
-    const real t83 = Rc[4] * t82;
-    const real t84 = t77 + t83;
-    const real t85 = Rc[3] * S[2];
-    const real t86 = Rc[4] * S[7];
-    const real t87 = t85 + t86;
-    const real t88 = Rc[5] * S[11];
-    const real t89 = t87 + t88;
-    const real t90 = Rc[5] * t89;
-    const real t91 = t84 + t90;
-    S_I[6] += t91;
-    const real t92 = Rc[6] * t76;
-    const real t93 = Rc[7] * t82;
-    const real t94 = t92 + t93;
-    const real t95 = Rc[8] * t89;
-    const real t96 = t94 + t95;
-    S_I[7] += t96;
-    const real t97 = Rc[3] * S[3];
-    const real t98 = Rc[4] * S[8];
-    const real t99 = t97 + t98;
-    const real t100 = Rc[5] * S[12];
-    const real t101 = t99 + t100;
-    const real t102 = Rc[0] * t101;
-    const real t103 = Rc[3] * S[4];
-    const real t104 = Rc[4] * S[9];
-    const real t105 = t103 + t104;
-    const real t106 = Rc[5] * S[13];
-    const real t107 = t105 + t106;
-    const real t108 = Rc[1] * t107;
-    const real t109 = t102 + t108;
-    const real t110 = Rc[3] * S[5];
-    const real t111 = Rc[4] * S[10];
-    const real t112 = t110 + t111;
-    const real t113 = Rc[5] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = Rc[2] * t114;
-    const real t116 = t109 + t115;
-    const real t117 = r[1] * t96;
-    const real t118 = r[2] * t91;
-    const real t119 = t117 - t118;
-    const real t120 = t116 + t119;
-    S_I[8] += t120;
-    const real t121 = Rc[3] * t101;
-    const real t122 = Rc[4] * t107;
-    const real t123 = t121 + t122;
-    const real t124 = Rc[5] * t114;
-    const real t125 = t123 + t124;
-    const real t126 = r[0] * t96;
-    const real t127 = t51 - t126;
-    const real t128 = t125 + t127;
-    S_I[9] += t128;
-    const real t129 = Rc[6] * t101;
-    const real t130 = Rc[7] * t107;
-    const real t131 = t129 + t130;
-    const real t132 = Rc[8] * t114;
-    const real t133 = t131 + t132;
-    const real t134 = r[0] * t91;
-    const real t135 = r[1] * t24;
-    const real t136 = t134 - t135;
-    const real t137 = t133 + t136;
-    S_I[10] += t137;
-    const real t138 = Rc[6] * S[0];
-    const real t139 = Rc[7] * S[1];
-    const real t140 = t138 + t139;
-    const real t141 = Rc[8] * S[2];
-    const real t142 = t140 + t141;
-    const real t143 = Rc[6] * t142;
-    const real t144 = Rc[6] * S[1];
-    const real t145 = Rc[7] * S[6];
-    const real t146 = t144 + t145;
-    const real t147 = Rc[8] * S[7];
-    const real t148 = t146 + t147;
-    const real t149 = Rc[7] * t148;
-    const real t150 = t143 + t149;
-    const real t151 = Rc[6] * S[2];
-    const real t152 = Rc[7] * S[7];
-    const real t153 = t151 + t152;
-    const real t154 = Rc[8] * S[11];
-    const real t155 = t153 + t154;
-    const real t156 = Rc[8] * t155;
-    const real t157 = t150 + t156;
-    S_I[11] += t157;
-    const real t158 = Rc[6] * S[3];
-    const real t159 = Rc[7] * S[8];
-    const real t160 = t158 + t159;
-    const real t161 = Rc[8] * S[12];
-    const real t162 = t160 + t161;
-    const real t163 = Rc[0] * t162;
-    const real t164 = Rc[6] * S[4];
-    const real t165 = Rc[7] * S[9];
-    const real t166 = t164 + t165;
-    const real t167 = Rc[8] * S[13];
-    const real t168 = t166 + t167;
-    const real t169 = Rc[1] * t168;
-    const real t170 = t163 + t169;
-    const real t171 = Rc[6] * S[5];
-    const real t172 = Rc[7] * S[10];
-    const real t173 = t171 + t172;
-    const real t174 = Rc[8] * S[14];
-    const real t175 = t173 + t174;
-    const real t176 = Rc[2] * t175;
-    const real t177 = t170 + t176;
-    const real t178 = r[1] * t157;
-    const real t179 = r[2] * t96;
-    const real t180 = t178 - t179;
-    const real t181 = t177 + t180;
-    S_I[12] += t181;
-    const real t182 = Rc[3] * t162;
-    const real t183 = Rc[4] * t168;
-    const real t184 = t182 + t183;
-    const real t185 = Rc[5] * t175;
-    const real t186 = t184 + t185;
-    const real t187 = r[2] * t29;
-    const real t188 = r[0] * t157;
-    const real t189 = t187 - t188;
-    const real t190 = t186 + t189;
-    S_I[13] += t190;
-    const real t191 = Rc[6] * t162;
-    const real t192 = Rc[7] * t168;
-    const real t193 = t191 + t192;
-    const real t194 = Rc[8] * t175;
-    const real t195 = t193 + t194;
-    const real t196 = t126 - t50;
-    const real t197 = t195 + t196;
-    S_I[14] += t197;
-    const real t198 = Rc[0] * S[15];
-    const real t199 = Rc[1] * S[16];
-    const real t200 = t198 + t199;
-    const real t201 = Rc[2] * S[17];
-    const real t202 = t200 + t201;
-    const real t203 = Rc[0] * t202;
-    const real t204 = Rc[0] * S[16];
-    const real t205 = Rc[1] * S[18];
-    const real t206 = t204 + t205;
-    const real t207 = Rc[2] * S[19];
-    const real t208 = t206 + t207;
-    const real t209 = Rc[1] * t208;
-    const real t210 = t203 + t209;
-    const real t211 = Rc[0] * S[17];
-    const real t212 = Rc[1] * S[19];
-    const real t213 = t211 + t212;
-    const real t214 = Rc[2] * S[20];
-    const real t215 = t213 + t214;
-    const real t216 = Rc[2] * t215;
-    const real t217 = t210 + t216;
-    const real t218 = r[1] * t181;
-    const real t219 = r[2] * t120;
-    const real t220 = t218 - t219;
-    const real t221 = r[1] * t177;
-    const real t222 = r[2] * t116;
-    const real t223 = t221 - t222;
-    const real t224 = t220 + t223;
-    const real t225 = t217 + t224;
-    S_I[15] += t225;
-    const real t226 = Rc[3] * t202;
-    const real t227 = Rc[4] * t208;
-    const real t228 = t226 + t227;
-    const real t229 = Rc[5] * t215;
-    const real t230 = t228 + t229;
-    const real t231 = r[1] * t190;
-    const real t232 = r[2] * t128;
-    const real t233 = t231 - t232;
-    const real t234 = r[2] * t49;
-    const real t235 = r[0] * t177;
-    const real t236 = t234 - t235;
-    const real t237 = t233 + t236;
-    const real t238 = t230 + t237;
-    S_I[16] += t238;
-    const real t239 = Rc[6] * t202;
-    const real t240 = Rc[7] * t208;
-    const real t241 = t239 + t240;
-    const real t242 = Rc[8] * t215;
-    const real t243 = t241 + t242;
-    const real t244 = r[1] * t197;
-    const real t245 = r[2] * t137;
-    const real t246 = t244 - t245;
-    const real t247 = r[0] * t116;
-    const real t248 = r[1] * t49;
-    const real t249 = t247 - t248;
-    const real t250 = t246 + t249;
-    const real t251 = t243 + t250;
-    S_I[17] += t251;
-    const real t252 = Rc[3] * S[15];
-    const real t253 = Rc[4] * S[16];
-    const real t254 = t252 + t253;
-    const real t255 = Rc[5] * S[17];
-    const real t256 = t254 + t255;
-    const real t257 = Rc[3] * t256;
-    const real t258 = Rc[3] * S[16];
-    const real t259 = Rc[4] * S[18];
-    const real t260 = t258 + t259;
-    const real t261 = Rc[5] * S[19];
-    const real t262 = t260 + t261;
-    const real t263 = Rc[4] * t262;
-    const real t264 = t257 + t263;
-    const real t265 = Rc[3] * S[17];
-    const real t266 = Rc[4] * S[19];
-    const real t267 = t265 + t266;
-    const real t268 = Rc[5] * S[20];
-    const real t269 = t267 + t268;
-    const real t270 = Rc[5] * t269;
-    const real t271 = t264 + t270;
-    const real t272 = r[2] * t62;
-    const real t273 = r[0] * t190;
-    const real t274 = t272 - t273;
-    const real t275 = r[2] * t58;
-    const real t276 = r[0] * t186;
-    const real t277 = t275 - t276;
-    const real t278 = t274 + t277;
-    const real t279 = t271 + t278;
-    S_I[18] += t279;
-    const real t280 = Rc[6] * t256;
-    const real t281 = Rc[7] * t262;
-    const real t282 = t280 + t281;
-    const real t283 = Rc[8] * t269;
-    const real t284 = t282 + t283;
-    const real t285 = r[2] * t71;
-    const real t286 = r[0] * t197;
-    const real t287 = t285 - t286;
-    const real t288 = r[0] * t125;
-    const real t289 = r[1] * t58;
-    const real t290 = t288 - t289;
-    const real t291 = t287 + t290;
-    const real t292 = t284 + t291;
-    S_I[19] += t292;
-    const real t293 = Rc[6] * S[15];
-    const real t294 = Rc[7] * S[16];
-    const real t295 = t293 + t294;
-    const real t296 = Rc[8] * S[17];
-    const real t297 = t295 + t296;
-    const real t298 = Rc[6] * t297;
-    const real t299 = Rc[6] * S[16];
-    const real t300 = Rc[7] * S[18];
-    const real t301 = t299 + t300;
-    const real t302 = Rc[8] * S[19];
-    const real t303 = t301 + t302;
-    const real t304 = Rc[7] * t303;
-    const real t305 = t298 + t304;
-    const real t306 = Rc[6] * S[17];
-    const real t307 = Rc[7] * S[19];
-    const real t308 = t306 + t307;
-    const real t309 = Rc[8] * S[20];
-    const real t310 = t308 + t309;
-    const real t311 = Rc[8] * t310;
-    const real t312 = t305 + t311;
-    const real t313 = r[0] * t137;
-    const real t314 = r[1] * t71;
-    const real t315 = t313 - t314;
-    const real t316 = r[0] * t133;
-    const real t317 = r[1] * t67;
-    const real t318 = t316 - t317;
-    const real t319 = t315 + t318;
-    const real t320 = t312 + t319;
-    S_I[20] += t320;
-    return 0;
+  (void)H;
+  (void)J;
+  (void)W;
+  (void)floor_;
+  (void)F;
+  (void)G;
+  real t4 = Rc[0] * S[0] + Rc[1] * S[1] + Rc[2] * S[2];
+  real t10 = Rc[0] * S[1] + Rc[1] * S[6] + Rc[2] * S[7];
+  real t17 = Rc[0] * S[2] + Rc[1] * S[7] + Rc[2] * S[11];
+  real t19 = Rc[0] * t4 + Rc[1] * t10 + Rc[2] * t17;
+  S_I[0] += t19;
+  real t24 = Rc[3] * t4 + Rc[4] * t10 + Rc[5] * t17;
+  S_I[1] += t24;
+  real t29 = Rc[6] * t4 + Rc[7] * t10 + Rc[8] * t17;
+  S_I[2] += t29;
+  real t34 = Rc[0] * S[3] + Rc[1] * S[8] + Rc[2] * S[12];
+  real t40 = Rc[0] * S[4] + Rc[1] * S[9] + Rc[2] * S[13];
+  real t47 = Rc[0] * S[5] + Rc[1] * S[10] + Rc[2] * S[14];
+  real t49 = Rc[0] * t34 + Rc[1] * t40 + Rc[2] * t47;
+  real t50 = r[1] * t29;
+  real t51 = r[2] * t24;
+  S_I[3] += t49 + (t50 - t51);
+  real t58 = Rc[3] * t34 + Rc[4] * t40 + Rc[5] * t47;
+  real t62 = t58 + (r[2] * t19 - r[0] * t29);
+  S_I[4] += t62;
+  real t67 = Rc[6] * t34 + Rc[7] * t40 + Rc[8] * t47;
+  real t71 = t67 + (r[0] * t24 - r[1] * t19);
+  S_I[5] += t71;
+  real t76 = Rc[3] * S[0] + Rc[4] * S[1] + Rc[5] * S[2];
+  real t82 = Rc[3] * S[1] + Rc[4] * S[6] + Rc[5] * S[7];
+  real t89 = Rc[3] * S[2] + Rc[4] * S[7] + Rc[5] * S[11];
+  real t91 = Rc[3] * t76 + Rc[4] * t82 + Rc[5] * t89;
+  S_I[6] += t91;
+  real t96 = Rc[6] * t76 + Rc[7] * t82 + Rc[8] * t89;
+  S_I[7] += t96;
+  real t101 = Rc[3] * S[3] + Rc[4] * S[8] + Rc[5] * S[12];
+  real t107 = Rc[3] * S[4] + Rc[4] * S[9] + Rc[5] * S[13];
+  real t114 = Rc[3] * S[5] + Rc[4] * S[10] + Rc[5] * S[14];
+  real t116 = Rc[0] * t101 + Rc[1] * t107 + Rc[2] * t114;
+  real t120 = t116 + (r[1] * t96 - r[2] * t91);
+  S_I[8] += t120;
+  real t125 = Rc[3] * t101 + Rc[4] * t107 + Rc[5] * t114;
+  real t126 = r[0] * t96;
+  real t128 = t125 + (t51 - t126);
+  S_I[9] += t128;
+  real t133 = Rc[6] * t101 + Rc[7] * t107 + Rc[8] * t114;
+  real t137 = t133 + (r[0] * t91 - r[1] * t24);
+  S_I[10] += t137;
+  real t157 = Rc[6] * (Rc[6] * S[0] + Rc[7] * S[1] + Rc[8] * S[2]) + Rc[7] * (Rc[6] * S[1] + Rc[7] *
+    S[6] + Rc[8] * S[7]) + Rc[8] * (Rc[6] * S[2] + Rc[7] * S[7] + Rc[8] * S[11]);
+  S_I[11] += t157;
+  real t162 = Rc[6] * S[3] + Rc[7] * S[8] + Rc[8] * S[12];
+  real t168 = Rc[6] * S[4] + Rc[7] * S[9] + Rc[8] * S[13];
+  real t175 = Rc[6] * S[5] + Rc[7] * S[10] + Rc[8] * S[14];
+  real t177 = Rc[0] * t162 + Rc[1] * t168 + Rc[2] * t175;
+  real t181 = t177 + (r[1] * t157 - r[2] * t96);
+  S_I[12] += t181;
+  real t186 = Rc[3] * t162 + Rc[4] * t168 + Rc[5] * t175;
+  real t190 = t186 + (r[2] * t29 - r[0] * t157);
+  S_I[13] += t190;
+  real t197 = Rc[6] * t162 + Rc[7] * t168 + Rc[8] * t175 + (t126 - t50);
+  S_I[14] += t197;
+  real t202 = Rc[0] * S[15] + Rc[1] * S[16] + Rc[2] * S[17];
+  real t208 = Rc[0] * S[16] + Rc[1] * S[18] + Rc[2] * S[19];
+  real t215 = Rc[0] * S[17] + Rc[1] * S[19] + Rc[2] * S[20];
+  S_I[15] += Rc[0] * t202 + Rc[1] * t208 + Rc[2] * t215 + (r[1] * t181 - r[2] * t120 + (r[1] * t177
+    - r[2] * t116));
+  S_I[16] += Rc[3] * t202 + Rc[4] * t208 + Rc[5] * t215 + (r[1] * t190 - r[2] * t128 + (r[2] * t49 -
+    r[0] * t177));
+  S_I[17] += Rc[6] * t202 + Rc[7] * t208 + Rc[8] * t215 + (r[1] * t197 - r[2] * t137 + (r[0] * t116
+    - r[1] * t49));
+  real t256 = Rc[3] * S[15] + Rc[4] * S[16] + Rc[5] * S[17];
+  real t262 = Rc[3] * S[16] + Rc[4] * S[18] + Rc[5] * S[19];
+  real t269 = Rc[3] * S[17] + Rc[4] * S[19] + Rc[5] * S[20];
+  S_I[18] += Rc[3] * t256 + Rc[4] * t262 + Rc[5] * t269 + (r[2] * t62 - r[0] * t190 + (r[2] * t58 -
+    r[0] * t186));
+  S_I[19] += Rc[6] * t256 + Rc[7] * t262 + Rc[8] * t269 + (r[2] * t71 - r[0] * t197 + (r[0] * t125 -
+    r[1] * t58));
+  S_I[20] += Rc[6] * (Rc[6] * S[15] + Rc[7] * S[16] + Rc[8] * S[17]) + Rc[7] * (Rc[6] * S[16] +
+    Rc[7] * S[18] + Rc[8] * S[19]) + Rc[8] * (Rc[6] * S[17] + Rc[7] * S[19] + Rc[8] * S[20]) + (r[0]
+    * t137 - r[1] * t71 + (r[0] * t133 - r[1] * t67));
+  return 0;
 }
 
-static int mstmm_sweep_generic0_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"J", 0, "kg*m2 or kg", 0, 0},
-    {"W", 0, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
-    {"F", 0, "", 0, 0},
-    {"G", 0, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with no free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
@@ -1353,121 +381,29 @@ static const mstmm_port mstmm_sweep_generic0_factor_outputs[] = {
  * out y[0] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic0_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic0_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    (void)H;
-    (void)G;
-    (void)tau;
-    (void)y;
-    const real t0 = Rc[0] * e[0];
-    const real t1 = Rc[1] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[2] * e[2];
-    const real t4 = t2 + t3;
-    e_I[0] += t4;
-    const real t5 = Rc[3] * e[0];
-    const real t6 = Rc[4] * e[1];
-    const real t7 = t5 + t6;
-    const real t8 = Rc[5] * e[2];
-    const real t9 = t7 + t8;
-    e_I[1] += t9;
-    const real t10 = Rc[6] * e[0];
-    const real t11 = Rc[7] * e[1];
-    const real t12 = t10 + t11;
-    const real t13 = Rc[8] * e[2];
-    const real t14 = t12 + t13;
-    e_I[2] += t14;
-    const real t15 = Rc[0] * e[3];
-    const real t16 = Rc[1] * e[4];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[2] * e[5];
-    const real t19 = t17 + t18;
-    const real t20 = Rc[6] * r[1];
-    const real t21 = Rc[3] * r[2];
-    const real t22 = t20 - t21;
-    const real t23 = e[0] * t22;
-    const real t24 = Rc[7] * r[1];
-    const real t25 = Rc[4] * r[2];
-    const real t26 = t24 - t25;
-    const real t27 = e[1] * t26;
-    const real t28 = t23 + t27;
-    const real t29 = Rc[8] * r[1];
-    const real t30 = Rc[5] * r[2];
-    const real t31 = t29 - t30;
-    const real t32 = e[2] * t31;
-    const real t33 = t28 + t32;
-    const real t34 = t19 + t33;
-    e_I[3] += t34;
-    const real t35 = Rc[3] * e[3];
-    const real t36 = Rc[4] * e[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rc[5] * e[5];
-    const real t39 = t37 + t38;
-    const real t40 = Rc[0] * r[2];
-    const real t41 = Rc[6] * r[0];
-    const real t42 = t40 - t41;
-    const real t43 = e[0] * t42;
-    const real t44 = Rc[1] * r[2];
-    const real t45 = Rc[7] * r[0];
-    const real t46 = t44 - t45;
-    const real t47 = e[1] * t46;
-    const real t48 = t43 + t47;
-    const real t49 = Rc[2] * r[2];
-    const real t50 = Rc[8] * r[0];
-    const real t51 = t49 - t50;
-    const real t52 = e[2] * t51;
-    const real t53 = t48 + t52;
-    const real t54 = t39 + t53;
-    e_I[4] += t54;
-    const real t55 = Rc[6] * e[3];
-    const real t56 = Rc[7] * e[4];
-    const real t57 = t55 + t56;
-    const real t58 = Rc[8] * e[5];
-    const real t59 = t57 + t58;
-    const real t60 = Rc[3] * r[0];
-    const real t61 = Rc[0] * r[1];
-    const real t62 = t60 - t61;
-    const real t63 = e[0] * t62;
-    const real t64 = Rc[4] * r[0];
-    const real t65 = Rc[1] * r[1];
-    const real t66 = t64 - t65;
-    const real t67 = e[1] * t66;
-    const real t68 = t63 + t67;
-    const real t69 = Rc[5] * r[0];
-    const real t70 = Rc[2] * r[1];
-    const real t71 = t69 - t70;
-    const real t72 = e[2] * t71;
-    const real t73 = t68 + t72;
-    const real t74 = t59 + t73;
-    e_I[5] += t74;
-    return 0;
+  (void)H;
+  (void)G;
+  (void)tau;
+  (void)y;
+  e_I[0] += Rc[0] * e[0] + Rc[1] * e[1] + Rc[2] * e[2];
+  e_I[1] += Rc[3] * e[0] + Rc[4] * e[1] + Rc[5] * e[2];
+  e_I[2] += Rc[6] * e[0] + Rc[7] * e[1] + Rc[8] * e[2];
+  e_I[3] += Rc[0] * e[3] + Rc[1] * e[4] + Rc[2] * e[5] + (e[0] * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    e[1] * (Rc[7] * r[1] - Rc[4] * r[2]) + e[2] * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * e[3] + Rc[4] * e[4] + Rc[5] * e[5] + (e[0] * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    e[1] * (Rc[1] * r[2] - Rc[7] * r[0]) + e[2] * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * e[3] + Rc[7] * e[4] + Rc[8] * e[5] + (e[0] * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    e[1] * (Rc[4] * r[0] - Rc[1] * r[1]) + e[2] * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic0_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"G", 0, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 0, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_column_load_outputs[] = {
-    {"y", 0, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with no free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][0] motion subspace of the free coordinates
@@ -1478,90 +414,30 @@ static const mstmm_port mstmm_sweep_generic0_column_load_outputs[] = {
  * out udot[0] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic0_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic0_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    (void)H;
-    (void)F;
-    (void)G;
-    (void)y;
-    (void)udot;
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    delta[0] = t16;
-    const real t17 = Rc[1] * t3;
-    const real t18 = Rc[4] * t8;
-    const real t19 = t17 + t18;
-    const real t20 = Rc[7] * t14;
-    const real t21 = t19 + t20;
-    delta[1] = t21;
-    const real t22 = Rc[2] * t3;
-    const real t23 = Rc[5] * t8;
-    const real t24 = t22 + t23;
-    const real t25 = Rc[8] * t14;
-    const real t26 = t24 + t25;
-    delta[2] = t26;
-    const real t27 = Rc[0] * delta_I[3];
-    const real t28 = Rc[3] * delta_I[4];
-    const real t29 = t27 + t28;
-    const real t30 = Rc[6] * delta_I[5];
-    const real t31 = t29 + t30;
-    delta[3] = t31;
-    const real t32 = Rc[1] * delta_I[3];
-    const real t33 = Rc[4] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[7] * delta_I[5];
-    const real t36 = t34 + t35;
-    delta[4] = t36;
-    const real t37 = Rc[2] * delta_I[3];
-    const real t38 = Rc[5] * delta_I[4];
-    const real t39 = t37 + t38;
-    const real t40 = Rc[8] * delta_I[5];
-    const real t41 = t39 + t40;
-    delta[5] = t41;
-    return 0;
+  (void)H;
+  (void)F;
+  (void)G;
+  (void)y;
+  (void)udot;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  delta[0] = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  delta[1] = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  delta[2] = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  delta[3] = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  delta[4] = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  delta[5] = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic0_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"F", 0, "", 0, 0},
-    {"G", 0, "", 0, 0},
-    {"y", 0, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_column_acceleration_outputs[] = {
-    {"udot", 0, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with no free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6][0] motion subspace of the free coordinates
@@ -1577,223 +453,88 @@ static const mstmm_port mstmm_sweep_generic0_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic0_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic0_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    (void)H;
-    (void)J;
-    (void)floor_;
-    (void)tau;
-    (void)G;
-    (void)g;
-    const real t0 = U[0] < 0.0;
-    const real t1 = t0 != 0 ? (-1.0) : 1.0;
-    const real t2 = U[0] * t1;
-    V[0] = t2;
-    const real t3 = U[1] * t1;
-    V[1] = t3;
-    const real t4 = U[2] * t1;
-    V[2] = t4;
-    const real t5 = U[3] * t1;
-    V[3] = t5;
-    const real t6 = U[4] * t1;
-    V[4] = t6;
-    const real t7 = U[5] * t1;
-    V[5] = t7;
-    const real t8 = U[6] < 0.0;
-    const real t9 = t8 != 0 ? (-1.0) : 1.0;
-    const real t10 = U[6] * t9;
-    V[6] = t10;
-    const real t11 = U[7] * t9;
-    V[7] = t11;
-    const real t12 = U[8] * t9;
-    V[8] = t12;
-    const real t13 = U[9] * t9;
-    V[9] = t13;
-    const real t14 = U[10] * t9;
-    V[10] = t14;
-    const real t15 = U[11] < 0.0;
-    const real t16 = t15 != 0 ? (-1.0) : 1.0;
-    const real t17 = U[11] * t16;
-    V[11] = t17;
-    const real t18 = U[12] * t16;
-    V[12] = t18;
-    const real t19 = U[13] * t16;
-    V[13] = t19;
-    const real t20 = U[14] * t16;
-    V[14] = t20;
-    const real t21 = U[15] < 0.0;
-    const real t22 = t21 != 0 ? (-1.0) : 1.0;
-    const real t23 = U[15] * t22;
-    V[15] = t23;
-    const real t24 = U[16] * t22;
-    V[16] = t24;
-    const real t25 = U[17] * t22;
-    V[17] = t25;
-    const real t26 = U[18] < 0.0;
-    const real t27 = t26 != 0 ? (-1.0) : 1.0;
-    const real t28 = U[18] * t27;
-    V[18] = t28;
-    const real t29 = U[19] * t27;
-    V[19] = t29;
-    const real t30 = U[20] < 0.0;
-    const real t31 = t30 != 0 ? (-1.0) : 1.0;
-    const real t32 = U[20] * t31;
-    V[20] = t32;
-    const real t33 = U[0] * U[0];
-    const real t34 = t33 * 1e-26;
-    const real t35 = t34 < t33;
-    const real t36 = 1.0 / U[0];
-    const real t37 = e[0] * t36;
-    const real t38 = t35 != 0 ? t37 : 0.0;
-    const real t39 = d[0] + t38;
-    const real t40 = t39 * t1;
-    d_V[0] = t40;
-    const real t41 = U[6] * U[6];
-    const real t42 = U[1] * U[1];
-    const real t43 = t41 + t42;
-    const real t44 = 1e-26 * t43;
-    const real t45 = t44 < t41;
-    const real t46 = U[1] * t38;
-    const real t47 = e[1] - t46;
-    const real t48 = 1.0 / U[6];
-    const real t49 = t47 * t48;
-    const real t50 = t45 != 0 ? t49 : 0.0;
-    const real t51 = d[1] + t50;
-    const real t52 = t51 * t9;
-    d_V[1] = t52;
-    const real t53 = U[11] * U[11];
-    const real t54 = U[2] * U[2];
-    const real t55 = U[7] * U[7];
-    const real t56 = t54 + t55;
-    const real t57 = t53 + t56;
-    const real t58 = 1e-26 * t57;
-    const real t59 = t58 < t53;
-    const real t60 = U[2] * t38;
-    const real t61 = U[7] * t50;
-    const real t62 = t60 + t61;
-    const real t63 = e[2] - t62;
-    const real t64 = 1.0 / U[11];
-    const real t65 = t63 * t64;
-    const real t66 = t59 != 0 ? t65 : 0.0;
-    const real t67 = d[2] + t66;
-    const real t68 = t67 * t16;
-    d_V[2] = t68;
-    const real t69 = U[15] * U[15];
-    const real t70 = U[12] * U[12];
-    const real t71 = U[3] * U[3];
-    const real t72 = U[8] * U[8];
-    const real t73 = t71 + t72;
-    const real t74 = t70 + t73;
-    const real t75 = t69 + t74;
-    const real t76 = 1e-26 * t75;
-    const real t77 = t76 < t69;
-    const real t78 = U[12] * t66;
-    const real t79 = U[3] * t38;
-    const real t80 = U[8] * t50;
-    const real t81 = t79 + t80;
-    const real t82 = t78 + t81;
-    const real t83 = e[3] - t82;
-    const real t84 = 1.0 / U[15];
-    const real t85 = t83 * t84;
-    const real t86 = t77 != 0 ? t85 : 0.0;
-    const real t87 = d[3] + t86;
-    const real t88 = t87 * t22;
-    d_V[3] = t88;
-    const real t89 = U[18] * U[18];
-    const real t90 = U[16] * U[16];
-    const real t91 = U[13] * U[13];
-    const real t92 = U[4] * U[4];
-    const real t93 = U[9] * U[9];
-    const real t94 = t92 + t93;
-    const real t95 = t91 + t94;
-    const real t96 = t90 + t95;
-    const real t97 = t89 + t96;
-    const real t98 = 1e-26 * t97;
-    const real t99 = t98 < t89;
-    const real t100 = U[16] * t86;
-    const real t101 = U[13] * t66;
-    const real t102 = U[4] * t38;
-    const real t103 = U[9] * t50;
-    const real t104 = t102 + t103;
-    const real t105 = t101 + t104;
-    const real t106 = t100 + t105;
-    const real t107 = e[4] - t106;
-    const real t108 = 1.0 / U[18];
-    const real t109 = t107 * t108;
-    const real t110 = t99 != 0 ? t109 : 0.0;
-    const real t111 = d[4] + t110;
-    const real t112 = t111 * t27;
-    d_V[4] = t112;
-    const real t113 = U[20] * U[20];
-    const real t114 = U[19] * U[19];
-    const real t115 = U[17] * U[17];
-    const real t116 = U[14] * U[14];
-    const real t117 = U[5] * U[5];
-    const real t118 = U[10] * U[10];
-    const real t119 = t117 + t118;
-    const real t120 = t116 + t119;
-    const real t121 = t115 + t120;
-    const real t122 = t114 + t121;
-    const real t123 = t113 + t122;
-    const real t124 = 1e-26 * t123;
-    const real t125 = t124 < t113;
-    const real t126 = U[19] * t110;
-    const real t127 = U[17] * t86;
-    const real t128 = U[14] * t66;
-    const real t129 = U[5] * t38;
-    const real t130 = U[10] * t50;
-    const real t131 = t129 + t130;
-    const real t132 = t128 + t131;
-    const real t133 = t127 + t132;
-    const real t134 = t126 + t133;
-    const real t135 = e[5] - t134;
-    const real t136 = 1.0 / U[20];
-    const real t137 = t135 * t136;
-    const real t138 = t125 != 0 ? t137 : 0.0;
-    const real t139 = d[5] + t138;
-    const real t140 = t139 * t31;
-    d_V[5] = t140;
-    const real t141 = t35 != 0 ? 0.0 : e[0];
-    e_Q[0] = t141;
-    const real t142 = t45 != 0 ? 0.0 : t47;
-    e_Q[1] = t142;
-    const real t143 = t59 != 0 ? 0.0 : t63;
-    e_Q[2] = t143;
-    const real t144 = t77 != 0 ? 0.0 : t83;
-    e_Q[3] = t144;
-    const real t145 = t99 != 0 ? 0.0 : t107;
-    e_Q[4] = t145;
-    const real t146 = t125 != 0 ? 0.0 : t135;
-    e_Q[5] = t146;
-    return 0;
+  (void)H;
+  (void)J;
+  (void)floor_;
+  (void)tau;
+  (void)G;
+  (void)g;
+  real t1 = (U[0] < 0.0) ? (-1.0) : 1.0;
+  V[0] = U[0] * t1;
+  V[1] = U[1] * t1;
+  V[2] = U[2] * t1;
+  V[3] = U[3] * t1;
+  V[4] = U[4] * t1;
+  V[5] = U[5] * t1;
+  real t9 = (U[6] < 0.0) ? (-1.0) : 1.0;
+  V[6] = U[6] * t9;
+  V[7] = U[7] * t9;
+  V[8] = U[8] * t9;
+  V[9] = U[9] * t9;
+  V[10] = U[10] * t9;
+  real t16 = (U[11] < 0.0) ? (-1.0) : 1.0;
+  V[11] = U[11] * t16;
+  V[12] = U[12] * t16;
+  V[13] = U[13] * t16;
+  V[14] = U[14] * t16;
+  real t22 = (U[15] < 0.0) ? (-1.0) : 1.0;
+  V[15] = U[15] * t22;
+  V[16] = U[16] * t22;
+  V[17] = U[17] * t22;
+  real t27 = (U[18] < 0.0) ? (-1.0) : 1.0;
+  V[18] = U[18] * t27;
+  V[19] = U[19] * t27;
+  real t31 = (U[20] < 0.0) ? (-1.0) : 1.0;
+  V[20] = U[20] * t31;
+  real t33 = U[0] * U[0];
+  real t35 = t33 * 1e-26 < t33;
+  real t37 = e[0] * (1.0 / U[0]);
+  real t38 = t35 != 0 ? t37 : 0.0;
+  d_V[0] = (d[0] + t38) * t1;
+  real t41 = U[6] * U[6];
+  real t45 = 1e-26 * (t41 + U[1] * U[1]) < t41;
+  real t47 = e[1] - U[1] * t38;
+  real t49 = t47 * (1.0 / U[6]);
+  real t50 = t45 != 0 ? t49 : 0.0;
+  d_V[1] = (d[1] + t50) * t9;
+  real t53 = U[11] * U[11];
+  real t59 = 1e-26 * (t53 + (U[2] * U[2] + U[7] * U[7])) < t53;
+  real t63 = e[2] - (U[2] * t38 + U[7] * t50);
+  real t65 = t63 * (1.0 / U[11]);
+  real t66 = t59 != 0 ? t65 : 0.0;
+  d_V[2] = (d[2] + t66) * t16;
+  real t69 = U[15] * U[15];
+  real t77 = 1e-26 * (t69 + (U[12] * U[12] + (U[3] * U[3] + U[8] * U[8]))) < t69;
+  real t83 = e[3] - (U[12] * t66 + (U[3] * t38 + U[8] * t50));
+  real t85 = t83 * (1.0 / U[15]);
+  real t86 = t77 != 0 ? t85 : 0.0;
+  d_V[3] = (d[3] + t86) * t22;
+  real t89 = U[18] * U[18];
+  real t99 = 1e-26 * (t89 + (U[16] * U[16] + (U[13] * U[13] + (U[4] * U[4] + U[9] * U[9])))) < t89;
+  real t107 = e[4] - (U[16] * t86 + (U[13] * t66 + (U[4] * t38 + U[9] * t50)));
+  real t109 = t107 * (1.0 / U[18]);
+  real t110 = t99 != 0 ? t109 : 0.0;
+  d_V[4] = (d[4] + t110) * t27;
+  real t113 = U[20] * U[20];
+  real t125 = 1e-26 * (t113 + (U[19] * U[19] + (U[17] * U[17] + (U[14] * U[14] + (U[5] * U[5] +
+    U[10] * U[10]))))) < t113;
+  real t135 = e[5] - (U[19] * t110 + (U[17] * t86 + (U[14] * t66 + (U[5] * t38 + U[10] * t50))));
+  real t137 = t135 * (1.0 / U[20]);
+  d_V[5] = (d[5] + (t125 != 0 ? t137 : 0.0)) * t31;
+  e_Q[0] = t35 != 0 ? 0.0 : e[0];
+  e_Q[1] = t45 != 0 ? 0.0 : t47;
+  e_Q[2] = t59 != 0 ? 0.0 : t63;
+  e_Q[3] = t77 != 0 ? 0.0 : t83;
+  e_Q[4] = t99 != 0 ? 0.0 : t107;
+  e_Q[5] = t125 != 0 ? 0.0 : t135;
+  return 0;
 }
 
-static int mstmm_sweep_generic0_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_qr_eliminate_inputs[] = {
-    {"H", 0, "", 0, 0},
-    {"J", 0, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 0, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_qr_eliminate_outputs[] = {
-    {"G", 0, "", 0, 0},
-    {"g", 0, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 0 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1806,81 +547,27 @@ static const mstmm_port mstmm_sweep_generic0_qr_eliminate_outputs[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic0_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic0_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    (void)H;
-    (void)s;
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = t5 - c[3];
-    const real t7 = motion[3] + t6;
-    Q[3] = t7;
-    const real t8 = w[2] * t0;
-    const real t9 = w[0] * t2;
-    const real t10 = t8 - t9;
-    const real t11 = t10 - c[4];
-    const real t12 = motion[4] + t11;
-    Q[4] = t12;
-    const real t13 = w[0] * t1;
-    const real t14 = w[1] * t0;
-    const real t15 = t13 - t14;
-    const real t16 = t15 - c[5];
-    const real t17 = motion[5] + t16;
-    Q[5] = t17;
-    const real t18 = v[1] * t2;
-    const real t19 = t18 * 2.0;
-    const real t20 = v[2] * t1;
-    const real t21 = 2.0 * t20;
-    const real t22 = t19 - t21;
-    const real t23 = t22 - c[0];
-    const real t24 = motion[6] + t23;
-    Q[6] = t24;
-    const real t25 = v[2] * t0;
-    const real t26 = 2.0 * t25;
-    const real t27 = v[0] * t2;
-    const real t28 = 2.0 * t27;
-    const real t29 = t26 - t28;
-    const real t30 = t29 - c[1];
-    const real t31 = motion[7] + t30;
-    Q[7] = t31;
-    const real t32 = v[0] * t1;
-    const real t33 = 2.0 * t32;
-    const real t34 = v[1] * t0;
-    const real t35 = 2.0 * t34;
-    const real t36 = t33 - t35;
-    const real t37 = t36 - c[2];
-    const real t38 = motion[8] + t37;
-    Q[8] = t38;
-    return 0;
+  (void)H;
+  (void)s;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - c[3]);
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - c[4]);
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - c[5]);
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - c[0]);
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - c[1]);
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - c[2]);
+  return 0;
 }
 
-static int mstmm_sweep_generic0_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_tangent_carrier_inputs[] = {
-    {"H", 0, "", 0, 0},
-    {"s", 0, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 0 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1904,288 +591,78 @@ static const mstmm_port mstmm_sweep_generic0_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[0] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic0_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic0_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    (void)H;
-    (void)s;
-    (void)d_H;
-    (void)d_s;
-    (void)J;
-    (void)laws;
-    (void)row;
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = theta[2] * Q[4];
-    const real t16 = Q[1] * d_w[2];
-    const real t17 = Q[2] * d_w[1];
-    const real t18 = t16 - t17;
-    const real t19 = t15 + t18;
-    const real t20 = theta[1] * Q[5];
-    const real t21 = t19 - t20;
-    const real t22 = d_c[3] + t21;
-    const real t23 = t14 + t22;
-    B[3] = t23;
-    const real t24 = w[0] * t10;
-    const real t25 = w[2] * t2;
-    const real t26 = t24 - t25;
-    const real t27 = theta[0] * Q[5];
-    const real t28 = Q[2] * d_w[0];
-    const real t29 = Q[0] * d_w[2];
-    const real t30 = t28 - t29;
-    const real t31 = theta[2] * Q[3];
-    const real t32 = t30 - t31;
-    const real t33 = t27 + t32;
-    const real t34 = d_c[4] + t33;
-    const real t35 = t26 + t34;
-    B[4] = t35;
-    const real t36 = w[1] * t2;
-    const real t37 = w[0] * t6;
-    const real t38 = t36 - t37;
-    const real t39 = theta[1] * Q[3];
-    const real t40 = Q[0] * d_w[1];
-    const real t41 = Q[1] * d_w[0];
-    const real t42 = t40 - t41;
-    const real t43 = t39 + t42;
-    const real t44 = theta[0] * Q[4];
-    const real t45 = t43 - t44;
-    const real t46 = d_c[5] + t45;
-    const real t47 = t38 + t46;
-    B[5] = t47;
-    const real t48 = v[2] * 2.0;
-    const real t49 = t6 * t48;
-    const real t50 = v[1] * 2.0;
-    const real t51 = t10 * t50;
-    const real t52 = t49 - t51;
-    const real t53 = theta[2] * Q[7];
-    const real t54 = x[2] * Q[4];
-    const real t55 = Q[1] * d_v[2];
-    const real t56 = 2.0 * t55;
-    const real t57 = x[1] * Q[0];
-    const real t58 = x[0] * Q[1];
-    const real t59 = t57 - t58;
-    const real t60 = Q[1] * t59;
-    const real t61 = x[0] * Q[2];
-    const real t62 = x[2] * Q[0];
-    const real t63 = t61 - t62;
-    const real t64 = Q[2] * t63;
-    const real t65 = t60 - t64;
-    const real t66 = t56 + t65;
-    const real t67 = Q[2] * d_v[1];
-    const real t68 = 2.0 * t67;
-    const real t69 = t66 - t68;
-    const real t70 = t54 + t69;
-    const real t71 = x[1] * Q[5];
-    const real t72 = t70 - t71;
-    const real t73 = t53 + t72;
-    const real t74 = theta[1] * Q[8];
-    const real t75 = t73 - t74;
-    const real t76 = d_c[0] + t75;
-    const real t77 = t52 + t76;
-    B[6] = t77;
-    const real t78 = v[0] * 2.0;
-    const real t79 = t10 * t78;
-    const real t80 = t2 * t48;
-    const real t81 = t79 - t80;
-    const real t82 = theta[0] * Q[8];
-    const real t83 = x[0] * Q[5];
-    const real t84 = Q[2] * d_v[0];
-    const real t85 = 2.0 * t84;
-    const real t86 = x[2] * Q[1];
-    const real t87 = x[1] * Q[2];
-    const real t88 = t86 - t87;
-    const real t89 = Q[2] * t88;
-    const real t90 = Q[0] * t59;
-    const real t91 = t89 - t90;
-    const real t92 = Q[0] * d_v[2];
-    const real t93 = 2.0 * t92;
-    const real t94 = t91 - t93;
-    const real t95 = t85 + t94;
-    const real t96 = x[2] * Q[3];
-    const real t97 = t95 - t96;
-    const real t98 = t83 + t97;
-    const real t99 = theta[2] * Q[6];
-    const real t100 = t98 - t99;
-    const real t101 = t82 + t100;
-    const real t102 = d_c[1] + t101;
-    const real t103 = t81 + t102;
-    B[7] = t103;
-    const real t104 = t2 * t50;
-    const real t105 = t6 * t78;
-    const real t106 = t104 - t105;
-    const real t107 = theta[1] * Q[6];
-    const real t108 = x[1] * Q[3];
-    const real t109 = Q[0] * d_v[1];
-    const real t110 = 2.0 * t109;
-    const real t111 = Q[0] * t63;
-    const real t112 = Q[1] * t88;
-    const real t113 = t111 - t112;
-    const real t114 = t110 + t113;
-    const real t115 = Q[1] * d_v[0];
-    const real t116 = 2.0 * t115;
-    const real t117 = t114 - t116;
-    const real t118 = t108 + t117;
-    const real t119 = x[0] * Q[4];
-    const real t120 = t118 - t119;
-    const real t121 = t107 + t120;
-    const real t122 = theta[0] * Q[7];
-    const real t123 = t121 - t122;
-    const real t124 = d_c[2] + t123;
-    const real t125 = t106 + t124;
-    B[8] = t125;
-    const real t126 = theta[1] * f[2];
-    const real t127 = theta[2] * f[1];
-    const real t128 = t126 - t127;
-    G[0] = t128;
-    const real t129 = theta[2] * f[0];
-    const real t130 = theta[0] * f[2];
-    const real t131 = t129 - t130;
-    G[1] = t131;
-    const real t132 = theta[0] * f[1];
-    const real t133 = theta[1] * f[0];
-    const real t134 = t132 - t133;
-    G[2] = t134;
-    const real t135 = theta[1] * f[5];
-    const real t136 = x[1] * f[2];
-    const real t137 = x[2] * f[1];
-    const real t138 = t136 - t137;
-    const real t139 = theta[2] * f[4];
-    const real t140 = t138 - t139;
-    const real t141 = t135 + t140;
-    G[3] = t141;
-    const real t142 = theta[2] * f[3];
-    const real t143 = x[2] * f[0];
-    const real t144 = x[0] * f[2];
-    const real t145 = t143 - t144;
-    const real t146 = t142 + t145;
-    const real t147 = theta[0] * f[5];
-    const real t148 = t146 - t147;
-    G[4] = t148;
-    const real t149 = theta[0] * f[4];
-    const real t150 = x[0] * f[1];
-    const real t151 = x[1] * f[0];
-    const real t152 = t150 - t151;
-    const real t153 = theta[1] * f[3];
-    const real t154 = t152 - t153;
-    const real t155 = t149 + t154;
-    G[5] = t155;
-    return 0;
+  (void)H;
+  (void)s;
+  (void)d_H;
+  (void)d_s;
+  (void)J;
+  (void)laws;
+  (void)row;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (theta[2] * Q[4] + (Q[1] * d_w[2] - Q[2] * d_w[1]) -
+    theta[1] * Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (theta[0] * Q[5] + (Q[2] * d_w[0] - Q[0] * d_w[2] -
+    theta[2] * Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (theta[1] * Q[3] + (Q[0] * d_w[1] - Q[1] * d_w[0]) -
+    theta[0] * Q[4]));
+  real t48 = v[2] * 2.0;
+  real t50 = v[1] * 2.0;
+  real t59 = x[1] * Q[0] - x[0] * Q[1];
+  real t63 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t48 - t10 * t50 + (d_c[0] + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * d_v[2]) +
+    (Q[1] * t59 - Q[2] * t63) - 2.0 * (Q[2] * d_v[1])) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t78 = v[0] * 2.0;
+  real t88 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t78 - t2 * t48 + (d_c[1] + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * d_v[0]) +
+    (Q[2] * t88 - Q[0] * t59 - 2.0 * (Q[0] * d_v[2])) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t2 * t50 - t6 * t78 + (d_c[2] + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * d_v[1]) +
+    (Q[0] * t63 - Q[1] * t88) - 2.0 * (Q[1] * d_v[0])) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  return 0;
 }
 
-static int mstmm_sweep_generic0_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"s", 0, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 0, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 0, "", 0, 0},
-    {"J", 0, "kg*m2 or kg", 0, 0},
-    {"laws", 0, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 0, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* free and constrained directions of a hinge with 0 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][0] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic0_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic0_complement(in_t H, out_t W)
 {
-    (void)H;
-    W[0] = 1.0;
-    W[1] = 0.0;
-    W[2] = 0.0;
-    W[3] = 0.0;
-    W[4] = 0.0;
-    W[5] = 0.0;
-    W[6] = 0.0;
-    W[7] = 1.0;
-    W[8] = 0.0;
-    W[9] = 0.0;
-    W[10] = 0.0;
-    W[11] = 0.0;
-    W[12] = 0.0;
-    W[13] = 0.0;
-    W[14] = 1.0;
-    W[15] = 0.0;
-    W[16] = 0.0;
-    W[17] = 0.0;
-    W[18] = 0.0;
-    W[19] = 0.0;
-    W[20] = 0.0;
-    W[21] = 1.0;
-    W[22] = 0.0;
-    W[23] = 0.0;
-    W[24] = 0.0;
-    W[25] = 0.0;
-    W[26] = 0.0;
-    W[27] = 0.0;
-    W[28] = 1.0;
-    W[29] = 0.0;
-    W[30] = 0.0;
-    W[31] = 0.0;
-    W[32] = 0.0;
-    W[33] = 0.0;
-    W[34] = 0.0;
-    W[35] = 1.0;
-    return 0;
+  (void)H;
+  W[0] = 1.0;
+  W[1] = W[2] = W[3] = W[4] = W[5] = W[6] = 0.0;
+  W[7] = 1.0;
+  W[8] = W[9] = W[10] = W[11] = W[12] = W[13] = 0.0;
+  W[14] = 1.0;
+  W[15] = W[16] = W[17] = W[18] = W[19] = W[20] = 0.0;
+  W[21] = 1.0;
+  W[22] = W[23] = W[24] = W[25] = W[26] = W[27] = 0.0;
+  W[28] = 1.0;
+  W[29] = W[30] = W[31] = W[32] = W[33] = W[34] = 0.0;
+  W[35] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic0_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_complement_inputs[] = {
-    {"H", 0, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_complement, (in[0], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -2208,468 +685,117 @@ static const mstmm_port mstmm_sweep_generic0_complement_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic0_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic0_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)H;
-    (void)c;
-    (void)s;
-    (void)d_H;
-    (void)d_s;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = d_c[3] + t157;
-    const real t159 = motion_I[5] * t34;
-    const real t160 = t65 * d_motion_I[5];
-    const real t161 = t159 + t160;
-    const real t162 = motion_I[4] * t19;
-    const real t163 = t73 * d_motion_I[4];
-    const real t164 = t162 + t163;
-    const real t165 = motion_I[3] * t4;
-    const real t166 = t81 * d_motion_I[3];
-    const real t167 = t165 + t166;
-    const real t168 = t164 + t167;
-    const real t169 = t161 + t168;
-    const real t170 = t158 + t169;
-    d_motion[3] = t170;
-    const real t171 = t153 * d_w[0];
-    const real t172 = w[0] * t139;
-    const real t173 = t171 + t172;
-    const real t174 = w[2] * t85;
-    const real t175 = t81 * motion_I[0];
-    const real t176 = t73 * motion_I[1];
-    const real t177 = t175 + t176;
-    const real t178 = t65 * motion_I[2];
-    const real t179 = t177 + t178;
-    const real t180 = t179 * d_w[2];
-    const real t181 = t174 + t180;
-    const real t182 = t173 - t181;
-    const real t183 = d_c[4] + t182;
-    const real t184 = motion_I[5] * t39;
-    const real t185 = t92 * d_motion_I[5];
-    const real t186 = t184 + t185;
-    const real t187 = motion_I[4] * t24;
-    const real t188 = t100 * d_motion_I[4];
-    const real t189 = t187 + t188;
-    const real t190 = motion_I[3] * t9;
-    const real t191 = t108 * d_motion_I[3];
-    const real t192 = t190 + t191;
-    const real t193 = t189 + t192;
-    const real t194 = t186 + t193;
-    const real t195 = t183 + t194;
-    d_motion[4] = t195;
-    const real t196 = w[1] * t85;
-    const real t197 = t179 * d_w[1];
-    const real t198 = t196 + t197;
-    const real t199 = t146 * d_w[0];
-    const real t200 = w[0] * t112;
-    const real t201 = t199 + t200;
-    const real t202 = t198 - t201;
-    const real t203 = d_c[5] + t202;
-    const real t204 = motion_I[5] * t44;
-    const real t205 = t119 * d_motion_I[5];
-    const real t206 = t204 + t205;
-    const real t207 = motion_I[4] * t29;
-    const real t208 = t127 * d_motion_I[4];
-    const real t209 = t207 + t208;
-    const real t210 = motion_I[3] * t14;
-    const real t211 = t135 * d_motion_I[3];
-    const real t212 = t210 + t211;
-    const real t213 = t209 + t212;
-    const real t214 = t206 + t213;
-    const real t215 = t203 + t214;
-    d_motion[5] = t215;
-    const real t216 = v[2] * t112;
-    const real t217 = t146 * d_v[2];
-    const real t218 = t216 + t217;
-    const real t219 = 2.0 * t218;
-    const real t220 = v[1] * t139;
-    const real t221 = t153 * d_v[1];
-    const real t222 = t220 + t221;
-    const real t223 = 2.0 * t222;
-    const real t224 = t219 - t223;
-    const real t225 = d_c[0] + t224;
-    const real t226 = Rt[0] * d[0];
-    const real t227 = Rt[1] * d[1];
-    const real t228 = t226 + t227;
-    const real t229 = Rt[2] * d[2];
-    const real t230 = t228 + t229;
-    const real t231 = t230 + ro[0];
-    const real t232 = motion_I[0] * motion_I[2];
-    const real t233 = t232 - motion_I[4];
-    const real t234 = t231 * t233;
-    const real t235 = Rt[3] * d[0];
-    const real t236 = Rt[4] * d[1];
-    const real t237 = t235 + t236;
-    const real t238 = Rt[5] * d[2];
-    const real t239 = t237 + t238;
-    const real t240 = t239 + ro[1];
-    const real t241 = motion_I[1] * motion_I[2];
-    const real t242 = motion_I[3] + t241;
-    const real t243 = t240 * t242;
-    const real t244 = t234 + t243;
-    const real t245 = Rt[6] * d[0];
-    const real t246 = Rt[7] * d[1];
-    const real t247 = t245 + t246;
-    const real t248 = Rt[8] * d[2];
-    const real t249 = t247 + t248;
-    const real t250 = t249 + ro[2];
-    const real t251 = motion_I[1] * motion_I[1];
-    const real t252 = motion_I[0] * motion_I[0];
-    const real t253 = t251 + t252;
-    const real t254 = t250 * t253;
-    const real t255 = t244 - t254;
-    const real t256 = t255 + motion_I[8];
-    const real t257 = t256 * t34;
-    const real t258 = t242 * t54;
-    const real t259 = motion_I[2] * d_motion_I[1];
-    const real t260 = motion_I[1] * d_motion_I[2];
-    const real t261 = t259 + t260;
-    const real t262 = d_motion_I[3] + t261;
-    const real t263 = t240 * t262;
-    const real t264 = t258 + t263;
-    const real t265 = t233 * t49;
-    const real t266 = motion_I[2] * d_motion_I[0];
-    const real t267 = motion_I[0] * d_motion_I[2];
-    const real t268 = t266 + t267;
-    const real t269 = t268 - d_motion_I[4];
-    const real t270 = t231 * t269;
-    const real t271 = t265 + t270;
-    const real t272 = t264 + t271;
-    const real t273 = t253 * t59;
-    const real t274 = motion_I[0] * d_motion_I[0];
-    const real t275 = t274 + t274;
-    const real t276 = motion_I[1] * d_motion_I[1];
-    const real t277 = t276 + t276;
-    const real t278 = t275 + t277;
-    const real t279 = t250 * t278;
-    const real t280 = t273 + t279;
-    const real t281 = t272 - t280;
-    const real t282 = d_motion_I[8] + t281;
-    const real t283 = t65 * t282;
-    const real t284 = t257 + t283;
-    const real t285 = motion_I[0] * motion_I[1];
-    const real t286 = motion_I[5] + t285;
-    const real t287 = t231 * t286;
-    const real t288 = motion_I[2] * motion_I[2];
-    const real t289 = t288 + t252;
-    const real t290 = t240 * t289;
-    const real t291 = t287 - t290;
-    const real t292 = t241 - motion_I[3];
-    const real t293 = t250 * t292;
-    const real t294 = t291 + t293;
-    const real t295 = t294 + motion_I[7];
-    const real t296 = t295 * t19;
-    const real t297 = t292 * t59;
-    const real t298 = t261 - d_motion_I[3];
-    const real t299 = t250 * t298;
-    const real t300 = t297 + t299;
-    const real t301 = t286 * t49;
-    const real t302 = motion_I[1] * d_motion_I[0];
-    const real t303 = motion_I[0] * d_motion_I[1];
-    const real t304 = t302 + t303;
-    const real t305 = d_motion_I[5] + t304;
-    const real t306 = t231 * t305;
-    const real t307 = t301 + t306;
-    const real t308 = t289 * t54;
-    const real t309 = motion_I[2] * d_motion_I[2];
-    const real t310 = t309 + t309;
-    const real t311 = t275 + t310;
-    const real t312 = t240 * t311;
-    const real t313 = t308 + t312;
-    const real t314 = t307 - t313;
-    const real t315 = t300 + t314;
-    const real t316 = d_motion_I[7] + t315;
-    const real t317 = t73 * t316;
-    const real t318 = t296 + t317;
-    const real t319 = t285 - motion_I[5];
-    const real t320 = t240 * t319;
-    const real t321 = t251 + t288;
-    const real t322 = t231 * t321;
-    const real t323 = t320 - t322;
-    const real t324 = motion_I[4] + t232;
-    const real t325 = t250 * t324;
-    const real t326 = t323 + t325;
-    const real t327 = t326 + motion_I[6];
-    const real t328 = t327 * t4;
-    const real t329 = t324 * t59;
-    const real t330 = d_motion_I[4] + t268;
-    const real t331 = t250 * t330;
-    const real t332 = t329 + t331;
-    const real t333 = t319 * t54;
-    const real t334 = t304 - d_motion_I[5];
-    const real t335 = t240 * t334;
-    const real t336 = t333 + t335;
-    const real t337 = t321 * t49;
-    const real t338 = t277 + t310;
-    const real t339 = t231 * t338;
-    const real t340 = t337 + t339;
-    const real t341 = t336 - t340;
-    const real t342 = t332 + t341;
-    const real t343 = d_motion_I[6] + t342;
-    const real t344 = t81 * t343;
-    const real t345 = t328 + t344;
-    const real t346 = t318 + t345;
-    const real t347 = t284 + t346;
-    const real t348 = t225 + t347;
-    d_motion[6] = t348;
-    const real t349 = v[0] * t139;
-    const real t350 = t153 * d_v[0];
-    const real t351 = t349 + t350;
-    const real t352 = 2.0 * t351;
-    const real t353 = v[2] * t85;
-    const real t354 = t179 * d_v[2];
-    const real t355 = t353 + t354;
-    const real t356 = 2.0 * t355;
-    const real t357 = t352 - t356;
-    const real t358 = d_c[1] + t357;
-    const real t359 = t256 * t39;
-    const real t360 = t92 * t282;
-    const real t361 = t359 + t360;
-    const real t362 = t295 * t24;
-    const real t363 = t100 * t316;
-    const real t364 = t362 + t363;
-    const real t365 = t327 * t9;
-    const real t366 = t108 * t343;
-    const real t367 = t365 + t366;
-    const real t368 = t364 + t367;
-    const real t369 = t361 + t368;
-    const real t370 = t358 + t369;
-    d_motion[7] = t370;
-    const real t371 = v[1] * t85;
-    const real t372 = t179 * d_v[1];
-    const real t373 = t371 + t372;
-    const real t374 = 2.0 * t373;
-    const real t375 = v[0] * t112;
-    const real t376 = t146 * d_v[0];
-    const real t377 = t375 + t376;
-    const real t378 = 2.0 * t377;
-    const real t379 = t374 - t378;
-    const real t380 = d_c[2] + t379;
-    const real t381 = t256 * t44;
-    const real t382 = t119 * t282;
-    const real t383 = t381 + t382;
-    const real t384 = t295 * t29;
-    const real t385 = t127 * t316;
-    const real t386 = t384 + t385;
-    const real t387 = t327 * t14;
-    const real t388 = t135 * t343;
-    const real t389 = t387 + t388;
-    const real t390 = t386 + t389;
-    const real t391 = t383 + t390;
-    const real t392 = t380 + t391;
-    d_motion[8] = t392;
-    return 0;
+  (void)H;
+  (void)c;
+  (void)s;
+  (void)d_H;
+  (void)d_s;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = d_c[3] + (w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139)) +
+    (motion_I[5] * t34 + t65 * d_motion_I[5] + (motion_I[4] * t19 + t73 * d_motion_I[4] +
+    (motion_I[3] * t4 + t81 * d_motion_I[3])));
+  real t179 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = d_c[4] + (t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t179 * d_w[2])) + (motion_I[5]
+    * t39 + t92 * d_motion_I[5] + (motion_I[4] * t24 + t100 * d_motion_I[4] + (motion_I[3] * t9 +
+    t108 * d_motion_I[3])));
+  d_motion[5] = d_c[5] + (w[1] * t85 + t179 * d_w[1] - (t146 * d_w[0] + w[0] * t112)) + (motion_I[5]
+    * t44 + t119 * d_motion_I[5] + (motion_I[4] * t29 + t127 * d_motion_I[4] + (motion_I[3] * t14 +
+    t135 * d_motion_I[3])));
+  real t231 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t232 = motion_I[0] * motion_I[2];
+  real t233 = t232 - motion_I[4];
+  real t240 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t241 = motion_I[1] * motion_I[2];
+  real t242 = motion_I[3] + t241;
+  real t250 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t251 = motion_I[1] * motion_I[1];
+  real t252 = motion_I[0] * motion_I[0];
+  real t253 = t251 + t252;
+  real t256 = t231 * t233 + t240 * t242 - t250 * t253 + motion_I[8];
+  real t261 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t268 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t274 = motion_I[0] * d_motion_I[0];
+  real t275 = t274 + t274;
+  real t276 = motion_I[1] * d_motion_I[1];
+  real t277 = t276 + t276;
+  real t282 = d_motion_I[8] + (t242 * t54 + t240 * (d_motion_I[3] + t261) + (t233 * t49 + t231 *
+    (t268 - d_motion_I[4])) - (t253 * t59 + t250 * (t275 + t277)));
+  real t285 = motion_I[0] * motion_I[1];
+  real t286 = motion_I[5] + t285;
+  real t288 = motion_I[2] * motion_I[2];
+  real t289 = t288 + t252;
+  real t292 = t241 - motion_I[3];
+  real t295 = t231 * t286 - t240 * t289 + t250 * t292 + motion_I[7];
+  real t304 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t309 = motion_I[2] * d_motion_I[2];
+  real t310 = t309 + t309;
+  real t316 = d_motion_I[7] + (t292 * t59 + t250 * (t261 - d_motion_I[3]) + (t286 * t49 + t231 *
+    (d_motion_I[5] + t304) - (t289 * t54 + t240 * (t275 + t310))));
+  real t319 = t285 - motion_I[5];
+  real t321 = t251 + t288;
+  real t324 = motion_I[4] + t232;
+  real t327 = t240 * t319 - t231 * t321 + t250 * t324 + motion_I[6];
+  real t343 = d_motion_I[6] + (t324 * t59 + t250 * (d_motion_I[4] + t268) + (t319 * t54 + t240 *
+    (t304 - d_motion_I[5]) - (t321 * t49 + t231 * (t277 + t310))));
+  d_motion[6] = d_c[0] + (2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]))
+    + (t256 * t34 + t65 * t282 + (t295 * t19 + t73 * t316 + (t327 * t4 + t81 * t343)));
+  d_motion[7] = d_c[1] + (2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t179 * d_v[2]))
+    + (t256 * t39 + t92 * t282 + (t295 * t24 + t100 * t316 + (t327 * t9 + t108 * t343)));
+  d_motion[8] = d_c[2] + (2.0 * (v[1] * t85 + t179 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]))
+    + (t256 * t44 + t119 * t282 + (t295 * t29 + t127 * t316 + (t327 * t14 + t135 * t343)));
+  return 0;
 }
 
-static int mstmm_sweep_generic0_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 0, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 0, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 0, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 0, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6][0] motion subspace
@@ -2678,33 +804,17 @@ static const mstmm_port mstmm_sweep_generic0_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[0] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic0_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic0_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    (void)H;
-    (void)f;
-    (void)d_H;
-    (void)d_f;
-    (void)d_tau;
-    return 0;
+  (void)H;
+  (void)f;
+  (void)d_H;
+  (void)d_f;
+  (void)d_tau;
+  return 0;
 }
 
-static int mstmm_sweep_generic0_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_effort_slope_inputs[] = {
-    {"H", 0, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 0, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_effort_slope_outputs[] = {
-    {"d_tau", 0, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -2712,253 +822,98 @@ static const mstmm_port mstmm_sweep_generic0_effort_slope_outputs[] = {
  * in  d_H[6][0] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic0_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic0_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    (void)H;
-    (void)d_H;
-    d_W[0] = 0.0;
-    d_W[1] = 0.0;
-    d_W[2] = 0.0;
-    d_W[3] = 0.0;
-    d_W[4] = 0.0;
-    d_W[5] = 0.0;
-    d_W[6] = 0.0;
-    d_W[7] = 0.0;
-    d_W[8] = 0.0;
-    d_W[9] = 0.0;
-    d_W[10] = 0.0;
-    d_W[11] = 0.0;
-    d_W[12] = 0.0;
-    d_W[13] = 0.0;
-    d_W[14] = 0.0;
-    d_W[15] = 0.0;
-    d_W[16] = 0.0;
-    d_W[17] = 0.0;
-    d_W[18] = 0.0;
-    d_W[19] = 0.0;
-    d_W[20] = 0.0;
-    d_W[21] = 0.0;
-    d_W[22] = 0.0;
-    d_W[23] = 0.0;
-    d_W[24] = 0.0;
-    d_W[25] = 0.0;
-    d_W[26] = 0.0;
-    d_W[27] = 0.0;
-    d_W[28] = 0.0;
-    d_W[29] = 0.0;
-    d_W[30] = 0.0;
-    d_W[31] = 0.0;
-    d_W[32] = 0.0;
-    d_W[33] = 0.0;
-    d_W[34] = 0.0;
-    d_W[35] = 0.0;
-    return 0;
+  (void)H;
+  (void)d_H;
+  d_W[0] = d_W[1] = d_W[2] = d_W[3] = d_W[4] = d_W[5] = d_W[6] = d_W[7] = d_W[8] = d_W[9] = d_W[10]
+    = d_W[11] = d_W[12] = d_W[13] = d_W[14] = d_W[15] = d_W[16] = d_W[17] = d_W[18] = d_W[19] =
+    d_W[20] = d_W[21] = d_W[22] = d_W[23] = d_W[24] = d_W[25] = d_W[26] = d_W[27] = d_W[28] =
+    d_W[29] = d_W[30] = d_W[31] = d_W[32] = d_W[33] = d_W[34] = d_W[35] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic0_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic0_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic0_complement_slope_inputs[] = {
-    {"H", 0, "", 0, 0},
-    {"d_H", 0, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic0_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic0_complement_slope, (in[0], in[1], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic0_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic0_forward,
-        .call = mstmm_sweep_generic0_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic0_forward_inputs,
-        .outputs = mstmm_sweep_generic0_forward_outputs,
-        .ir_hash = "9f67d877454e555765f569cc79b7fa4ef84f8fc85a7a68fd3f1a23aabff02c92",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic0_condense,
-        .call = mstmm_sweep_generic0_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic0_condense_inputs,
-        .outputs = mstmm_sweep_generic0_condense_outputs,
-        .ir_hash = "a66ee296ff72ac5919f7b8d66567cc810287efd92a808ce63aa0ff62fc1e6650",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic0_recover,
-        .call = mstmm_sweep_generic0_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic0_recover_inputs,
-        .outputs = mstmm_sweep_generic0_recover_outputs,
-        .ir_hash = "a9fd78b3dce46d20e8d8b082813724fb0a51fcd7b41fbbcb92b28fbfc7330c7b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic0_effort,
-        .call = mstmm_sweep_generic0_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic0_effort_inputs,
-        .outputs = mstmm_sweep_generic0_effort_outputs,
-        .ir_hash = "2cd2014c762c78734d446dfa4643d0bf9cefb728f626f5fe8af9b4fcf9f6d269",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic0_project,
-        .call = mstmm_sweep_generic0_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic0_project_inputs,
-        .outputs = mstmm_sweep_generic0_project_outputs,
-        .ir_hash = "1c62b6e9dc39b1aca8af7aa5dcb7d7442ee7b6f96729d8b638ae7a7dbda8604d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic0_factor,
-        .call = mstmm_sweep_generic0_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic0_factor_inputs,
-        .outputs = mstmm_sweep_generic0_factor_outputs,
-        .ir_hash = "7b695fe71188644e26b6557526444afcefa0c48210c76705d2b856839ac3b0ce",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic0_column_load,
-        .call = mstmm_sweep_generic0_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic0_column_load_inputs,
-        .outputs = mstmm_sweep_generic0_column_load_outputs,
-        .ir_hash = "4212bb37299f26ac6859a6dca06f0ef34c5b7b1998bad20e114a17f7c758fb15",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic0_column_acceleration,
-        .call = mstmm_sweep_generic0_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic0_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic0_column_acceleration_outputs,
-        .ir_hash = "771b1c73e13295305ac4aa23ac9c2d832a36ef6f971ff8a5e5083f2551232844",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic0_qr_eliminate,
-        .call = mstmm_sweep_generic0_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic0_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic0_qr_eliminate_outputs,
-        .ir_hash = "42209a670b6e6363e4310b64cd9b26fef3b0a3577a972834e3f1694883565172",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic0_tangent_carrier,
-        .call = mstmm_sweep_generic0_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic0_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic0_tangent_carrier_outputs,
-        .ir_hash = "a13a909c20a689eb10da8d5270e6537d146216a21be5a1818f8bec39a972c75b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic0_tangent_column,
-        .call = mstmm_sweep_generic0_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic0_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic0_tangent_column_outputs,
-        .ir_hash = "cc1b7096834062706d020315261b07096cdd9b739c0b666eb92c38f522a3f14e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic0_complement,
-        .call = mstmm_sweep_generic0_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic0_complement_inputs,
-        .outputs = mstmm_sweep_generic0_complement_outputs,
-        .ir_hash = "a9b2041f0dcb2168ab3e49c95fd54db10cd01dd9a2d7faa033618c6e25486459",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic0_forward_slope,
-        .call = mstmm_sweep_generic0_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic0_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic0_forward_slope_outputs,
-        .ir_hash = "484796c85cec186ae884d3ac0df980d3d48b803aba834242bf50183e52b9fb80",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic0_effort_slope,
-        .call = mstmm_sweep_generic0_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic0_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic0_effort_slope_outputs,
-        .ir_hash = "10aa8d744bb9932f8402826f38924d11cd225db2010392cb19d6fe17b56d3231",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic0_complement_slope,
-        .call = mstmm_sweep_generic0_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic0_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic0_complement_slope_outputs,
-        .ir_hash = "09d39915cf088a312ea637a555c0ef183d0601bc0405599a329b5142f9b53344",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic0_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 0, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 0, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "9c167316b1aaca4e09d23fbeedd37a46cd767b3a1de1fb6ea82b22a6d7e4428b", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic0_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"J", 0, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 0, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 0, "", 0, 0}, {"g", 0, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "d196c1b4b2d3a92a6a61fd9f1438eef52b22fdc37a38880fdb3923d2d0e9d9ac", 0, NULL},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic0_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"G", 0, "", 0, 0}, {"g", 0, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 0, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "430030d00f8a802d3b0e6e66c77995e8d3c7447e23882d27ddd81fbf9dac80e3", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic0_effort), 2, 1, (const mstmm_port[]){{"H", 0, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 0, "N, N*m", 0, 0}},
+    "bc35cf4393ddcfa3bc124aaf5de2db3c9907d15ef51d63c9909a963651d94a73", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic0_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 0, "", 0, 0}},
+    "217fe6af8e615110c2c2eb6ccc638cd13a0b1df9074a03b1e08deed25db9af88", 0, NULL},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic0_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"J", 0, "kg*m2 or kg", 0, 0}, {"W", 0, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 0, "", 0,
+    0}, {"G", 0, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "744c2bdd7fb441392e62dc1ceb09e525ba786127f0e90f7973e4c5d73007130d", 0, NULL},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic0_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"G", 0, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0}, {"tau", 0, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 0, "N, N*m",
+    0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "2bc634da8ca15df1ac59a4512e20f84b5699300b47e2d7147e8f6535a63adc35", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic0_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 0, "", 0, 0}, {"F", 0, "", 0, 0},
+    {"G", 0, "", 0, 0}, {"y", 0, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 0, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "cf8abf63234b3265e16d041b65731b16c140060a388c9d66e69a3486c7d4ee3a", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic0_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 0, "", 0, 0}, {"J", 0, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 0, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 0, "", 0, 0}, {"g", 0, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "c765c2ce337b592bae35b2135c16a879583c4ea68d1f471b3a570ea0aaa5f783", 0, NULL},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic0_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 0, "", 0, 0}, {"s", 0, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "6fa8f2fa1d47934a61617947d041ab80e4e8d5a70f05e55327ed4269d7e13ce7", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic0_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 0, "", 0, 0}, {"s", 0, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 0, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    0, "", 0, 0}, {"J", 0, "kg*m2 or kg", 0, 0}, {"laws", 0, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 0, "", 0, 0}},
+    "e7b17e77b39644a6748129a22699d45cf1655d614afc6c45b2bb31ecb6d4816d", 0, NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic0_complement), 1, 1, (const mstmm_port[]){{"H",
+    0, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "1b831f275ae78779728390a6b273411d4576ce1e2816895434fb62e7903ce58e", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic0_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 0, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 0, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 0, "", 0, 0},
+    {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 0, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "a95f62b424a297c7caaf033b139538662060239941246f42a37f3817a06c2935",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic0_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 0, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 0, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 0, "N, N*m", 0, 0}},
+    "01ffd6346f97e020a171af9088efa84fcdd525152b67a114fcaa4dd6cffb8697", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic0_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 0, "", 0, 0}, {"d_H", 0, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "", 0,
+    0}}, "aebe9bd5804696c9678bca413c0b92f0de9b9684aa44cd1d06b0004ae1fc5f20", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic0 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic0",
-    .hash = "77ed2de3e326bf8f4d4d04271b53e3799d20a900ee73cea2d2d59d00f3fc0758",
+    .hash = "ad631dce8d5e5ca857219217cd5c218b8cbb212590a975071f1f8e01d0f99450",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -10,105 +10,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic1;
-int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic1_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic1_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic1_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic1_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x);
-int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row);
-int mstmm_sweep_generic1_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
-int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one);
-int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S);
-int mstmm_sweep_generic1_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic1_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic1_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z);
-int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic1_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_generic1_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_generic1_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic1_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y);
-int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-int mstmm_sweep_generic1_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic1_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -127,8 +28,6 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 #endif
 
 /* bias motion outboard of a hinge with 1 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -143,255 +42,70 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic1_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic1_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = H[3] * s[0];
-    const real t87 = c[3] + t86;
-    const real t88 = w[2] * t73;
-    const real t89 = w[1] * t79;
-    const real t90 = t88 - t89;
-    const real t91 = t87 + t90;
-    const real t92 = t85 + t91;
-    motion[3] = t92;
-    const real t93 = motion_I[3] * t9;
-    const real t94 = motion_I[4] * t24;
-    const real t95 = t93 + t94;
-    const real t96 = motion_I[5] * t39;
-    const real t97 = t95 + t96;
-    const real t98 = H[4] * s[0];
-    const real t99 = c[4] + t98;
-    const real t100 = w[0] * t79;
-    const real t101 = w[2] * t67;
-    const real t102 = t100 - t101;
-    const real t103 = t99 + t102;
-    const real t104 = t97 + t103;
-    motion[4] = t104;
-    const real t105 = motion_I[3] * t14;
-    const real t106 = motion_I[4] * t29;
-    const real t107 = t105 + t106;
-    const real t108 = motion_I[5] * t44;
-    const real t109 = t107 + t108;
-    const real t110 = H[5] * s[0];
-    const real t111 = c[5] + t110;
-    const real t112 = w[1] * t67;
-    const real t113 = w[0] * t73;
-    const real t114 = t112 - t113;
-    const real t115 = t111 + t114;
-    const real t116 = t109 + t115;
-    motion[5] = t116;
-    const real t117 = motion_I[0] * motion_I[1];
-    const real t118 = t117 - motion_I[5];
-    const real t119 = t56 * t118;
-    const real t120 = motion_I[1] * motion_I[1];
-    const real t121 = motion_I[2] * motion_I[2];
-    const real t122 = t120 + t121;
-    const real t123 = t50 * t122;
-    const real t124 = t119 - t123;
-    const real t125 = motion_I[0] * motion_I[2];
-    const real t126 = motion_I[4] + t125;
-    const real t127 = t62 * t126;
-    const real t128 = t124 + t127;
-    const real t129 = motion_I[6] + t128;
-    const real t130 = t4 * t129;
-    const real t131 = motion_I[5] + t117;
-    const real t132 = t50 * t131;
-    const real t133 = motion_I[0] * motion_I[0];
-    const real t134 = t121 + t133;
-    const real t135 = t56 * t134;
-    const real t136 = t132 - t135;
-    const real t137 = motion_I[1] * motion_I[2];
-    const real t138 = t137 - motion_I[3];
-    const real t139 = t62 * t138;
-    const real t140 = t136 + t139;
-    const real t141 = motion_I[7] + t140;
-    const real t142 = t19 * t141;
-    const real t143 = t130 + t142;
-    const real t144 = t125 - motion_I[4];
-    const real t145 = t50 * t144;
-    const real t146 = motion_I[3] + t137;
-    const real t147 = t56 * t146;
-    const real t148 = t145 + t147;
-    const real t149 = t120 + t133;
-    const real t150 = t62 * t149;
-    const real t151 = t148 - t150;
-    const real t152 = motion_I[8] + t151;
-    const real t153 = t34 * t152;
-    const real t154 = t143 + t153;
-    const real t155 = H[0] * s[0];
-    const real t156 = c[0] + t155;
-    const real t157 = v[2] * t73;
-    const real t158 = 2.0 * t157;
-    const real t159 = v[1] * t79;
-    const real t160 = 2.0 * t159;
-    const real t161 = t158 - t160;
-    const real t162 = t156 + t161;
-    const real t163 = t154 + t162;
-    motion[6] = t163;
-    const real t164 = t9 * t129;
-    const real t165 = t24 * t141;
-    const real t166 = t164 + t165;
-    const real t167 = t39 * t152;
-    const real t168 = t166 + t167;
-    const real t169 = H[1] * s[0];
-    const real t170 = c[1] + t169;
-    const real t171 = v[0] * t79;
-    const real t172 = 2.0 * t171;
-    const real t173 = v[2] * t67;
-    const real t174 = 2.0 * t173;
-    const real t175 = t172 - t174;
-    const real t176 = t170 + t175;
-    const real t177 = t168 + t176;
-    motion[7] = t177;
-    const real t178 = t14 * t129;
-    const real t179 = t29 * t141;
-    const real t180 = t178 + t179;
-    const real t181 = t44 * t152;
-    const real t182 = t180 + t181;
-    const real t183 = H[2] * s[0];
-    const real t184 = c[2] + t183;
-    const real t185 = v[1] * t67;
-    const real t186 = 2.0 * t185;
-    const real t187 = v[0] * t73;
-    const real t188 = 2.0 * t187;
-    const real t189 = t186 - t188;
-    const real t190 = t184 + t189;
-    const real t191 = t182 + t190;
-    motion[8] = t191;
-    return 0;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + H[3] * s[0] + (w[2]
+    * t73 - w[1] * t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + H[4] * s[0] + (w[0]
+    * t79 - w[2] * t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + H[5] * s[0] +
+    (w[1] * t67 - w[0] * t73));
+  real t117 = motion_I[0] * motion_I[1];
+  real t120 = motion_I[1] * motion_I[1];
+  real t121 = motion_I[2] * motion_I[2];
+  real t125 = motion_I[0] * motion_I[2];
+  real t129 = motion_I[6] + (t56 * (t117 - motion_I[5]) - t50 * (t120 + t121) + t62 * (motion_I[4] +
+    t125));
+  real t133 = motion_I[0] * motion_I[0];
+  real t137 = motion_I[1] * motion_I[2];
+  real t141 = motion_I[7] + (t50 * (motion_I[5] + t117) - t56 * (t121 + t133) + t62 * (t137 -
+    motion_I[3]));
+  real t152 = motion_I[8] + (t50 * (t125 - motion_I[4]) + t56 * (motion_I[3] + t137) - t62 * (t120 +
+    t133));
+  motion[6] = t4 * t129 + t19 * t141 + t34 * t152 + (c[0] + H[0] * s[0] + (2.0 * (v[2] * t73) - 2.0
+    * (v[1] * t79)));
+  motion[7] = t9 * t129 + t24 * t141 + t39 * t152 + (c[1] + H[1] * s[0] + (2.0 * (v[0] * t79) - 2.0
+    * (v[2] * t67)));
+  motion[8] = t14 * t129 + t29 * t141 + t44 * t152 + (c[2] + H[2] * s[0] + (2.0 * (v[1] * t67) - 2.0
+    * (v[0] * t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
@@ -405,657 +119,156 @@ static const mstmm_port mstmm_sweep_generic1_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic1_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[1] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[1] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[2] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[3] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[4] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[5] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[1] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[2] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[3] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[4] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[5] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[2] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[1] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[2] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[3] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[4] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[5] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[3] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[1] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[2] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[3] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[4] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[5] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[4] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[1] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[2] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[3] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[4] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[5] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[5] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t79 = H[2] * H[2];
-    const real t80 = H[0] * H[0];
-    const real t81 = H[1] * H[1];
-    const real t82 = t80 + t81;
-    const real t83 = t79 + t82;
-    const real t84 = 0.0 < floor_[0];
-    const real t85 = S[0] + S[6];
-    const real t86 = S[11] + t85;
-    const real t87 = ((real)1 / (real)300000000000000) * t86;
-    const real t88 = t84 != 0 ? floor_[0] : t87;
-    const real t89 = t83 * t88;
-    const real t90 = H[5] * H[5];
-    const real t91 = H[3] * H[3];
-    const real t92 = H[4] * H[4];
-    const real t93 = t91 + t92;
-    const real t94 = t90 + t93;
-    const real t95 = 0.0 < floor_[1];
-    const real t96 = S[15] + S[18];
-    const real t97 = S[20] + t96;
-    const real t98 = ((real)1 / (real)300000000000000) * t97;
-    const real t99 = t95 != 0 ? floor_[1] : t98;
-    const real t100 = t94 * t99;
-    const real t101 = t89 + t100;
-    const real t102 = t101 < t77;
-    if (!(t102 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t103 = 1.0 / t77;
-    const real t104 = t10 * t103;
-    G[0] = t104;
-    const real t105 = t22 * t103;
-    G[1] = t105;
-    const real t106 = t35 * t103;
-    G[2] = t106;
-    const real t107 = t48 * t103;
-    G[3] = t107;
-    const real t108 = t61 * t103;
-    G[4] = t108;
-    const real t109 = t74 * t103;
-    G[5] = t109;
-    const real t110 = H[0] * e[0];
-    const real t111 = H[1] * e[1];
-    const real t112 = t110 + t111;
-    const real t113 = H[2] * e[2];
-    const real t114 = t112 + t113;
-    const real t115 = H[3] * e[3];
-    const real t116 = t114 + t115;
-    const real t117 = H[4] * e[4];
-    const real t118 = t116 + t117;
-    const real t119 = H[5] * e[5];
-    const real t120 = t118 + t119;
-    const real t121 = tau[0] - t120;
-    const real t122 = t103 * t121;
-    g[0] = t122;
-    const real t123 = t10 * t104;
-    const real t124 = S[0] - t123;
-    const real t125 = Rc[0] * t124;
-    const real t126 = t10 * t105;
-    const real t127 = S[1] - t126;
-    const real t128 = Rc[1] * t127;
-    const real t129 = t125 + t128;
-    const real t130 = t10 * t106;
-    const real t131 = S[2] - t130;
-    const real t132 = Rc[2] * t131;
-    const real t133 = t129 + t132;
-    const real t134 = Rc[0] * t133;
-    const real t135 = Rc[0] * t127;
-    const real t136 = t22 * t105;
-    const real t137 = S[6] - t136;
-    const real t138 = Rc[1] * t137;
-    const real t139 = t135 + t138;
-    const real t140 = t22 * t106;
-    const real t141 = S[7] - t140;
-    const real t142 = Rc[2] * t141;
-    const real t143 = t139 + t142;
-    const real t144 = Rc[1] * t143;
-    const real t145 = t134 + t144;
-    const real t146 = Rc[0] * t131;
-    const real t147 = Rc[1] * t141;
-    const real t148 = t146 + t147;
-    const real t149 = t35 * t106;
-    const real t150 = S[11] - t149;
-    const real t151 = Rc[2] * t150;
-    const real t152 = t148 + t151;
-    const real t153 = Rc[2] * t152;
-    const real t154 = t145 + t153;
-    S_I[0] += t154;
-    const real t155 = Rc[3] * t133;
-    const real t156 = Rc[4] * t143;
-    const real t157 = t155 + t156;
-    const real t158 = Rc[5] * t152;
-    const real t159 = t157 + t158;
-    S_I[1] += t159;
-    const real t160 = Rc[6] * t133;
-    const real t161 = Rc[7] * t143;
-    const real t162 = t160 + t161;
-    const real t163 = Rc[8] * t152;
-    const real t164 = t162 + t163;
-    S_I[2] += t164;
-    const real t165 = t10 * t107;
-    const real t166 = S[3] - t165;
-    const real t167 = Rc[0] * t166;
-    const real t168 = t22 * t107;
-    const real t169 = S[8] - t168;
-    const real t170 = Rc[1] * t169;
-    const real t171 = t167 + t170;
-    const real t172 = t35 * t107;
-    const real t173 = S[12] - t172;
-    const real t174 = Rc[2] * t173;
-    const real t175 = t171 + t174;
-    const real t176 = Rc[0] * t175;
-    const real t177 = t10 * t108;
-    const real t178 = S[4] - t177;
-    const real t179 = Rc[0] * t178;
-    const real t180 = t22 * t108;
-    const real t181 = S[9] - t180;
-    const real t182 = Rc[1] * t181;
-    const real t183 = t179 + t182;
-    const real t184 = t35 * t108;
-    const real t185 = S[13] - t184;
-    const real t186 = Rc[2] * t185;
-    const real t187 = t183 + t186;
-    const real t188 = Rc[1] * t187;
-    const real t189 = t176 + t188;
-    const real t190 = t10 * t109;
-    const real t191 = S[5] - t190;
-    const real t192 = Rc[0] * t191;
-    const real t193 = t22 * t109;
-    const real t194 = S[10] - t193;
-    const real t195 = Rc[1] * t194;
-    const real t196 = t192 + t195;
-    const real t197 = t35 * t109;
-    const real t198 = S[14] - t197;
-    const real t199 = Rc[2] * t198;
-    const real t200 = t196 + t199;
-    const real t201 = Rc[2] * t200;
-    const real t202 = t189 + t201;
-    const real t203 = r[1] * t164;
-    const real t204 = r[2] * t159;
-    const real t205 = t203 - t204;
-    const real t206 = t202 + t205;
-    S_I[3] += t206;
-    const real t207 = Rc[3] * t175;
-    const real t208 = Rc[4] * t187;
-    const real t209 = t207 + t208;
-    const real t210 = Rc[5] * t200;
-    const real t211 = t209 + t210;
-    const real t212 = r[2] * t154;
-    const real t213 = r[0] * t164;
-    const real t214 = t212 - t213;
-    const real t215 = t211 + t214;
-    S_I[4] += t215;
-    const real t216 = Rc[6] * t175;
-    const real t217 = Rc[7] * t187;
-    const real t218 = t216 + t217;
-    const real t219 = Rc[8] * t200;
-    const real t220 = t218 + t219;
-    const real t221 = r[0] * t159;
-    const real t222 = r[1] * t154;
-    const real t223 = t221 - t222;
-    const real t224 = t220 + t223;
-    S_I[5] += t224;
-    const real t225 = Rc[3] * t124;
-    const real t226 = Rc[4] * t127;
-    const real t227 = t225 + t226;
-    const real t228 = Rc[5] * t131;
-    const real t229 = t227 + t228;
-    const real t230 = Rc[3] * t229;
-    const real t231 = Rc[3] * t127;
-    const real t232 = Rc[4] * t137;
-    const real t233 = t231 + t232;
-    const real t234 = Rc[5] * t141;
-    const real t235 = t233 + t234;
-    const real t236 = Rc[4] * t235;
-    const real t237 = t230 + t236;
-    const real t238 = Rc[3] * t131;
-    const real t239 = Rc[4] * t141;
-    const real t240 = t238 + t239;
-    const real t241 = Rc[5] * t150;
-    const real t242 = t240 + t241;
-    const real t243 = Rc[5] * t242;
-    const real t244 = t237 + t243;
-    S_I[6] += t244;
-    const real t245 = Rc[6] * t229;
-    const real t246 = Rc[7] * t235;
-    const real t247 = t245 + t246;
-    const real t248 = Rc[8] * t242;
-    const real t249 = t247 + t248;
-    S_I[7] += t249;
-    const real t250 = Rc[3] * t166;
-    const real t251 = Rc[4] * t169;
-    const real t252 = t250 + t251;
-    const real t253 = Rc[5] * t173;
-    const real t254 = t252 + t253;
-    const real t255 = Rc[0] * t254;
-    const real t256 = Rc[3] * t178;
-    const real t257 = Rc[4] * t181;
-    const real t258 = t256 + t257;
-    const real t259 = Rc[5] * t185;
-    const real t260 = t258 + t259;
-    const real t261 = Rc[1] * t260;
-    const real t262 = t255 + t261;
-    const real t263 = Rc[3] * t191;
-    const real t264 = Rc[4] * t194;
-    const real t265 = t263 + t264;
-    const real t266 = Rc[5] * t198;
-    const real t267 = t265 + t266;
-    const real t268 = Rc[2] * t267;
-    const real t269 = t262 + t268;
-    const real t270 = r[1] * t249;
-    const real t271 = r[2] * t244;
-    const real t272 = t270 - t271;
-    const real t273 = t269 + t272;
-    S_I[8] += t273;
-    const real t274 = Rc[3] * t254;
-    const real t275 = Rc[4] * t260;
-    const real t276 = t274 + t275;
-    const real t277 = Rc[5] * t267;
-    const real t278 = t276 + t277;
-    const real t279 = r[0] * t249;
-    const real t280 = t204 - t279;
-    const real t281 = t278 + t280;
-    S_I[9] += t281;
-    const real t282 = Rc[6] * t254;
-    const real t283 = Rc[7] * t260;
-    const real t284 = t282 + t283;
-    const real t285 = Rc[8] * t267;
-    const real t286 = t284 + t285;
-    const real t287 = r[0] * t244;
-    const real t288 = r[1] * t159;
-    const real t289 = t287 - t288;
-    const real t290 = t286 + t289;
-    S_I[10] += t290;
-    const real t291 = Rc[6] * t124;
-    const real t292 = Rc[7] * t127;
-    const real t293 = t291 + t292;
-    const real t294 = Rc[8] * t131;
-    const real t295 = t293 + t294;
-    const real t296 = Rc[6] * t295;
-    const real t297 = Rc[6] * t127;
-    const real t298 = Rc[7] * t137;
-    const real t299 = t297 + t298;
-    const real t300 = Rc[8] * t141;
-    const real t301 = t299 + t300;
-    const real t302 = Rc[7] * t301;
-    const real t303 = t296 + t302;
-    const real t304 = Rc[6] * t131;
-    const real t305 = Rc[7] * t141;
-    const real t306 = t304 + t305;
-    const real t307 = Rc[8] * t150;
-    const real t308 = t306 + t307;
-    const real t309 = Rc[8] * t308;
-    const real t310 = t303 + t309;
-    S_I[11] += t310;
-    const real t311 = Rc[6] * t166;
-    const real t312 = Rc[7] * t169;
-    const real t313 = t311 + t312;
-    const real t314 = Rc[8] * t173;
-    const real t315 = t313 + t314;
-    const real t316 = Rc[0] * t315;
-    const real t317 = Rc[6] * t178;
-    const real t318 = Rc[7] * t181;
-    const real t319 = t317 + t318;
-    const real t320 = Rc[8] * t185;
-    const real t321 = t319 + t320;
-    const real t322 = Rc[1] * t321;
-    const real t323 = t316 + t322;
-    const real t324 = Rc[6] * t191;
-    const real t325 = Rc[7] * t194;
-    const real t326 = t324 + t325;
-    const real t327 = Rc[8] * t198;
-    const real t328 = t326 + t327;
-    const real t329 = Rc[2] * t328;
-    const real t330 = t323 + t329;
-    const real t331 = r[1] * t310;
-    const real t332 = r[2] * t249;
-    const real t333 = t331 - t332;
-    const real t334 = t330 + t333;
-    S_I[12] += t334;
-    const real t335 = Rc[3] * t315;
-    const real t336 = Rc[4] * t321;
-    const real t337 = t335 + t336;
-    const real t338 = Rc[5] * t328;
-    const real t339 = t337 + t338;
-    const real t340 = r[2] * t164;
-    const real t341 = r[0] * t310;
-    const real t342 = t340 - t341;
-    const real t343 = t339 + t342;
-    S_I[13] += t343;
-    const real t344 = Rc[6] * t315;
-    const real t345 = Rc[7] * t321;
-    const real t346 = t344 + t345;
-    const real t347 = Rc[8] * t328;
-    const real t348 = t346 + t347;
-    const real t349 = t279 - t203;
-    const real t350 = t348 + t349;
-    S_I[14] += t350;
-    const real t351 = t48 * t107;
-    const real t352 = S[15] - t351;
-    const real t353 = Rc[0] * t352;
-    const real t354 = t48 * t108;
-    const real t355 = S[16] - t354;
-    const real t356 = Rc[1] * t355;
-    const real t357 = t353 + t356;
-    const real t358 = t48 * t109;
-    const real t359 = S[17] - t358;
-    const real t360 = Rc[2] * t359;
-    const real t361 = t357 + t360;
-    const real t362 = Rc[0] * t361;
-    const real t363 = Rc[0] * t355;
-    const real t364 = t61 * t108;
-    const real t365 = S[18] - t364;
-    const real t366 = Rc[1] * t365;
-    const real t367 = t363 + t366;
-    const real t368 = t61 * t109;
-    const real t369 = S[19] - t368;
-    const real t370 = Rc[2] * t369;
-    const real t371 = t367 + t370;
-    const real t372 = Rc[1] * t371;
-    const real t373 = t362 + t372;
-    const real t374 = Rc[0] * t359;
-    const real t375 = Rc[1] * t369;
-    const real t376 = t374 + t375;
-    const real t377 = t74 * t109;
-    const real t378 = S[20] - t377;
-    const real t379 = Rc[2] * t378;
-    const real t380 = t376 + t379;
-    const real t381 = Rc[2] * t380;
-    const real t382 = t373 + t381;
-    const real t383 = r[1] * t334;
-    const real t384 = r[2] * t273;
-    const real t385 = t383 - t384;
-    const real t386 = r[1] * t330;
-    const real t387 = r[2] * t269;
-    const real t388 = t386 - t387;
-    const real t389 = t385 + t388;
-    const real t390 = t382 + t389;
-    S_I[15] += t390;
-    const real t391 = Rc[3] * t361;
-    const real t392 = Rc[4] * t371;
-    const real t393 = t391 + t392;
-    const real t394 = Rc[5] * t380;
-    const real t395 = t393 + t394;
-    const real t396 = r[1] * t343;
-    const real t397 = r[2] * t281;
-    const real t398 = t396 - t397;
-    const real t399 = r[2] * t202;
-    const real t400 = r[0] * t330;
-    const real t401 = t399 - t400;
-    const real t402 = t398 + t401;
-    const real t403 = t395 + t402;
-    S_I[16] += t403;
-    const real t404 = Rc[6] * t361;
-    const real t405 = Rc[7] * t371;
-    const real t406 = t404 + t405;
-    const real t407 = Rc[8] * t380;
-    const real t408 = t406 + t407;
-    const real t409 = r[1] * t350;
-    const real t410 = r[2] * t290;
-    const real t411 = t409 - t410;
-    const real t412 = r[0] * t269;
-    const real t413 = r[1] * t202;
-    const real t414 = t412 - t413;
-    const real t415 = t411 + t414;
-    const real t416 = t408 + t415;
-    S_I[17] += t416;
-    const real t417 = Rc[3] * t352;
-    const real t418 = Rc[4] * t355;
-    const real t419 = t417 + t418;
-    const real t420 = Rc[5] * t359;
-    const real t421 = t419 + t420;
-    const real t422 = Rc[3] * t421;
-    const real t423 = Rc[3] * t355;
-    const real t424 = Rc[4] * t365;
-    const real t425 = t423 + t424;
-    const real t426 = Rc[5] * t369;
-    const real t427 = t425 + t426;
-    const real t428 = Rc[4] * t427;
-    const real t429 = t422 + t428;
-    const real t430 = Rc[3] * t359;
-    const real t431 = Rc[4] * t369;
-    const real t432 = t430 + t431;
-    const real t433 = Rc[5] * t378;
-    const real t434 = t432 + t433;
-    const real t435 = Rc[5] * t434;
-    const real t436 = t429 + t435;
-    const real t437 = r[2] * t215;
-    const real t438 = r[0] * t343;
-    const real t439 = t437 - t438;
-    const real t440 = r[2] * t211;
-    const real t441 = r[0] * t339;
-    const real t442 = t440 - t441;
-    const real t443 = t439 + t442;
-    const real t444 = t436 + t443;
-    S_I[18] += t444;
-    const real t445 = Rc[6] * t421;
-    const real t446 = Rc[7] * t427;
-    const real t447 = t445 + t446;
-    const real t448 = Rc[8] * t434;
-    const real t449 = t447 + t448;
-    const real t450 = r[2] * t224;
-    const real t451 = r[0] * t350;
-    const real t452 = t450 - t451;
-    const real t453 = r[0] * t278;
-    const real t454 = r[1] * t211;
-    const real t455 = t453 - t454;
-    const real t456 = t452 + t455;
-    const real t457 = t449 + t456;
-    S_I[19] += t457;
-    const real t458 = Rc[6] * t352;
-    const real t459 = Rc[7] * t355;
-    const real t460 = t458 + t459;
-    const real t461 = Rc[8] * t359;
-    const real t462 = t460 + t461;
-    const real t463 = Rc[6] * t462;
-    const real t464 = Rc[6] * t355;
-    const real t465 = Rc[7] * t365;
-    const real t466 = t464 + t465;
-    const real t467 = Rc[8] * t369;
-    const real t468 = t466 + t467;
-    const real t469 = Rc[7] * t468;
-    const real t470 = t463 + t469;
-    const real t471 = Rc[6] * t359;
-    const real t472 = Rc[7] * t369;
-    const real t473 = t471 + t472;
-    const real t474 = Rc[8] * t378;
-    const real t475 = t473 + t474;
-    const real t476 = Rc[8] * t475;
-    const real t477 = t470 + t476;
-    const real t478 = r[0] * t290;
-    const real t479 = r[1] * t224;
-    const real t480 = t478 - t479;
-    const real t481 = r[0] * t286;
-    const real t482 = r[1] * t220;
-    const real t483 = t481 - t482;
-    const real t484 = t480 + t483;
-    const real t485 = t477 + t484;
-    S_I[20] += t485;
-    const real t486 = t10 * t122;
-    const real t487 = e[0] + t486;
-    const real t488 = Rc[0] * t487;
-    const real t489 = t22 * t122;
-    const real t490 = e[1] + t489;
-    const real t491 = Rc[1] * t490;
-    const real t492 = t488 + t491;
-    const real t493 = t35 * t122;
-    const real t494 = e[2] + t493;
-    const real t495 = Rc[2] * t494;
-    const real t496 = t492 + t495;
-    e_I[0] += t496;
-    const real t497 = Rc[3] * t487;
-    const real t498 = Rc[4] * t490;
-    const real t499 = t497 + t498;
-    const real t500 = Rc[5] * t494;
-    const real t501 = t499 + t500;
-    e_I[1] += t501;
-    const real t502 = Rc[6] * t487;
-    const real t503 = Rc[7] * t490;
-    const real t504 = t502 + t503;
-    const real t505 = Rc[8] * t494;
-    const real t506 = t504 + t505;
-    e_I[2] += t506;
-    const real t507 = t48 * t122;
-    const real t508 = e[3] + t507;
-    const real t509 = Rc[0] * t508;
-    const real t510 = t61 * t122;
-    const real t511 = e[4] + t510;
-    const real t512 = Rc[1] * t511;
-    const real t513 = t509 + t512;
-    const real t514 = t74 * t122;
-    const real t515 = e[5] + t514;
-    const real t516 = Rc[2] * t515;
-    const real t517 = t513 + t516;
-    const real t518 = Rc[6] * r[1];
-    const real t519 = Rc[3] * r[2];
-    const real t520 = t518 - t519;
-    const real t521 = t487 * t520;
-    const real t522 = Rc[7] * r[1];
-    const real t523 = Rc[4] * r[2];
-    const real t524 = t522 - t523;
-    const real t525 = t490 * t524;
-    const real t526 = t521 + t525;
-    const real t527 = Rc[8] * r[1];
-    const real t528 = Rc[5] * r[2];
-    const real t529 = t527 - t528;
-    const real t530 = t494 * t529;
-    const real t531 = t526 + t530;
-    const real t532 = t517 + t531;
-    e_I[3] += t532;
-    const real t533 = Rc[3] * t508;
-    const real t534 = Rc[4] * t511;
-    const real t535 = t533 + t534;
-    const real t536 = Rc[5] * t515;
-    const real t537 = t535 + t536;
-    const real t538 = Rc[0] * r[2];
-    const real t539 = Rc[6] * r[0];
-    const real t540 = t538 - t539;
-    const real t541 = t487 * t540;
-    const real t542 = Rc[1] * r[2];
-    const real t543 = Rc[7] * r[0];
-    const real t544 = t542 - t543;
-    const real t545 = t490 * t544;
-    const real t546 = t541 + t545;
-    const real t547 = Rc[2] * r[2];
-    const real t548 = Rc[8] * r[0];
-    const real t549 = t547 - t548;
-    const real t550 = t494 * t549;
-    const real t551 = t546 + t550;
-    const real t552 = t537 + t551;
-    e_I[4] += t552;
-    const real t553 = Rc[6] * t508;
-    const real t554 = Rc[7] * t511;
-    const real t555 = t553 + t554;
-    const real t556 = Rc[8] * t515;
-    const real t557 = t555 + t556;
-    const real t558 = Rc[3] * r[0];
-    const real t559 = Rc[0] * r[1];
-    const real t560 = t558 - t559;
-    const real t561 = t487 * t560;
-    const real t562 = Rc[4] * r[0];
-    const real t563 = Rc[1] * r[1];
-    const real t564 = t562 - t563;
-    const real t565 = t490 * t564;
-    const real t566 = t561 + t565;
-    const real t567 = Rc[5] * r[0];
-    const real t568 = Rc[2] * r[1];
-    const real t569 = t567 - t568;
-    const real t570 = t494 * t569;
-    const real t571 = t566 + t570;
-    const real t572 = t557 + t571;
-    e_I[5] += t572;
-    return 0;
+  real t10 = H[0] * S[0] + H[1] * S[1] + H[2] * S[2] + H[3] * S[3] + H[4] * S[4] + H[5] * S[5];
+  real t22 = H[0] * S[1] + H[1] * S[6] + H[2] * S[7] + H[3] * S[8] + H[4] * S[9] + H[5] * S[10];
+  real t35 = H[0] * S[2] + H[1] * S[7] + H[2] * S[11] + H[3] * S[12] + H[4] * S[13] + H[5] * S[14];
+  real t48 = H[0] * S[3] + H[1] * S[8] + H[2] * S[12] + H[3] * S[15] + H[4] * S[16] + H[5] * S[17];
+  real t61 = H[0] * S[4] + H[1] * S[9] + H[2] * S[13] + H[3] * S[16] + H[4] * S[18] + H[5] * S[19];
+  real t74 = H[0] * S[5] + H[1] * S[10] + H[2] * S[14] + H[3] * S[17] + H[4] * S[19] + H[5] * S[20];
+  real t77 = J[0] + (H[0] * t10 + H[1] * t22 + H[2] * t35 + H[3] * t48 + H[4] * t61 + H[5] * t74);
+  real t78 = 0.0 < t77;
+  if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t78 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t87 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t98 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  if (!(((H[2] * H[2] + (H[0] * H[0] + H[1] * H[1])) * ((0.0 < floor_[0]) ? floor_[0] : t87) + (H[5] * H[5] + (H[3] * H[3] + H[4] * H[4])) * ((0.0 < floor_[1]) ? floor_[1] : t98) < t77))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t103 = 1.0 / t77;
+  real t104 = t10 * t103;
+  G[0] = t104;
+  real t105 = t22 * t103;
+  G[1] = t105;
+  real t106 = t35 * t103;
+  G[2] = t106;
+  real t107 = t48 * t103;
+  G[3] = t107;
+  real t108 = t61 * t103;
+  G[4] = t108;
+  real t109 = t74 * t103;
+  G[5] = t109;
+  real t122 = t103 * (tau[0] - (H[0] * e[0] + H[1] * e[1] + H[2] * e[2] + H[3] * e[3] + H[4] * e[4]
+    + H[5] * e[5]));
+  g[0] = t122;
+  real t124 = S[0] - t10 * t104;
+  real t127 = S[1] - t10 * t105;
+  real t131 = S[2] - t10 * t106;
+  real t133 = Rc[0] * t124 + Rc[1] * t127 + Rc[2] * t131;
+  real t137 = S[6] - t22 * t105;
+  real t141 = S[7] - t22 * t106;
+  real t143 = Rc[0] * t127 + Rc[1] * t137 + Rc[2] * t141;
+  real t150 = S[11] - t35 * t106;
+  real t152 = Rc[0] * t131 + Rc[1] * t141 + Rc[2] * t150;
+  real t154 = Rc[0] * t133 + Rc[1] * t143 + Rc[2] * t152;
+  S_I[0] += t154;
+  real t159 = Rc[3] * t133 + Rc[4] * t143 + Rc[5] * t152;
+  S_I[1] += t159;
+  real t164 = Rc[6] * t133 + Rc[7] * t143 + Rc[8] * t152;
+  S_I[2] += t164;
+  real t166 = S[3] - t10 * t107;
+  real t169 = S[8] - t22 * t107;
+  real t173 = S[12] - t35 * t107;
+  real t175 = Rc[0] * t166 + Rc[1] * t169 + Rc[2] * t173;
+  real t178 = S[4] - t10 * t108;
+  real t181 = S[9] - t22 * t108;
+  real t185 = S[13] - t35 * t108;
+  real t187 = Rc[0] * t178 + Rc[1] * t181 + Rc[2] * t185;
+  real t191 = S[5] - t10 * t109;
+  real t194 = S[10] - t22 * t109;
+  real t198 = S[14] - t35 * t109;
+  real t200 = Rc[0] * t191 + Rc[1] * t194 + Rc[2] * t198;
+  real t202 = Rc[0] * t175 + Rc[1] * t187 + Rc[2] * t200;
+  real t203 = r[1] * t164;
+  real t204 = r[2] * t159;
+  S_I[3] += t202 + (t203 - t204);
+  real t211 = Rc[3] * t175 + Rc[4] * t187 + Rc[5] * t200;
+  real t215 = t211 + (r[2] * t154 - r[0] * t164);
+  S_I[4] += t215;
+  real t220 = Rc[6] * t175 + Rc[7] * t187 + Rc[8] * t200;
+  real t224 = t220 + (r[0] * t159 - r[1] * t154);
+  S_I[5] += t224;
+  real t229 = Rc[3] * t124 + Rc[4] * t127 + Rc[5] * t131;
+  real t235 = Rc[3] * t127 + Rc[4] * t137 + Rc[5] * t141;
+  real t242 = Rc[3] * t131 + Rc[4] * t141 + Rc[5] * t150;
+  real t244 = Rc[3] * t229 + Rc[4] * t235 + Rc[5] * t242;
+  S_I[6] += t244;
+  real t249 = Rc[6] * t229 + Rc[7] * t235 + Rc[8] * t242;
+  S_I[7] += t249;
+  real t254 = Rc[3] * t166 + Rc[4] * t169 + Rc[5] * t173;
+  real t260 = Rc[3] * t178 + Rc[4] * t181 + Rc[5] * t185;
+  real t267 = Rc[3] * t191 + Rc[4] * t194 + Rc[5] * t198;
+  real t269 = Rc[0] * t254 + Rc[1] * t260 + Rc[2] * t267;
+  real t273 = t269 + (r[1] * t249 - r[2] * t244);
+  S_I[8] += t273;
+  real t278 = Rc[3] * t254 + Rc[4] * t260 + Rc[5] * t267;
+  real t279 = r[0] * t249;
+  real t281 = t278 + (t204 - t279);
+  S_I[9] += t281;
+  real t286 = Rc[6] * t254 + Rc[7] * t260 + Rc[8] * t267;
+  real t290 = t286 + (r[0] * t244 - r[1] * t159);
+  S_I[10] += t290;
+  real t310 = Rc[6] * (Rc[6] * t124 + Rc[7] * t127 + Rc[8] * t131) + Rc[7] * (Rc[6] * t127 + Rc[7] *
+    t137 + Rc[8] * t141) + Rc[8] * (Rc[6] * t131 + Rc[7] * t141 + Rc[8] * t150);
+  S_I[11] += t310;
+  real t315 = Rc[6] * t166 + Rc[7] * t169 + Rc[8] * t173;
+  real t321 = Rc[6] * t178 + Rc[7] * t181 + Rc[8] * t185;
+  real t328 = Rc[6] * t191 + Rc[7] * t194 + Rc[8] * t198;
+  real t330 = Rc[0] * t315 + Rc[1] * t321 + Rc[2] * t328;
+  real t334 = t330 + (r[1] * t310 - r[2] * t249);
+  S_I[12] += t334;
+  real t339 = Rc[3] * t315 + Rc[4] * t321 + Rc[5] * t328;
+  real t343 = t339 + (r[2] * t164 - r[0] * t310);
+  S_I[13] += t343;
+  real t350 = Rc[6] * t315 + Rc[7] * t321 + Rc[8] * t328 + (t279 - t203);
+  S_I[14] += t350;
+  real t352 = S[15] - t48 * t107;
+  real t355 = S[16] - t48 * t108;
+  real t359 = S[17] - t48 * t109;
+  real t361 = Rc[0] * t352 + Rc[1] * t355 + Rc[2] * t359;
+  real t365 = S[18] - t61 * t108;
+  real t369 = S[19] - t61 * t109;
+  real t371 = Rc[0] * t355 + Rc[1] * t365 + Rc[2] * t369;
+  real t378 = S[20] - t74 * t109;
+  real t380 = Rc[0] * t359 + Rc[1] * t369 + Rc[2] * t378;
+  S_I[15] += Rc[0] * t361 + Rc[1] * t371 + Rc[2] * t380 + (r[1] * t334 - r[2] * t273 + (r[1] * t330
+    - r[2] * t269));
+  S_I[16] += Rc[3] * t361 + Rc[4] * t371 + Rc[5] * t380 + (r[1] * t343 - r[2] * t281 + (r[2] * t202
+    - r[0] * t330));
+  S_I[17] += Rc[6] * t361 + Rc[7] * t371 + Rc[8] * t380 + (r[1] * t350 - r[2] * t290 + (r[0] * t269
+    - r[1] * t202));
+  real t421 = Rc[3] * t352 + Rc[4] * t355 + Rc[5] * t359;
+  real t427 = Rc[3] * t355 + Rc[4] * t365 + Rc[5] * t369;
+  real t434 = Rc[3] * t359 + Rc[4] * t369 + Rc[5] * t378;
+  S_I[18] += Rc[3] * t421 + Rc[4] * t427 + Rc[5] * t434 + (r[2] * t215 - r[0] * t343 + (r[2] * t211
+    - r[0] * t339));
+  S_I[19] += Rc[6] * t421 + Rc[7] * t427 + Rc[8] * t434 + (r[2] * t224 - r[0] * t350 + (r[0] * t278
+    - r[1] * t211));
+  S_I[20] += Rc[6] * (Rc[6] * t352 + Rc[7] * t355 + Rc[8] * t359) + Rc[7] * (Rc[6] * t355 + Rc[7] *
+    t365 + Rc[8] * t369) + Rc[8] * (Rc[6] * t359 + Rc[7] * t369 + Rc[8] * t378) + (r[0] * t290 -
+    r[1] * t224 + (r[0] * t286 - r[1] * t220));
+  real t487 = e[0] + t10 * t122;
+  real t490 = e[1] + t22 * t122;
+  real t494 = e[2] + t35 * t122;
+  e_I[0] += Rc[0] * t487 + Rc[1] * t490 + Rc[2] * t494;
+  e_I[1] += Rc[3] * t487 + Rc[4] * t490 + Rc[5] * t494;
+  e_I[2] += Rc[6] * t487 + Rc[7] * t490 + Rc[8] * t494;
+  real t508 = e[3] + t48 * t122;
+  real t511 = e[4] + t61 * t122;
+  real t515 = e[5] + t74 * t122;
+  e_I[3] += Rc[0] * t508 + Rc[1] * t511 + Rc[2] * t515 + (t487 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t490 * (Rc[7] * r[1] - Rc[4] * r[2]) + t494 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t508 + Rc[4] * t511 + Rc[5] * t515 + (t487 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t490 * (Rc[1] * r[2] - Rc[7] * r[0]) + t494 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t508 + Rc[7] * t511 + Rc[8] * t515 + (t487 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t490 * (Rc[4] * r[0] - Rc[1] * r[1]) + t494 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic1_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic1_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
@@ -1065,142 +278,43 @@ static const mstmm_guard mstmm_sweep_generic1_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic1_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic1_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = H[0] * t53;
-    const real t55 = t16 + t54;
-    delta[0] = t55;
-    const real t56 = H[1] * t53;
-    const real t57 = t22 + t56;
-    delta[1] = t57;
-    const real t58 = H[2] * t53;
-    const real t59 = t29 + t58;
-    delta[2] = t59;
-    const real t60 = H[3] * t53;
-    const real t61 = t36 + t60;
-    delta[3] = t61;
-    const real t62 = H[4] * t53;
-    const real t63 = t43 + t62;
-    delta[4] = t63;
-    const real t64 = H[5] * t53;
-    const real t65 = t50 + t64;
-    delta[5] = t65;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  delta[0] = t16 + H[0] * t53;
+  delta[1] = t22 + H[1] * t53;
+  delta[2] = t29 + H[2] * t53;
+  delta[3] = t36 + H[3] * t53;
+  delta[4] = t43 + H[4] * t53;
+  delta[5] = t50 + H[5] * t53;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 1 speeds
  * in  H[6] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[1] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic1_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic1_effort(in_t H, in_t f, out_t tau)
 {
-    const real t0 = H[0] * f[0];
-    const real t1 = H[1] * f[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * f[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * f[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * f[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * f[5];
-    const real t10 = t8 + t9;
-    tau[0] = t10;
-    return 0;
+  tau[0] = H[0] * f[0] + H[1] * f[1] + H[2] * f[2] + H[3] * f[3] + H[4] * f[4] + H[5] * f[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_effort_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_effort_outputs[] = {
-    {"tau", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 1 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1210,113 +324,25 @@ static const mstmm_port mstmm_sweep_generic1_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[1] accelerations of the coordinates
  */
-int mstmm_sweep_generic1_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic1_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    const real t0 = H[0] * H[0];
-    const real t1 = H[1] * H[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * H[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * H[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * H[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * H[5];
-    const real t10 = t8 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t12 = r[2] * delta_I[4];
-    const real t13 = r[1] * delta_I[5];
-    const real t14 = t12 - t13;
-    const real t15 = delta_I[0] + t14;
-    const real t16 = Rc[0] * t15;
-    const real t17 = r[0] * delta_I[5];
-    const real t18 = r[2] * delta_I[3];
-    const real t19 = t17 - t18;
-    const real t20 = delta_I[1] + t19;
-    const real t21 = Rc[3] * t20;
-    const real t22 = t16 + t21;
-    const real t23 = r[1] * delta_I[3];
-    const real t24 = r[0] * delta_I[4];
-    const real t25 = t23 - t24;
-    const real t26 = delta_I[2] + t25;
-    const real t27 = Rc[6] * t26;
-    const real t28 = t22 + t27;
-    const real t29 = delta[0] - t28;
-    const real t30 = H[0] * t29;
-    const real t31 = Rc[1] * t15;
-    const real t32 = Rc[4] * t20;
-    const real t33 = t31 + t32;
-    const real t34 = Rc[7] * t26;
-    const real t35 = t33 + t34;
-    const real t36 = delta[1] - t35;
-    const real t37 = H[1] * t36;
-    const real t38 = t30 + t37;
-    const real t39 = Rc[2] * t15;
-    const real t40 = Rc[5] * t20;
-    const real t41 = t39 + t40;
-    const real t42 = Rc[8] * t26;
-    const real t43 = t41 + t42;
-    const real t44 = delta[2] - t43;
-    const real t45 = H[2] * t44;
-    const real t46 = t38 + t45;
-    const real t47 = Rc[0] * delta_I[3];
-    const real t48 = Rc[3] * delta_I[4];
-    const real t49 = t47 + t48;
-    const real t50 = Rc[6] * delta_I[5];
-    const real t51 = t49 + t50;
-    const real t52 = delta[3] - t51;
-    const real t53 = H[3] * t52;
-    const real t54 = t46 + t53;
-    const real t55 = Rc[1] * delta_I[3];
-    const real t56 = Rc[4] * delta_I[4];
-    const real t57 = t55 + t56;
-    const real t58 = Rc[7] * delta_I[5];
-    const real t59 = t57 + t58;
-    const real t60 = delta[4] - t59;
-    const real t61 = H[4] * t60;
-    const real t62 = t54 + t61;
-    const real t63 = Rc[2] * delta_I[3];
-    const real t64 = Rc[5] * delta_I[4];
-    const real t65 = t63 + t64;
-    const real t66 = Rc[8] * delta_I[5];
-    const real t67 = t65 + t66;
-    const real t68 = delta[5] - t67;
-    const real t69 = H[5] * t68;
-    const real t70 = t62 + t69;
-    const real t71 = 1.0 / t10;
-    const real t72 = t70 * t71;
-    udot[0] = t72;
-    return 0;
+  real t10 = H[0] * H[0] + H[1] * H[1] + H[2] * H[2] + H[3] * H[3] + H[4] * H[4] + H[5] * H[5];
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t15 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t20 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t26 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  udot[0] = (H[0] * (delta[0] - (Rc[0] * t15 + Rc[3] * t20 + Rc[6] * t26)) + H[1] * (delta[1] -
+    (Rc[1] * t15 + Rc[4] * t20 + Rc[7] * t26)) + H[2] * (delta[2] - (Rc[2] * t15 + Rc[5] * t20 +
+    Rc[8] * t26)) + H[3] * (delta[3] - (Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] *
+    delta_I[5])) + H[4] * (delta[4] - (Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] *
+    delta_I[5])) + H[5] * (delta[5] - (Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] *
+    delta_I[5]))) * (1.0 / t10);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_project_outputs[] = {
-    {"udot", 1, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic1_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 1 free speed, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
@@ -1328,548 +354,138 @@ static const mstmm_guard mstmm_sweep_generic1_project_guards[] = {
  * out G[1][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic1_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic1_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[1] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[1] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[2] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[3] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[4] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[5] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[1] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[2] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[3] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[4] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[5] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[2] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[1] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[2] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[3] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[4] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[5] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[3] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[1] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[2] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[3] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[4] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[5] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[4] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[1] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[2] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[3] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[4] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[5] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[5] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] - W[0];
-    const real t78 = t76 + t77;
-    const real t79 = 0.0 < t78;
-    if (!(t79 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t80 = H[2] * H[2];
-    const real t81 = H[0] * H[0];
-    const real t82 = H[1] * H[1];
-    const real t83 = t81 + t82;
-    const real t84 = t80 + t83;
-    const real t85 = 0.0 < floor_[0];
-    const real t86 = S[0] + S[6];
-    const real t87 = S[11] + t86;
-    const real t88 = ((real)1 / (real)300000000000000) * t87;
-    const real t89 = t85 != 0 ? floor_[0] : t88;
-    const real t90 = t84 * t89;
-    const real t91 = H[5] * H[5];
-    const real t92 = H[3] * H[3];
-    const real t93 = H[4] * H[4];
-    const real t94 = t92 + t93;
-    const real t95 = t91 + t94;
-    const real t96 = 0.0 < floor_[1];
-    const real t97 = S[15] + S[18];
-    const real t98 = S[20] + t97;
-    const real t99 = ((real)1 / (real)300000000000000) * t98;
-    const real t100 = t96 != 0 ? floor_[1] : t99;
-    const real t101 = t95 * t100;
-    const real t102 = t90 + t101;
-    const real t103 = t102 < t78;
-    if (!(t103 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t104 = 1.0 / t78;
-    F[0] = t104;
-    const real t105 = t10 * t104;
-    G[0] = t105;
-    const real t106 = t22 * t104;
-    G[1] = t106;
-    const real t107 = t35 * t104;
-    G[2] = t107;
-    const real t108 = t48 * t104;
-    G[3] = t108;
-    const real t109 = t61 * t104;
-    G[4] = t109;
-    const real t110 = t74 * t104;
-    G[5] = t110;
-    const real t111 = t10 * t105;
-    const real t112 = S[0] - t111;
-    const real t113 = Rc[0] * t112;
-    const real t114 = t10 * t106;
-    const real t115 = S[1] - t114;
-    const real t116 = Rc[1] * t115;
-    const real t117 = t113 + t116;
-    const real t118 = t10 * t107;
-    const real t119 = S[2] - t118;
-    const real t120 = Rc[2] * t119;
-    const real t121 = t117 + t120;
-    const real t122 = Rc[0] * t121;
-    const real t123 = Rc[0] * t115;
-    const real t124 = t22 * t106;
-    const real t125 = S[6] - t124;
-    const real t126 = Rc[1] * t125;
-    const real t127 = t123 + t126;
-    const real t128 = t22 * t107;
-    const real t129 = S[7] - t128;
-    const real t130 = Rc[2] * t129;
-    const real t131 = t127 + t130;
-    const real t132 = Rc[1] * t131;
-    const real t133 = t122 + t132;
-    const real t134 = Rc[0] * t119;
-    const real t135 = Rc[1] * t129;
-    const real t136 = t134 + t135;
-    const real t137 = t35 * t107;
-    const real t138 = S[11] - t137;
-    const real t139 = Rc[2] * t138;
-    const real t140 = t136 + t139;
-    const real t141 = Rc[2] * t140;
-    const real t142 = t133 + t141;
-    S_I[0] += t142;
-    const real t143 = Rc[3] * t121;
-    const real t144 = Rc[4] * t131;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[5] * t140;
-    const real t147 = t145 + t146;
-    S_I[1] += t147;
-    const real t148 = Rc[6] * t121;
-    const real t149 = Rc[7] * t131;
-    const real t150 = t148 + t149;
-    const real t151 = Rc[8] * t140;
-    const real t152 = t150 + t151;
-    S_I[2] += t152;
-    const real t153 = t10 * t108;
-    const real t154 = S[3] - t153;
-    const real t155 = Rc[0] * t154;
-    const real t156 = t22 * t108;
-    const real t157 = S[8] - t156;
-    const real t158 = Rc[1] * t157;
-    const real t159 = t155 + t158;
-    const real t160 = t35 * t108;
-    const real t161 = S[12] - t160;
-    const real t162 = Rc[2] * t161;
-    const real t163 = t159 + t162;
-    const real t164 = Rc[0] * t163;
-    const real t165 = t10 * t109;
-    const real t166 = S[4] - t165;
-    const real t167 = Rc[0] * t166;
-    const real t168 = t22 * t109;
-    const real t169 = S[9] - t168;
-    const real t170 = Rc[1] * t169;
-    const real t171 = t167 + t170;
-    const real t172 = t35 * t109;
-    const real t173 = S[13] - t172;
-    const real t174 = Rc[2] * t173;
-    const real t175 = t171 + t174;
-    const real t176 = Rc[1] * t175;
-    const real t177 = t164 + t176;
-    const real t178 = t10 * t110;
-    const real t179 = S[5] - t178;
-    const real t180 = Rc[0] * t179;
-    const real t181 = t22 * t110;
-    const real t182 = S[10] - t181;
-    const real t183 = Rc[1] * t182;
-    const real t184 = t180 + t183;
-    const real t185 = t35 * t110;
-    const real t186 = S[14] - t185;
-    const real t187 = Rc[2] * t186;
-    const real t188 = t184 + t187;
-    const real t189 = Rc[2] * t188;
-    const real t190 = t177 + t189;
-    const real t191 = r[1] * t152;
-    const real t192 = r[2] * t147;
-    const real t193 = t191 - t192;
-    const real t194 = t190 + t193;
-    S_I[3] += t194;
-    const real t195 = Rc[3] * t163;
-    const real t196 = Rc[4] * t175;
-    const real t197 = t195 + t196;
-    const real t198 = Rc[5] * t188;
-    const real t199 = t197 + t198;
-    const real t200 = r[2] * t142;
-    const real t201 = r[0] * t152;
-    const real t202 = t200 - t201;
-    const real t203 = t199 + t202;
-    S_I[4] += t203;
-    const real t204 = Rc[6] * t163;
-    const real t205 = Rc[7] * t175;
-    const real t206 = t204 + t205;
-    const real t207 = Rc[8] * t188;
-    const real t208 = t206 + t207;
-    const real t209 = r[0] * t147;
-    const real t210 = r[1] * t142;
-    const real t211 = t209 - t210;
-    const real t212 = t208 + t211;
-    S_I[5] += t212;
-    const real t213 = Rc[3] * t112;
-    const real t214 = Rc[4] * t115;
-    const real t215 = t213 + t214;
-    const real t216 = Rc[5] * t119;
-    const real t217 = t215 + t216;
-    const real t218 = Rc[3] * t217;
-    const real t219 = Rc[3] * t115;
-    const real t220 = Rc[4] * t125;
-    const real t221 = t219 + t220;
-    const real t222 = Rc[5] * t129;
-    const real t223 = t221 + t222;
-    const real t224 = Rc[4] * t223;
-    const real t225 = t218 + t224;
-    const real t226 = Rc[3] * t119;
-    const real t227 = Rc[4] * t129;
-    const real t228 = t226 + t227;
-    const real t229 = Rc[5] * t138;
-    const real t230 = t228 + t229;
-    const real t231 = Rc[5] * t230;
-    const real t232 = t225 + t231;
-    S_I[6] += t232;
-    const real t233 = Rc[6] * t217;
-    const real t234 = Rc[7] * t223;
-    const real t235 = t233 + t234;
-    const real t236 = Rc[8] * t230;
-    const real t237 = t235 + t236;
-    S_I[7] += t237;
-    const real t238 = Rc[3] * t154;
-    const real t239 = Rc[4] * t157;
-    const real t240 = t238 + t239;
-    const real t241 = Rc[5] * t161;
-    const real t242 = t240 + t241;
-    const real t243 = Rc[0] * t242;
-    const real t244 = Rc[3] * t166;
-    const real t245 = Rc[4] * t169;
-    const real t246 = t244 + t245;
-    const real t247 = Rc[5] * t173;
-    const real t248 = t246 + t247;
-    const real t249 = Rc[1] * t248;
-    const real t250 = t243 + t249;
-    const real t251 = Rc[3] * t179;
-    const real t252 = Rc[4] * t182;
-    const real t253 = t251 + t252;
-    const real t254 = Rc[5] * t186;
-    const real t255 = t253 + t254;
-    const real t256 = Rc[2] * t255;
-    const real t257 = t250 + t256;
-    const real t258 = r[1] * t237;
-    const real t259 = r[2] * t232;
-    const real t260 = t258 - t259;
-    const real t261 = t257 + t260;
-    S_I[8] += t261;
-    const real t262 = Rc[3] * t242;
-    const real t263 = Rc[4] * t248;
-    const real t264 = t262 + t263;
-    const real t265 = Rc[5] * t255;
-    const real t266 = t264 + t265;
-    const real t267 = r[0] * t237;
-    const real t268 = t192 - t267;
-    const real t269 = t266 + t268;
-    S_I[9] += t269;
-    const real t270 = Rc[6] * t242;
-    const real t271 = Rc[7] * t248;
-    const real t272 = t270 + t271;
-    const real t273 = Rc[8] * t255;
-    const real t274 = t272 + t273;
-    const real t275 = r[0] * t232;
-    const real t276 = r[1] * t147;
-    const real t277 = t275 - t276;
-    const real t278 = t274 + t277;
-    S_I[10] += t278;
-    const real t279 = Rc[6] * t112;
-    const real t280 = Rc[7] * t115;
-    const real t281 = t279 + t280;
-    const real t282 = Rc[8] * t119;
-    const real t283 = t281 + t282;
-    const real t284 = Rc[6] * t283;
-    const real t285 = Rc[6] * t115;
-    const real t286 = Rc[7] * t125;
-    const real t287 = t285 + t286;
-    const real t288 = Rc[8] * t129;
-    const real t289 = t287 + t288;
-    const real t290 = Rc[7] * t289;
-    const real t291 = t284 + t290;
-    const real t292 = Rc[6] * t119;
-    const real t293 = Rc[7] * t129;
-    const real t294 = t292 + t293;
-    const real t295 = Rc[8] * t138;
-    const real t296 = t294 + t295;
-    const real t297 = Rc[8] * t296;
-    const real t298 = t291 + t297;
-    S_I[11] += t298;
-    const real t299 = Rc[6] * t154;
-    const real t300 = Rc[7] * t157;
-    const real t301 = t299 + t300;
-    const real t302 = Rc[8] * t161;
-    const real t303 = t301 + t302;
-    const real t304 = Rc[0] * t303;
-    const real t305 = Rc[6] * t166;
-    const real t306 = Rc[7] * t169;
-    const real t307 = t305 + t306;
-    const real t308 = Rc[8] * t173;
-    const real t309 = t307 + t308;
-    const real t310 = Rc[1] * t309;
-    const real t311 = t304 + t310;
-    const real t312 = Rc[6] * t179;
-    const real t313 = Rc[7] * t182;
-    const real t314 = t312 + t313;
-    const real t315 = Rc[8] * t186;
-    const real t316 = t314 + t315;
-    const real t317 = Rc[2] * t316;
-    const real t318 = t311 + t317;
-    const real t319 = r[1] * t298;
-    const real t320 = r[2] * t237;
-    const real t321 = t319 - t320;
-    const real t322 = t318 + t321;
-    S_I[12] += t322;
-    const real t323 = Rc[3] * t303;
-    const real t324 = Rc[4] * t309;
-    const real t325 = t323 + t324;
-    const real t326 = Rc[5] * t316;
-    const real t327 = t325 + t326;
-    const real t328 = r[2] * t152;
-    const real t329 = r[0] * t298;
-    const real t330 = t328 - t329;
-    const real t331 = t327 + t330;
-    S_I[13] += t331;
-    const real t332 = Rc[6] * t303;
-    const real t333 = Rc[7] * t309;
-    const real t334 = t332 + t333;
-    const real t335 = Rc[8] * t316;
-    const real t336 = t334 + t335;
-    const real t337 = t267 - t191;
-    const real t338 = t336 + t337;
-    S_I[14] += t338;
-    const real t339 = t48 * t108;
-    const real t340 = S[15] - t339;
-    const real t341 = Rc[0] * t340;
-    const real t342 = t48 * t109;
-    const real t343 = S[16] - t342;
-    const real t344 = Rc[1] * t343;
-    const real t345 = t341 + t344;
-    const real t346 = t48 * t110;
-    const real t347 = S[17] - t346;
-    const real t348 = Rc[2] * t347;
-    const real t349 = t345 + t348;
-    const real t350 = Rc[0] * t349;
-    const real t351 = Rc[0] * t343;
-    const real t352 = t61 * t109;
-    const real t353 = S[18] - t352;
-    const real t354 = Rc[1] * t353;
-    const real t355 = t351 + t354;
-    const real t356 = t61 * t110;
-    const real t357 = S[19] - t356;
-    const real t358 = Rc[2] * t357;
-    const real t359 = t355 + t358;
-    const real t360 = Rc[1] * t359;
-    const real t361 = t350 + t360;
-    const real t362 = Rc[0] * t347;
-    const real t363 = Rc[1] * t357;
-    const real t364 = t362 + t363;
-    const real t365 = t74 * t110;
-    const real t366 = S[20] - t365;
-    const real t367 = Rc[2] * t366;
-    const real t368 = t364 + t367;
-    const real t369 = Rc[2] * t368;
-    const real t370 = t361 + t369;
-    const real t371 = r[1] * t322;
-    const real t372 = r[2] * t261;
-    const real t373 = t371 - t372;
-    const real t374 = r[1] * t318;
-    const real t375 = r[2] * t257;
-    const real t376 = t374 - t375;
-    const real t377 = t373 + t376;
-    const real t378 = t370 + t377;
-    S_I[15] += t378;
-    const real t379 = Rc[3] * t349;
-    const real t380 = Rc[4] * t359;
-    const real t381 = t379 + t380;
-    const real t382 = Rc[5] * t368;
-    const real t383 = t381 + t382;
-    const real t384 = r[1] * t331;
-    const real t385 = r[2] * t269;
-    const real t386 = t384 - t385;
-    const real t387 = r[2] * t190;
-    const real t388 = r[0] * t318;
-    const real t389 = t387 - t388;
-    const real t390 = t386 + t389;
-    const real t391 = t383 + t390;
-    S_I[16] += t391;
-    const real t392 = Rc[6] * t349;
-    const real t393 = Rc[7] * t359;
-    const real t394 = t392 + t393;
-    const real t395 = Rc[8] * t368;
-    const real t396 = t394 + t395;
-    const real t397 = r[1] * t338;
-    const real t398 = r[2] * t278;
-    const real t399 = t397 - t398;
-    const real t400 = r[0] * t257;
-    const real t401 = r[1] * t190;
-    const real t402 = t400 - t401;
-    const real t403 = t399 + t402;
-    const real t404 = t396 + t403;
-    S_I[17] += t404;
-    const real t405 = Rc[3] * t340;
-    const real t406 = Rc[4] * t343;
-    const real t407 = t405 + t406;
-    const real t408 = Rc[5] * t347;
-    const real t409 = t407 + t408;
-    const real t410 = Rc[3] * t409;
-    const real t411 = Rc[3] * t343;
-    const real t412 = Rc[4] * t353;
-    const real t413 = t411 + t412;
-    const real t414 = Rc[5] * t357;
-    const real t415 = t413 + t414;
-    const real t416 = Rc[4] * t415;
-    const real t417 = t410 + t416;
-    const real t418 = Rc[3] * t347;
-    const real t419 = Rc[4] * t357;
-    const real t420 = t418 + t419;
-    const real t421 = Rc[5] * t366;
-    const real t422 = t420 + t421;
-    const real t423 = Rc[5] * t422;
-    const real t424 = t417 + t423;
-    const real t425 = r[2] * t203;
-    const real t426 = r[0] * t331;
-    const real t427 = t425 - t426;
-    const real t428 = r[2] * t199;
-    const real t429 = r[0] * t327;
-    const real t430 = t428 - t429;
-    const real t431 = t427 + t430;
-    const real t432 = t424 + t431;
-    S_I[18] += t432;
-    const real t433 = Rc[6] * t409;
-    const real t434 = Rc[7] * t415;
-    const real t435 = t433 + t434;
-    const real t436 = Rc[8] * t422;
-    const real t437 = t435 + t436;
-    const real t438 = r[2] * t212;
-    const real t439 = r[0] * t338;
-    const real t440 = t438 - t439;
-    const real t441 = r[0] * t266;
-    const real t442 = r[1] * t199;
-    const real t443 = t441 - t442;
-    const real t444 = t440 + t443;
-    const real t445 = t437 + t444;
-    S_I[19] += t445;
-    const real t446 = Rc[6] * t340;
-    const real t447 = Rc[7] * t343;
-    const real t448 = t446 + t447;
-    const real t449 = Rc[8] * t347;
-    const real t450 = t448 + t449;
-    const real t451 = Rc[6] * t450;
-    const real t452 = Rc[6] * t343;
-    const real t453 = Rc[7] * t353;
-    const real t454 = t452 + t453;
-    const real t455 = Rc[8] * t357;
-    const real t456 = t454 + t455;
-    const real t457 = Rc[7] * t456;
-    const real t458 = t451 + t457;
-    const real t459 = Rc[6] * t347;
-    const real t460 = Rc[7] * t357;
-    const real t461 = t459 + t460;
-    const real t462 = Rc[8] * t366;
-    const real t463 = t461 + t462;
-    const real t464 = Rc[8] * t463;
-    const real t465 = t458 + t464;
-    const real t466 = r[0] * t278;
-    const real t467 = r[1] * t212;
-    const real t468 = t466 - t467;
-    const real t469 = r[0] * t274;
-    const real t470 = r[1] * t208;
-    const real t471 = t469 - t470;
-    const real t472 = t468 + t471;
-    const real t473 = t465 + t472;
-    S_I[20] += t473;
-    return 0;
+  real t10 = H[0] * S[0] + H[1] * S[1] + H[2] * S[2] + H[3] * S[3] + H[4] * S[4] + H[5] * S[5];
+  real t22 = H[0] * S[1] + H[1] * S[6] + H[2] * S[7] + H[3] * S[8] + H[4] * S[9] + H[5] * S[10];
+  real t35 = H[0] * S[2] + H[1] * S[7] + H[2] * S[11] + H[3] * S[12] + H[4] * S[13] + H[5] * S[14];
+  real t48 = H[0] * S[3] + H[1] * S[8] + H[2] * S[12] + H[3] * S[15] + H[4] * S[16] + H[5] * S[17];
+  real t61 = H[0] * S[4] + H[1] * S[9] + H[2] * S[13] + H[3] * S[16] + H[4] * S[18] + H[5] * S[19];
+  real t74 = H[0] * S[5] + H[1] * S[10] + H[2] * S[14] + H[3] * S[17] + H[4] * S[19] + H[5] * S[20];
+  real t78 = H[0] * t10 + H[1] * t22 + H[2] * t35 + H[3] * t48 + H[4] * t61 + H[5] * t74 + (J[0] -
+    W[0]);
+  if (!((0.0 < t78))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t88 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t99 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  if (!(((H[2] * H[2] + (H[0] * H[0] + H[1] * H[1])) * ((0.0 < floor_[0]) ? floor_[0] : t88) + (H[5] * H[5] + (H[3] * H[3] + H[4] * H[4])) * ((0.0 < floor_[1]) ? floor_[1] : t99) < t78))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t104 = 1.0 / t78;
+  F[0] = t104;
+  real t105 = t10 * t104;
+  G[0] = t105;
+  real t106 = t22 * t104;
+  G[1] = t106;
+  real t107 = t35 * t104;
+  G[2] = t107;
+  real t108 = t48 * t104;
+  G[3] = t108;
+  real t109 = t61 * t104;
+  G[4] = t109;
+  real t110 = t74 * t104;
+  G[5] = t110;
+  real t112 = S[0] - t10 * t105;
+  real t115 = S[1] - t10 * t106;
+  real t119 = S[2] - t10 * t107;
+  real t121 = Rc[0] * t112 + Rc[1] * t115 + Rc[2] * t119;
+  real t125 = S[6] - t22 * t106;
+  real t129 = S[7] - t22 * t107;
+  real t131 = Rc[0] * t115 + Rc[1] * t125 + Rc[2] * t129;
+  real t138 = S[11] - t35 * t107;
+  real t140 = Rc[0] * t119 + Rc[1] * t129 + Rc[2] * t138;
+  real t142 = Rc[0] * t121 + Rc[1] * t131 + Rc[2] * t140;
+  S_I[0] += t142;
+  real t147 = Rc[3] * t121 + Rc[4] * t131 + Rc[5] * t140;
+  S_I[1] += t147;
+  real t152 = Rc[6] * t121 + Rc[7] * t131 + Rc[8] * t140;
+  S_I[2] += t152;
+  real t154 = S[3] - t10 * t108;
+  real t157 = S[8] - t22 * t108;
+  real t161 = S[12] - t35 * t108;
+  real t163 = Rc[0] * t154 + Rc[1] * t157 + Rc[2] * t161;
+  real t166 = S[4] - t10 * t109;
+  real t169 = S[9] - t22 * t109;
+  real t173 = S[13] - t35 * t109;
+  real t175 = Rc[0] * t166 + Rc[1] * t169 + Rc[2] * t173;
+  real t179 = S[5] - t10 * t110;
+  real t182 = S[10] - t22 * t110;
+  real t186 = S[14] - t35 * t110;
+  real t188 = Rc[0] * t179 + Rc[1] * t182 + Rc[2] * t186;
+  real t190 = Rc[0] * t163 + Rc[1] * t175 + Rc[2] * t188;
+  real t191 = r[1] * t152;
+  real t192 = r[2] * t147;
+  S_I[3] += t190 + (t191 - t192);
+  real t199 = Rc[3] * t163 + Rc[4] * t175 + Rc[5] * t188;
+  real t203 = t199 + (r[2] * t142 - r[0] * t152);
+  S_I[4] += t203;
+  real t208 = Rc[6] * t163 + Rc[7] * t175 + Rc[8] * t188;
+  real t212 = t208 + (r[0] * t147 - r[1] * t142);
+  S_I[5] += t212;
+  real t217 = Rc[3] * t112 + Rc[4] * t115 + Rc[5] * t119;
+  real t223 = Rc[3] * t115 + Rc[4] * t125 + Rc[5] * t129;
+  real t230 = Rc[3] * t119 + Rc[4] * t129 + Rc[5] * t138;
+  real t232 = Rc[3] * t217 + Rc[4] * t223 + Rc[5] * t230;
+  S_I[6] += t232;
+  real t237 = Rc[6] * t217 + Rc[7] * t223 + Rc[8] * t230;
+  S_I[7] += t237;
+  real t242 = Rc[3] * t154 + Rc[4] * t157 + Rc[5] * t161;
+  real t248 = Rc[3] * t166 + Rc[4] * t169 + Rc[5] * t173;
+  real t255 = Rc[3] * t179 + Rc[4] * t182 + Rc[5] * t186;
+  real t257 = Rc[0] * t242 + Rc[1] * t248 + Rc[2] * t255;
+  real t261 = t257 + (r[1] * t237 - r[2] * t232);
+  S_I[8] += t261;
+  real t266 = Rc[3] * t242 + Rc[4] * t248 + Rc[5] * t255;
+  real t267 = r[0] * t237;
+  real t269 = t266 + (t192 - t267);
+  S_I[9] += t269;
+  real t274 = Rc[6] * t242 + Rc[7] * t248 + Rc[8] * t255;
+  real t278 = t274 + (r[0] * t232 - r[1] * t147);
+  S_I[10] += t278;
+  real t298 = Rc[6] * (Rc[6] * t112 + Rc[7] * t115 + Rc[8] * t119) + Rc[7] * (Rc[6] * t115 + Rc[7] *
+    t125 + Rc[8] * t129) + Rc[8] * (Rc[6] * t119 + Rc[7] * t129 + Rc[8] * t138);
+  S_I[11] += t298;
+  real t303 = Rc[6] * t154 + Rc[7] * t157 + Rc[8] * t161;
+  real t309 = Rc[6] * t166 + Rc[7] * t169 + Rc[8] * t173;
+  real t316 = Rc[6] * t179 + Rc[7] * t182 + Rc[8] * t186;
+  real t318 = Rc[0] * t303 + Rc[1] * t309 + Rc[2] * t316;
+  real t322 = t318 + (r[1] * t298 - r[2] * t237);
+  S_I[12] += t322;
+  real t327 = Rc[3] * t303 + Rc[4] * t309 + Rc[5] * t316;
+  real t331 = t327 + (r[2] * t152 - r[0] * t298);
+  S_I[13] += t331;
+  real t338 = Rc[6] * t303 + Rc[7] * t309 + Rc[8] * t316 + (t267 - t191);
+  S_I[14] += t338;
+  real t340 = S[15] - t48 * t108;
+  real t343 = S[16] - t48 * t109;
+  real t347 = S[17] - t48 * t110;
+  real t349 = Rc[0] * t340 + Rc[1] * t343 + Rc[2] * t347;
+  real t353 = S[18] - t61 * t109;
+  real t357 = S[19] - t61 * t110;
+  real t359 = Rc[0] * t343 + Rc[1] * t353 + Rc[2] * t357;
+  real t366 = S[20] - t74 * t110;
+  real t368 = Rc[0] * t347 + Rc[1] * t357 + Rc[2] * t366;
+  S_I[15] += Rc[0] * t349 + Rc[1] * t359 + Rc[2] * t368 + (r[1] * t322 - r[2] * t261 + (r[1] * t318
+    - r[2] * t257));
+  S_I[16] += Rc[3] * t349 + Rc[4] * t359 + Rc[5] * t368 + (r[1] * t331 - r[2] * t269 + (r[2] * t190
+    - r[0] * t318));
+  S_I[17] += Rc[6] * t349 + Rc[7] * t359 + Rc[8] * t368 + (r[1] * t338 - r[2] * t278 + (r[0] * t257
+    - r[1] * t190));
+  real t409 = Rc[3] * t340 + Rc[4] * t343 + Rc[5] * t347;
+  real t415 = Rc[3] * t343 + Rc[4] * t353 + Rc[5] * t357;
+  real t422 = Rc[3] * t347 + Rc[4] * t357 + Rc[5] * t366;
+  S_I[18] += Rc[3] * t409 + Rc[4] * t415 + Rc[5] * t422 + (r[2] * t203 - r[0] * t331 + (r[2] * t199
+    - r[0] * t327));
+  S_I[19] += Rc[6] * t409 + Rc[7] * t415 + Rc[8] * t422 + (r[2] * t212 - r[0] * t338 + (r[0] * t266
+    - r[1] * t199));
+  S_I[20] += Rc[6] * (Rc[6] * t340 + Rc[7] * t343 + Rc[8] * t347) + Rc[7] * (Rc[6] * t343 + Rc[7] *
+    t353 + Rc[8] * t357) + Rc[8] * (Rc[6] * t347 + Rc[7] * t357 + Rc[8] * t366) + (r[0] * t278 -
+    r[1] * t212 + (r[0] * t274 - r[1] * t208));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"W", 1, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_factor_outputs[] = {
-    {"F", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic1_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
@@ -1879,142 +495,34 @@ static const mstmm_guard mstmm_sweep_generic1_factor_guards[] = {
  * out y[1] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic1_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[1] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = G[0] * t11;
-    const real t13 = e[0] + t12;
-    const real t14 = Rc[0] * t13;
-    const real t15 = G[1] * t11;
-    const real t16 = e[1] + t15;
-    const real t17 = Rc[1] * t16;
-    const real t18 = t14 + t17;
-    const real t19 = G[2] * t11;
-    const real t20 = e[2] + t19;
-    const real t21 = Rc[2] * t20;
-    const real t22 = t18 + t21;
-    e_I[0] += t22;
-    const real t23 = Rc[3] * t13;
-    const real t24 = Rc[4] * t16;
-    const real t25 = t23 + t24;
-    const real t26 = Rc[5] * t20;
-    const real t27 = t25 + t26;
-    e_I[1] += t27;
-    const real t28 = Rc[6] * t13;
-    const real t29 = Rc[7] * t16;
-    const real t30 = t28 + t29;
-    const real t31 = Rc[8] * t20;
-    const real t32 = t30 + t31;
-    e_I[2] += t32;
-    const real t33 = G[3] * t11;
-    const real t34 = e[3] + t33;
-    const real t35 = Rc[0] * t34;
-    const real t36 = G[4] * t11;
-    const real t37 = e[4] + t36;
-    const real t38 = Rc[1] * t37;
-    const real t39 = t35 + t38;
-    const real t40 = G[5] * t11;
-    const real t41 = e[5] + t40;
-    const real t42 = Rc[2] * t41;
-    const real t43 = t39 + t42;
-    const real t44 = Rc[6] * r[1];
-    const real t45 = Rc[3] * r[2];
-    const real t46 = t44 - t45;
-    const real t47 = t13 * t46;
-    const real t48 = Rc[7] * r[1];
-    const real t49 = Rc[4] * r[2];
-    const real t50 = t48 - t49;
-    const real t51 = t16 * t50;
-    const real t52 = t47 + t51;
-    const real t53 = Rc[8] * r[1];
-    const real t54 = Rc[5] * r[2];
-    const real t55 = t53 - t54;
-    const real t56 = t20 * t55;
-    const real t57 = t52 + t56;
-    const real t58 = t43 + t57;
-    e_I[3] += t58;
-    const real t59 = Rc[3] * t34;
-    const real t60 = Rc[4] * t37;
-    const real t61 = t59 + t60;
-    const real t62 = Rc[5] * t41;
-    const real t63 = t61 + t62;
-    const real t64 = Rc[0] * r[2];
-    const real t65 = Rc[6] * r[0];
-    const real t66 = t64 - t65;
-    const real t67 = t13 * t66;
-    const real t68 = Rc[1] * r[2];
-    const real t69 = Rc[7] * r[0];
-    const real t70 = t68 - t69;
-    const real t71 = t16 * t70;
-    const real t72 = t67 + t71;
-    const real t73 = Rc[2] * r[2];
-    const real t74 = Rc[8] * r[0];
-    const real t75 = t73 - t74;
-    const real t76 = t20 * t75;
-    const real t77 = t72 + t76;
-    const real t78 = t63 + t77;
-    e_I[4] += t78;
-    const real t79 = Rc[6] * t34;
-    const real t80 = Rc[7] * t37;
-    const real t81 = t79 + t80;
-    const real t82 = Rc[8] * t41;
-    const real t83 = t81 + t82;
-    const real t84 = Rc[3] * r[0];
-    const real t85 = Rc[0] * r[1];
-    const real t86 = t84 - t85;
-    const real t87 = t13 * t86;
-    const real t88 = Rc[4] * r[0];
-    const real t89 = Rc[1] * r[1];
-    const real t90 = t88 - t89;
-    const real t91 = t16 * t90;
-    const real t92 = t87 + t91;
-    const real t93 = Rc[5] * r[0];
-    const real t94 = Rc[2] * r[1];
-    const real t95 = t93 - t94;
-    const real t96 = t20 * t95;
-    const real t97 = t92 + t96;
-    const real t98 = t83 + t97;
-    e_I[5] += t98;
-    return 0;
+  real t11 = tau[0] - (H[0] * e[0] + H[1] * e[1] + H[2] * e[2] + H[3] * e[3] + H[4] * e[4] + H[5] *
+    e[5]);
+  y[0] = t11;
+  real t13 = e[0] + G[0] * t11;
+  real t16 = e[1] + G[1] * t11;
+  real t20 = e[2] + G[2] * t11;
+  e_I[0] += Rc[0] * t13 + Rc[1] * t16 + Rc[2] * t20;
+  e_I[1] += Rc[3] * t13 + Rc[4] * t16 + Rc[5] * t20;
+  e_I[2] += Rc[6] * t13 + Rc[7] * t16 + Rc[8] * t20;
+  real t34 = e[3] + G[3] * t11;
+  real t37 = e[4] + G[4] * t11;
+  real t41 = e[5] + G[5] * t11;
+  e_I[3] += Rc[0] * t34 + Rc[1] * t37 + Rc[2] * t41 + (t13 * (Rc[6] * r[1] - Rc[3] * r[2]) + t16 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t20 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t34 + Rc[4] * t37 + Rc[5] * t41 + (t13 * (Rc[0] * r[2] - Rc[6] * r[0]) + t16 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t20 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t34 + Rc[7] * t37 + Rc[8] * t41 + (t13 * (Rc[3] * r[0] - Rc[0] * r[1]) + t16 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t20 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_column_load_outputs[] = {
-    {"y", 1, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6] motion subspace of the free coordinates
@@ -2025,111 +533,34 @@ static const mstmm_port mstmm_sweep_generic1_column_load_outputs[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic1_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic1_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = r[2] * delta_I[4];
-    const real t2 = r[1] * delta_I[5];
-    const real t3 = t1 - t2;
-    const real t4 = delta_I[0] + t3;
-    const real t5 = Rc[0] * t4;
-    const real t6 = r[0] * delta_I[5];
-    const real t7 = r[2] * delta_I[3];
-    const real t8 = t6 - t7;
-    const real t9 = delta_I[1] + t8;
-    const real t10 = Rc[3] * t9;
-    const real t11 = t5 + t10;
-    const real t12 = r[1] * delta_I[3];
-    const real t13 = r[0] * delta_I[4];
-    const real t14 = t12 - t13;
-    const real t15 = delta_I[2] + t14;
-    const real t16 = Rc[6] * t15;
-    const real t17 = t11 + t16;
-    const real t18 = G[0] * t17;
-    const real t19 = Rc[1] * t4;
-    const real t20 = Rc[4] * t9;
-    const real t21 = t19 + t20;
-    const real t22 = Rc[7] * t15;
-    const real t23 = t21 + t22;
-    const real t24 = G[1] * t23;
-    const real t25 = t18 + t24;
-    const real t26 = Rc[2] * t4;
-    const real t27 = Rc[5] * t9;
-    const real t28 = t26 + t27;
-    const real t29 = Rc[8] * t15;
-    const real t30 = t28 + t29;
-    const real t31 = G[2] * t30;
-    const real t32 = t25 + t31;
-    const real t33 = Rc[0] * delta_I[3];
-    const real t34 = Rc[3] * delta_I[4];
-    const real t35 = t33 + t34;
-    const real t36 = Rc[6] * delta_I[5];
-    const real t37 = t35 + t36;
-    const real t38 = G[3] * t37;
-    const real t39 = t32 + t38;
-    const real t40 = Rc[1] * delta_I[3];
-    const real t41 = Rc[4] * delta_I[4];
-    const real t42 = t40 + t41;
-    const real t43 = Rc[7] * delta_I[5];
-    const real t44 = t42 + t43;
-    const real t45 = G[4] * t44;
-    const real t46 = t39 + t45;
-    const real t47 = Rc[2] * delta_I[3];
-    const real t48 = Rc[5] * delta_I[4];
-    const real t49 = t47 + t48;
-    const real t50 = Rc[8] * delta_I[5];
-    const real t51 = t49 + t50;
-    const real t52 = G[5] * t51;
-    const real t53 = t46 + t52;
-    const real t54 = t0 - t53;
-    udot[0] = t54;
-    const real t55 = H[0] * t54;
-    const real t56 = t17 + t55;
-    delta[0] = t56;
-    const real t57 = H[1] * t54;
-    const real t58 = t23 + t57;
-    delta[1] = t58;
-    const real t59 = H[2] * t54;
-    const real t60 = t30 + t59;
-    delta[2] = t60;
-    const real t61 = H[3] * t54;
-    const real t62 = t37 + t61;
-    delta[3] = t62;
-    const real t63 = H[4] * t54;
-    const real t64 = t44 + t63;
-    delta[4] = t64;
-    const real t65 = H[5] * t54;
-    const real t66 = t51 + t65;
-    delta[5] = t66;
-    return 0;
+  real t4 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t9 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t15 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t17 = Rc[0] * t4 + Rc[3] * t9 + Rc[6] * t15;
+  real t23 = Rc[1] * t4 + Rc[4] * t9 + Rc[7] * t15;
+  real t30 = Rc[2] * t4 + Rc[5] * t9 + Rc[8] * t15;
+  real t37 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t44 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t51 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t54 = F[0] * y[0] - (G[0] * t17 + G[1] * t23 + G[2] * t30 + G[3] * t37 + G[4] * t44 + G[5] *
+    t51);
+  udot[0] = t54;
+  delta[0] = t17 + H[0] * t54;
+  delta[1] = t23 + H[1] * t54;
+  delta[2] = t30 + H[2] * t54;
+  delta[3] = t37 + H[3] * t54;
+  delta[4] = t44 + H[4] * t54;
+  delta[5] = t51 + H[5] * t54;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"F", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"y", 1, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_column_acceleration_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6] motion subspace of the free coordinates
@@ -2145,557 +576,206 @@ static const mstmm_port mstmm_sweep_generic1_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic1_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic1_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    const real t0 = H[2] * H[2];
-    const real t1 = H[0] * H[0];
-    const real t2 = H[1] * H[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 0.0 < floor_[0];
-    const real t6 = U[11] * U[11];
-    const real t7 = U[7] * U[7];
-    const real t8 = U[6] * U[6];
-    const real t9 = U[2] * U[2];
-    const real t10 = U[0] * U[0];
-    const real t11 = U[1] * U[1];
-    const real t12 = t10 + t11;
-    const real t13 = t9 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = t7 + t14;
-    const real t16 = t6 + t15;
-    const real t17 = ((real)1 / (real)300000000000000) * t16;
-    const real t18 = t5 != 0 ? floor_[0] : t17;
-    const real t19 = t4 * t18;
-    const real t20 = H[5] * H[5];
-    const real t21 = H[3] * H[3];
-    const real t22 = H[4] * H[4];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    const real t25 = 0.0 < floor_[1];
-    const real t26 = U[20] * U[20];
-    const real t27 = U[19] * U[19];
-    const real t28 = U[18] * U[18];
-    const real t29 = U[17] * U[17];
-    const real t30 = U[16] * U[16];
-    const real t31 = U[15] * U[15];
-    const real t32 = U[14] * U[14];
-    const real t33 = U[13] * U[13];
-    const real t34 = U[12] * U[12];
-    const real t35 = U[10] * U[10];
-    const real t36 = U[9] * U[9];
-    const real t37 = U[8] * U[8];
-    const real t38 = U[5] * U[5];
-    const real t39 = U[3] * U[3];
-    const real t40 = U[4] * U[4];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = t36 + t43;
-    const real t45 = t35 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = t33 + t46;
-    const real t48 = t32 + t47;
-    const real t49 = t31 + t48;
-    const real t50 = t30 + t49;
-    const real t51 = t29 + t50;
-    const real t52 = t28 + t51;
-    const real t53 = t27 + t52;
-    const real t54 = t26 + t53;
-    const real t55 = ((real)1 / (real)300000000000000) * t54;
-    const real t56 = t25 != 0 ? floor_[1] : t55;
-    const real t57 = t24 * t56;
-    const real t58 = t19 + t57;
-    const real t59 = H[5] * U[20];
-    const real t60 = t59 * t59;
-    const real t61 = H[4] * U[18];
-    const real t62 = H[5] * U[19];
-    const real t63 = t61 + t62;
-    const real t64 = t63 * t63;
-    const real t65 = H[3] * U[15];
-    const real t66 = H[4] * U[16];
-    const real t67 = t65 + t66;
-    const real t68 = H[5] * U[17];
-    const real t69 = t67 + t68;
-    const real t70 = t69 * t69;
-    const real t71 = H[2] * U[11];
-    const real t72 = H[3] * U[12];
-    const real t73 = t71 + t72;
-    const real t74 = H[4] * U[13];
-    const real t75 = t73 + t74;
-    const real t76 = H[5] * U[14];
-    const real t77 = t75 + t76;
-    const real t78 = t77 * t77;
-    const real t79 = H[1] * U[6];
-    const real t80 = H[2] * U[7];
-    const real t81 = t79 + t80;
-    const real t82 = H[3] * U[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[4] * U[9];
-    const real t85 = t83 + t84;
-    const real t86 = H[5] * U[10];
-    const real t87 = t85 + t86;
-    const real t88 = t87 * t87;
-    const real t89 = H[0] * U[0];
-    const real t90 = H[1] * U[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[2] * U[2];
-    const real t93 = t91 + t92;
-    const real t94 = H[3] * U[3];
-    const real t95 = t93 + t94;
-    const real t96 = H[4] * U[4];
-    const real t97 = t95 + t96;
-    const real t98 = H[5] * U[5];
-    const real t99 = t97 + t98;
-    const real t100 = t99 * t99;
-    const real t101 = J[0] + t100;
-    const real t102 = t88 + t101;
-    const real t103 = t78 + t102;
-    const real t104 = t70 + t103;
-    const real t105 = t64 + t104;
-    const real t106 = t60 + t105;
-    const real t107 = t58 < t106;
-    if (!(t107 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t108 = 1e-26 * t106;
-    const real t109 = sqrt(J[0]);
-    const real t110 = t109 * t109;
-    const real t111 = t60 + t110;
-    const real t112 = sqrt(t111);
-    const real t113 = t112 * t112;
-    const real t114 = t64 + t113;
-    const real t115 = sqrt(t114);
-    const real t116 = t115 * t115;
-    const real t117 = t70 + t116;
-    const real t118 = sqrt(t117);
-    const real t119 = t118 * t118;
-    const real t120 = t78 + t119;
-    const real t121 = sqrt(t120);
-    const real t122 = t121 * t121;
-    const real t123 = t88 + t122;
-    const real t124 = sqrt(t123);
-    const real t125 = t124 * t124;
-    const real t126 = t100 + t125;
-    const real t127 = sqrt(t126);
-    const real t128 = t127 * t127;
-    const real t129 = t108 < t128;
-    if (!(t129 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t130 = 0.0 < t127;
-    const real t131 = t130 != 0 ? t127 : 1.0;
-    const real t132 = 1.0 / t131;
-    const real t133 = t99 * t132;
-    const real t134 = t130 != 0 ? t133 : 1.0;
-    const real t135 = U[0] * t134;
-    const real t136 = 1.0 / t127;
-    const real t137 = t135 * t136;
-    G[0] = t137;
-    const real t138 = U[1] * t134;
-    const real t139 = 0.0 < t124;
-    const real t140 = t139 != 0 ? t124 : 1.0;
-    const real t141 = 1.0 / t140;
-    const real t142 = t87 * t141;
-    const real t143 = t139 != 0 ? t142 : 1.0;
-    const real t144 = U[6] * t143;
-    const real t145 = t124 * t132;
-    const real t146 = t144 * t145;
-    const real t147 = t138 + t146;
-    const real t148 = t147 * t136;
-    G[1] = t148;
-    const real t149 = U[2] * t134;
-    const real t150 = U[7] * t143;
-    const real t151 = 0.0 < t121;
-    const real t152 = t151 != 0 ? t121 : 1.0;
-    const real t153 = 1.0 / t152;
-    const real t154 = t77 * t153;
-    const real t155 = t151 != 0 ? t154 : 1.0;
-    const real t156 = U[11] * t155;
-    const real t157 = t121 * t141;
-    const real t158 = t156 * t157;
-    const real t159 = t150 + t158;
-    const real t160 = t159 * t145;
-    const real t161 = t149 + t160;
-    const real t162 = t161 * t136;
-    G[2] = t162;
-    const real t163 = U[3] * t134;
-    const real t164 = U[8] * t143;
-    const real t165 = U[12] * t155;
-    const real t166 = 0.0 < t118;
-    const real t167 = t166 != 0 ? t118 : 1.0;
-    const real t168 = 1.0 / t167;
-    const real t169 = t69 * t168;
-    const real t170 = t166 != 0 ? t169 : 1.0;
-    const real t171 = U[15] * t170;
-    const real t172 = t118 * t153;
-    const real t173 = t171 * t172;
-    const real t174 = t165 + t173;
-    const real t175 = t174 * t157;
-    const real t176 = t164 + t175;
-    const real t177 = t176 * t145;
-    const real t178 = t163 + t177;
-    const real t179 = t178 * t136;
-    G[3] = t179;
-    const real t180 = U[4] * t134;
-    const real t181 = U[9] * t143;
-    const real t182 = U[13] * t155;
-    const real t183 = U[16] * t170;
-    const real t184 = 0.0 < t115;
-    const real t185 = t184 != 0 ? t115 : 1.0;
-    const real t186 = 1.0 / t185;
-    const real t187 = t63 * t186;
-    const real t188 = t184 != 0 ? t187 : 1.0;
-    const real t189 = U[18] * t188;
-    const real t190 = t115 * t168;
-    const real t191 = t189 * t190;
-    const real t192 = t183 + t191;
-    const real t193 = t192 * t172;
-    const real t194 = t182 + t193;
-    const real t195 = t194 * t157;
-    const real t196 = t181 + t195;
-    const real t197 = t196 * t145;
-    const real t198 = t180 + t197;
-    const real t199 = t198 * t136;
-    G[4] = t199;
-    const real t200 = U[5] * t134;
-    const real t201 = U[10] * t143;
-    const real t202 = U[14] * t155;
-    const real t203 = U[17] * t170;
-    const real t204 = U[19] * t188;
-    const real t205 = 0.0 < t112;
-    const real t206 = t205 != 0 ? t112 : 1.0;
-    const real t207 = 1.0 / t206;
-    const real t208 = t59 * t207;
-    const real t209 = t205 != 0 ? t208 : 1.0;
-    const real t210 = U[20] * t209;
-    const real t211 = t112 * t186;
-    const real t212 = t210 * t211;
-    const real t213 = t204 + t212;
-    const real t214 = t213 * t190;
-    const real t215 = t203 + t214;
-    const real t216 = t215 * t172;
-    const real t217 = t202 + t216;
-    const real t218 = t217 * t157;
-    const real t219 = t201 + t218;
-    const real t220 = t219 * t145;
-    const real t221 = t200 + t220;
-    const real t222 = t221 * t136;
-    G[5] = t222;
-    const real t223 = t10 * 1e-26;
-    const real t224 = t223 < t10;
-    const real t225 = t224 != 0 ? 0.0 : e[0];
-    const real t226 = H[0] * t225;
-    const real t227 = t8 + t11;
-    const real t228 = 1e-26 * t227;
-    const real t229 = t228 < t8;
-    const real t230 = 1.0 / U[0];
-    const real t231 = e[0] * t230;
-    const real t232 = t224 != 0 ? t231 : 0.0;
-    const real t233 = U[1] * t232;
-    const real t234 = e[1] - t233;
-    const real t235 = t229 != 0 ? 0.0 : t234;
-    const real t236 = H[1] * t235;
-    const real t237 = t226 + t236;
-    const real t238 = t9 + t7;
-    const real t239 = t6 + t238;
-    const real t240 = 1e-26 * t239;
-    const real t241 = t240 < t6;
-    const real t242 = U[2] * t232;
-    const real t243 = 1.0 / U[6];
-    const real t244 = t234 * t243;
-    const real t245 = t229 != 0 ? t244 : 0.0;
-    const real t246 = U[7] * t245;
-    const real t247 = t242 + t246;
-    const real t248 = e[2] - t247;
-    const real t249 = t241 != 0 ? 0.0 : t248;
-    const real t250 = H[2] * t249;
-    const real t251 = t237 + t250;
-    const real t252 = t39 + t37;
-    const real t253 = t34 + t252;
-    const real t254 = t31 + t253;
-    const real t255 = 1e-26 * t254;
-    const real t256 = t255 < t31;
-    const real t257 = 1.0 / U[11];
-    const real t258 = t248 * t257;
-    const real t259 = t241 != 0 ? t258 : 0.0;
-    const real t260 = U[12] * t259;
-    const real t261 = U[3] * t232;
-    const real t262 = U[8] * t245;
-    const real t263 = t261 + t262;
-    const real t264 = t260 + t263;
-    const real t265 = e[3] - t264;
-    const real t266 = t256 != 0 ? 0.0 : t265;
-    const real t267 = H[3] * t266;
-    const real t268 = t251 + t267;
-    const real t269 = t40 + t36;
-    const real t270 = t33 + t269;
-    const real t271 = t30 + t270;
-    const real t272 = t28 + t271;
-    const real t273 = 1e-26 * t272;
-    const real t274 = t273 < t28;
-    const real t275 = 1.0 / U[15];
-    const real t276 = t265 * t275;
-    const real t277 = t256 != 0 ? t276 : 0.0;
-    const real t278 = U[16] * t277;
-    const real t279 = U[13] * t259;
-    const real t280 = U[4] * t232;
-    const real t281 = U[9] * t245;
-    const real t282 = t280 + t281;
-    const real t283 = t279 + t282;
-    const real t284 = t278 + t283;
-    const real t285 = e[4] - t284;
-    const real t286 = t274 != 0 ? 0.0 : t285;
-    const real t287 = H[4] * t286;
-    const real t288 = t268 + t287;
-    const real t289 = t38 + t35;
-    const real t290 = t32 + t289;
-    const real t291 = t29 + t290;
-    const real t292 = t27 + t291;
-    const real t293 = t26 + t292;
-    const real t294 = 1e-26 * t293;
-    const real t295 = t294 < t26;
-    const real t296 = 1.0 / U[18];
-    const real t297 = t285 * t296;
-    const real t298 = t274 != 0 ? t297 : 0.0;
-    const real t299 = U[19] * t298;
-    const real t300 = U[17] * t277;
-    const real t301 = U[14] * t259;
-    const real t302 = U[5] * t232;
-    const real t303 = U[10] * t245;
-    const real t304 = t302 + t303;
-    const real t305 = t301 + t304;
-    const real t306 = t300 + t305;
-    const real t307 = t299 + t306;
-    const real t308 = e[5] - t307;
-    const real t309 = t295 != 0 ? 0.0 : t308;
-    const real t310 = H[5] * t309;
-    const real t311 = t288 + t310;
-    const real t312 = tau[0] - t311;
-    const real t313 = t312 * t136;
-    const real t314 = d[0] + t232;
-    const real t315 = t314 * t134;
-    const real t316 = d[1] + t245;
-    const real t317 = t316 * t143;
-    const real t318 = d[2] + t259;
-    const real t319 = t318 * t155;
-    const real t320 = d[3] + t277;
-    const real t321 = t320 * t170;
-    const real t322 = d[4] + t298;
-    const real t323 = t322 * t188;
-    const real t324 = 1.0 / U[20];
-    const real t325 = t308 * t324;
-    const real t326 = t295 != 0 ? t325 : 0.0;
-    const real t327 = d[5] + t326;
-    const real t328 = t327 * t209;
-    const real t329 = t328 * t211;
-    const real t330 = t323 + t329;
-    const real t331 = t330 * t190;
-    const real t332 = t321 + t331;
-    const real t333 = t332 * t172;
-    const real t334 = t319 + t333;
-    const real t335 = t334 * t157;
-    const real t336 = t317 + t335;
-    const real t337 = t336 * t145;
-    const real t338 = t315 + t337;
-    const real t339 = t313 - t338;
-    const real t340 = t136 * t339;
-    g[0] = t340;
-    const real t341 = U[0] * t145;
-    const real t342 = -t341;
-    const real t343 = t342 < 0.0;
-    const real t344 = t343 != 0 ? (-1.0) : 1.0;
-    const real t345 = t341 * t344;
-    const real t346 = -t345;
-    V[0] = t346;
-    const real t347 = t144 * t134;
-    const real t348 = U[1] * t145;
-    const real t349 = t347 - t348;
-    const real t350 = t349 * t344;
-    V[1] = t350;
-    const real t351 = t159 * t134;
-    const real t352 = U[2] * t145;
-    const real t353 = t351 - t352;
-    const real t354 = t353 * t344;
-    V[2] = t354;
-    const real t355 = t176 * t134;
-    const real t356 = U[3] * t145;
-    const real t357 = t355 - t356;
-    const real t358 = t357 * t344;
-    V[3] = t358;
-    const real t359 = t196 * t134;
-    const real t360 = U[4] * t145;
-    const real t361 = t359 - t360;
-    const real t362 = t361 * t344;
-    V[4] = t362;
-    const real t363 = t219 * t134;
-    const real t364 = U[5] * t145;
-    const real t365 = t363 - t364;
-    const real t366 = t365 * t344;
-    V[5] = t366;
-    const real t367 = U[6] * t157;
-    const real t368 = -t367;
-    const real t369 = t368 < 0.0;
-    const real t370 = t369 != 0 ? (-1.0) : 1.0;
-    const real t371 = t367 * t370;
-    const real t372 = -t371;
-    V[6] = t372;
-    const real t373 = t156 * t143;
-    const real t374 = U[7] * t157;
-    const real t375 = t373 - t374;
-    const real t376 = t375 * t370;
-    V[7] = t376;
-    const real t377 = t174 * t143;
-    const real t378 = U[8] * t157;
-    const real t379 = t377 - t378;
-    const real t380 = t379 * t370;
-    V[8] = t380;
-    const real t381 = t194 * t143;
-    const real t382 = U[9] * t157;
-    const real t383 = t381 - t382;
-    const real t384 = t383 * t370;
-    V[9] = t384;
-    const real t385 = t217 * t143;
-    const real t386 = U[10] * t157;
-    const real t387 = t385 - t386;
-    const real t388 = t387 * t370;
-    V[10] = t388;
-    const real t389 = U[11] * t172;
-    const real t390 = -t389;
-    const real t391 = t390 < 0.0;
-    const real t392 = t391 != 0 ? (-1.0) : 1.0;
-    const real t393 = t389 * t392;
-    const real t394 = -t393;
-    V[11] = t394;
-    const real t395 = t171 * t155;
-    const real t396 = U[12] * t172;
-    const real t397 = t395 - t396;
-    const real t398 = t397 * t392;
-    V[12] = t398;
-    const real t399 = t192 * t155;
-    const real t400 = U[13] * t172;
-    const real t401 = t399 - t400;
-    const real t402 = t401 * t392;
-    V[13] = t402;
-    const real t403 = t215 * t155;
-    const real t404 = U[14] * t172;
-    const real t405 = t403 - t404;
-    const real t406 = t405 * t392;
-    V[14] = t406;
-    const real t407 = U[15] * t190;
-    const real t408 = -t407;
-    const real t409 = t408 < 0.0;
-    const real t410 = t409 != 0 ? (-1.0) : 1.0;
-    const real t411 = t407 * t410;
-    const real t412 = -t411;
-    V[15] = t412;
-    const real t413 = t189 * t170;
-    const real t414 = U[16] * t190;
-    const real t415 = t413 - t414;
-    const real t416 = t415 * t410;
-    V[16] = t416;
-    const real t417 = t213 * t170;
-    const real t418 = U[17] * t190;
-    const real t419 = t417 - t418;
-    const real t420 = t419 * t410;
-    V[17] = t420;
-    const real t421 = U[18] * t211;
-    const real t422 = -t421;
-    const real t423 = t422 < 0.0;
-    const real t424 = t423 != 0 ? (-1.0) : 1.0;
-    const real t425 = t421 * t424;
-    const real t426 = -t425;
-    V[18] = t426;
-    const real t427 = t210 * t188;
-    const real t428 = U[19] * t211;
-    const real t429 = t427 - t428;
-    const real t430 = t429 * t424;
-    V[19] = t430;
-    const real t431 = t109 * t207;
-    const real t432 = U[20] * t431;
-    const real t433 = -t432;
-    const real t434 = t433 < 0.0;
-    const real t435 = t434 != 0 ? (-1.0) : 1.0;
-    const real t436 = t432 * t435;
-    const real t437 = -t436;
-    V[20] = t437;
-    const real t438 = t336 * t134;
-    const real t439 = t314 * t145;
-    const real t440 = t438 - t439;
-    const real t441 = t440 * t344;
-    d_V[0] = t441;
-    const real t442 = t334 * t143;
-    const real t443 = t316 * t157;
-    const real t444 = t442 - t443;
-    const real t445 = t444 * t370;
-    d_V[1] = t445;
-    const real t446 = t332 * t155;
-    const real t447 = t318 * t172;
-    const real t448 = t446 - t447;
-    const real t449 = t448 * t392;
-    d_V[2] = t449;
-    const real t450 = t330 * t170;
-    const real t451 = t320 * t190;
-    const real t452 = t450 - t451;
-    const real t453 = t452 * t410;
-    d_V[3] = t453;
-    const real t454 = t328 * t188;
-    const real t455 = t322 * t211;
-    const real t456 = t454 - t455;
-    const real t457 = t456 * t424;
-    d_V[4] = t457;
-    const real t458 = t327 * t431;
-    const real t459 = t458 * t435;
-    const real t460 = -t459;
-    d_V[5] = t460;
-    const real t461 = t312 * t137;
-    const real t462 = t225 + t461;
-    e_Q[0] = t462;
-    const real t463 = t312 * t148;
-    const real t464 = t235 + t463;
-    e_Q[1] = t464;
-    const real t465 = t312 * t162;
-    const real t466 = t249 + t465;
-    e_Q[2] = t466;
-    const real t467 = t312 * t179;
-    const real t468 = t266 + t467;
-    e_Q[3] = t468;
-    const real t469 = t312 * t199;
-    const real t470 = t286 + t469;
-    e_Q[4] = t470;
-    const real t471 = t312 * t222;
-    const real t472 = t309 + t471;
-    e_Q[5] = t472;
-    return 0;
+  real t6 = U[11] * U[11];
+  real t7 = U[7] * U[7];
+  real t8 = U[6] * U[6];
+  real t9 = U[2] * U[2];
+  real t10 = U[0] * U[0];
+  real t11 = U[1] * U[1];
+  real t17 = ((real)1 / (real)300000000000000) * (t6 + (t7 + (t8 + (t9 + (t10 + t11)))));
+  real t26 = U[20] * U[20];
+  real t27 = U[19] * U[19];
+  real t28 = U[18] * U[18];
+  real t29 = U[17] * U[17];
+  real t30 = U[16] * U[16];
+  real t31 = U[15] * U[15];
+  real t32 = U[14] * U[14];
+  real t33 = U[13] * U[13];
+  real t34 = U[12] * U[12];
+  real t35 = U[10] * U[10];
+  real t36 = U[9] * U[9];
+  real t37 = U[8] * U[8];
+  real t38 = U[5] * U[5];
+  real t39 = U[3] * U[3];
+  real t40 = U[4] * U[4];
+  real t55 = ((real)1 / (real)300000000000000) * (t26 + (t27 + (t28 + (t29 + (t30 + (t31 + (t32 +
+    (t33 + (t34 + (t35 + (t36 + (t37 + (t38 + (t39 + t40))))))))))))));
+  real t59 = H[5] * U[20];
+  real t60 = t59 * t59;
+  real t63 = H[4] * U[18] + H[5] * U[19];
+  real t64 = t63 * t63;
+  real t69 = H[3] * U[15] + H[4] * U[16] + H[5] * U[17];
+  real t70 = t69 * t69;
+  real t77 = H[2] * U[11] + H[3] * U[12] + H[4] * U[13] + H[5] * U[14];
+  real t78 = t77 * t77;
+  real t87 = H[1] * U[6] + H[2] * U[7] + H[3] * U[8] + H[4] * U[9] + H[5] * U[10];
+  real t88 = t87 * t87;
+  real t99 = H[0] * U[0] + H[1] * U[1] + H[2] * U[2] + H[3] * U[3] + H[4] * U[4] + H[5] * U[5];
+  real t100 = t99 * t99;
+  real t106 = t60 + (t64 + (t70 + (t78 + (t88 + (J[0] + t100)))));
+  if (!(((H[2] * H[2] + (H[0] * H[0] + H[1] * H[1])) * ((0.0 < floor_[0]) ? floor_[0] : t17) + (H[5] * H[5] + (H[3] * H[3] + H[4] * H[4])) * ((0.0 < floor_[1]) ? floor_[1] : t55) < t106))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t109 = sqrt(J[0]);
+  real t112 = sqrt(t60 + t109 * t109);
+  real t115 = sqrt(t64 + t112 * t112);
+  real t118 = sqrt(t70 + t115 * t115);
+  real t121 = sqrt(t78 + t118 * t118);
+  real t124 = sqrt(t88 + t121 * t121);
+  real t127 = sqrt(t100 + t124 * t124);
+  if (!((1e-26 * t106 < t127 * t127))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t130 = 0.0 < t127;
+  real t132 = 1.0 / (t130 != 0 ? t127 : 1.0);
+  real t133 = t99 * t132;
+  real t134 = t130 != 0 ? t133 : 1.0;
+  real t136 = 1.0 / t127;
+  real t137 = U[0] * t134 * t136;
+  G[0] = t137;
+  real t139 = 0.0 < t124;
+  real t141 = 1.0 / (t139 != 0 ? t124 : 1.0);
+  real t142 = t87 * t141;
+  real t143 = t139 != 0 ? t142 : 1.0;
+  real t144 = U[6] * t143;
+  real t145 = t124 * t132;
+  real t148 = (U[1] * t134 + t144 * t145) * t136;
+  G[1] = t148;
+  real t151 = 0.0 < t121;
+  real t153 = 1.0 / (t151 != 0 ? t121 : 1.0);
+  real t154 = t77 * t153;
+  real t155 = t151 != 0 ? t154 : 1.0;
+  real t156 = U[11] * t155;
+  real t157 = t121 * t141;
+  real t159 = U[7] * t143 + t156 * t157;
+  real t162 = (U[2] * t134 + t159 * t145) * t136;
+  G[2] = t162;
+  real t166 = 0.0 < t118;
+  real t168 = 1.0 / (t166 != 0 ? t118 : 1.0);
+  real t169 = t69 * t168;
+  real t170 = t166 != 0 ? t169 : 1.0;
+  real t171 = U[15] * t170;
+  real t172 = t118 * t153;
+  real t174 = U[12] * t155 + t171 * t172;
+  real t176 = U[8] * t143 + t174 * t157;
+  real t179 = (U[3] * t134 + t176 * t145) * t136;
+  G[3] = t179;
+  real t184 = 0.0 < t115;
+  real t186 = 1.0 / (t184 != 0 ? t115 : 1.0);
+  real t187 = t63 * t186;
+  real t188 = t184 != 0 ? t187 : 1.0;
+  real t189 = U[18] * t188;
+  real t190 = t115 * t168;
+  real t192 = U[16] * t170 + t189 * t190;
+  real t194 = U[13] * t155 + t192 * t172;
+  real t196 = U[9] * t143 + t194 * t157;
+  real t199 = (U[4] * t134 + t196 * t145) * t136;
+  G[4] = t199;
+  real t205 = 0.0 < t112;
+  real t207 = 1.0 / (t205 != 0 ? t112 : 1.0);
+  real t208 = t59 * t207;
+  real t209 = t205 != 0 ? t208 : 1.0;
+  real t210 = U[20] * t209;
+  real t211 = t112 * t186;
+  real t213 = U[19] * t188 + t210 * t211;
+  real t215 = U[17] * t170 + t213 * t190;
+  real t217 = U[14] * t155 + t215 * t172;
+  real t219 = U[10] * t143 + t217 * t157;
+  real t222 = (U[5] * t134 + t219 * t145) * t136;
+  G[5] = t222;
+  real t224 = t10 * 1e-26 < t10;
+  real t225 = t224 != 0 ? 0.0 : e[0];
+  real t229 = 1e-26 * (t8 + t11) < t8;
+  real t231 = e[0] * (1.0 / U[0]);
+  real t232 = t224 != 0 ? t231 : 0.0;
+  real t234 = e[1] - U[1] * t232;
+  real t235 = t229 != 0 ? 0.0 : t234;
+  real t241 = 1e-26 * (t6 + (t9 + t7)) < t6;
+  real t244 = t234 * (1.0 / U[6]);
+  real t245 = t229 != 0 ? t244 : 0.0;
+  real t248 = e[2] - (U[2] * t232 + U[7] * t245);
+  real t249 = t241 != 0 ? 0.0 : t248;
+  real t256 = 1e-26 * (t31 + (t34 + (t39 + t37))) < t31;
+  real t258 = t248 * (1.0 / U[11]);
+  real t259 = t241 != 0 ? t258 : 0.0;
+  real t265 = e[3] - (U[12] * t259 + (U[3] * t232 + U[8] * t245));
+  real t266 = t256 != 0 ? 0.0 : t265;
+  real t274 = 1e-26 * (t28 + (t30 + (t33 + (t40 + t36)))) < t28;
+  real t276 = t265 * (1.0 / U[15]);
+  real t277 = t256 != 0 ? t276 : 0.0;
+  real t285 = e[4] - (U[16] * t277 + (U[13] * t259 + (U[4] * t232 + U[9] * t245)));
+  real t286 = t274 != 0 ? 0.0 : t285;
+  real t295 = 1e-26 * (t26 + (t27 + (t29 + (t32 + (t38 + t35))))) < t26;
+  real t297 = t285 * (1.0 / U[18]);
+  real t298 = t274 != 0 ? t297 : 0.0;
+  real t308 = e[5] - (U[19] * t298 + (U[17] * t277 + (U[14] * t259 + (U[5] * t232 + U[10] *
+    t245))));
+  real t309 = t295 != 0 ? 0.0 : t308;
+  real t312 = tau[0] - (H[0] * t225 + H[1] * t235 + H[2] * t249 + H[3] * t266 + H[4] * t286 + H[5] *
+    t309);
+  real t314 = d[0] + t232;
+  real t316 = d[1] + t245;
+  real t318 = d[2] + t259;
+  real t320 = d[3] + t277;
+  real t322 = d[4] + t298;
+  real t325 = t308 * (1.0 / U[20]);
+  real t327 = d[5] + (t295 != 0 ? t325 : 0.0);
+  real t328 = t327 * t209;
+  real t330 = t322 * t188 + t328 * t211;
+  real t332 = t320 * t170 + t330 * t190;
+  real t334 = t318 * t155 + t332 * t172;
+  real t336 = t316 * t143 + t334 * t157;
+  g[0] = t136 * (t312 * t136 - (t314 * t134 + t336 * t145));
+  real t341 = U[0] * t145;
+  real t344 = (-t341 < 0.0) ? (-1.0) : 1.0;
+  V[0] = -(t341 * t344);
+  V[1] = (t144 * t134 - U[1] * t145) * t344;
+  V[2] = (t159 * t134 - U[2] * t145) * t344;
+  V[3] = (t176 * t134 - U[3] * t145) * t344;
+  V[4] = (t196 * t134 - U[4] * t145) * t344;
+  V[5] = (t219 * t134 - U[5] * t145) * t344;
+  real t367 = U[6] * t157;
+  real t370 = (-t367 < 0.0) ? (-1.0) : 1.0;
+  V[6] = -(t367 * t370);
+  V[7] = (t156 * t143 - U[7] * t157) * t370;
+  V[8] = (t174 * t143 - U[8] * t157) * t370;
+  V[9] = (t194 * t143 - U[9] * t157) * t370;
+  V[10] = (t217 * t143 - U[10] * t157) * t370;
+  real t389 = U[11] * t172;
+  real t392 = (-t389 < 0.0) ? (-1.0) : 1.0;
+  V[11] = -(t389 * t392);
+  V[12] = (t171 * t155 - U[12] * t172) * t392;
+  V[13] = (t192 * t155 - U[13] * t172) * t392;
+  V[14] = (t215 * t155 - U[14] * t172) * t392;
+  real t407 = U[15] * t190;
+  real t410 = (-t407 < 0.0) ? (-1.0) : 1.0;
+  V[15] = -(t407 * t410);
+  V[16] = (t189 * t170 - U[16] * t190) * t410;
+  V[17] = (t213 * t170 - U[17] * t190) * t410;
+  real t421 = U[18] * t211;
+  real t424 = (-t421 < 0.0) ? (-1.0) : 1.0;
+  V[18] = -(t421 * t424);
+  V[19] = (t210 * t188 - U[19] * t211) * t424;
+  real t431 = t109 * t207;
+  real t432 = U[20] * t431;
+  real t435 = (-t432 < 0.0) ? (-1.0) : 1.0;
+  V[20] = -(t432 * t435);
+  d_V[0] = (t336 * t134 - t314 * t145) * t344;
+  d_V[1] = (t334 * t143 - t316 * t157) * t370;
+  d_V[2] = (t332 * t155 - t318 * t172) * t392;
+  d_V[3] = (t330 * t170 - t320 * t190) * t410;
+  d_V[4] = (t328 * t188 - t322 * t211) * t424;
+  d_V[5] = -(t327 * t431 * t435);
+  e_Q[0] = t225 + t312 * t137;
+  e_Q[1] = t235 + t312 * t148;
+  e_Q[2] = t249 + t312 * t162;
+  e_Q[3] = t266 + t312 * t179;
+  e_Q[4] = t286 + t312 * t199;
+  e_Q[5] = t309 + t312 * t222;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_qr_eliminate_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_qr_eliminate_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic1_qr_eliminate_guards[] = {
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic1_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 1 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2708,91 +788,25 @@ static const mstmm_guard mstmm_sweep_generic1_qr_eliminate_guards[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic1_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic1_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = H[3] * s[0];
-    const real t7 = c[3] + t6;
-    const real t8 = t5 - t7;
-    const real t9 = motion[3] + t8;
-    Q[3] = t9;
-    const real t10 = w[2] * t0;
-    const real t11 = w[0] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = H[4] * s[0];
-    const real t14 = c[4] + t13;
-    const real t15 = t12 - t14;
-    const real t16 = motion[4] + t15;
-    Q[4] = t16;
-    const real t17 = w[0] * t1;
-    const real t18 = w[1] * t0;
-    const real t19 = t17 - t18;
-    const real t20 = H[5] * s[0];
-    const real t21 = c[5] + t20;
-    const real t22 = t19 - t21;
-    const real t23 = motion[5] + t22;
-    Q[5] = t23;
-    const real t24 = v[1] * t2;
-    const real t25 = t24 * 2.0;
-    const real t26 = v[2] * t1;
-    const real t27 = 2.0 * t26;
-    const real t28 = t25 - t27;
-    const real t29 = H[0] * s[0];
-    const real t30 = c[0] + t29;
-    const real t31 = t28 - t30;
-    const real t32 = motion[6] + t31;
-    Q[6] = t32;
-    const real t33 = v[2] * t0;
-    const real t34 = 2.0 * t33;
-    const real t35 = v[0] * t2;
-    const real t36 = 2.0 * t35;
-    const real t37 = t34 - t36;
-    const real t38 = H[1] * s[0];
-    const real t39 = c[1] + t38;
-    const real t40 = t37 - t39;
-    const real t41 = motion[7] + t40;
-    Q[7] = t41;
-    const real t42 = v[0] * t1;
-    const real t43 = 2.0 * t42;
-    const real t44 = v[1] * t0;
-    const real t45 = 2.0 * t44;
-    const real t46 = t43 - t45;
-    const real t47 = H[2] * s[0];
-    const real t48 = c[2] + t47;
-    const real t49 = t46 - t48;
-    const real t50 = motion[8] + t49;
-    Q[8] = t50;
-    return 0;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - (c[3] + H[3] * s[0]));
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - (c[4] + H[4] * s[0]));
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - (c[5] + H[5] * s[0]));
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - (c[0] + H[0] * s[0]));
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - (c[1] + H[1] * s[0]));
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - (c[2] + H[2] * s[0]));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_carrier_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 1 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2816,255 +830,50 @@ static const mstmm_port mstmm_sweep_generic1_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic1_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic1_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = H[3] * d_s[0];
-    const real t16 = s[0] * d_H[3];
-    const real t17 = t15 + t16;
-    const real t18 = d_c[3] + t17;
-    const real t19 = theta[2] * Q[4];
-    const real t20 = Q[1] * d_w[2];
-    const real t21 = Q[2] * d_w[1];
-    const real t22 = t20 - t21;
-    const real t23 = t19 + t22;
-    const real t24 = theta[1] * Q[5];
-    const real t25 = t23 - t24;
-    const real t26 = t18 + t25;
-    const real t27 = t14 + t26;
-    B[3] = t27;
-    const real t28 = w[0] * t10;
-    const real t29 = w[2] * t2;
-    const real t30 = t28 - t29;
-    const real t31 = H[4] * d_s[0];
-    const real t32 = s[0] * d_H[4];
-    const real t33 = t31 + t32;
-    const real t34 = d_c[4] + t33;
-    const real t35 = theta[0] * Q[5];
-    const real t36 = Q[2] * d_w[0];
-    const real t37 = Q[0] * d_w[2];
-    const real t38 = t36 - t37;
-    const real t39 = theta[2] * Q[3];
-    const real t40 = t38 - t39;
-    const real t41 = t35 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t30 + t42;
-    B[4] = t43;
-    const real t44 = w[1] * t2;
-    const real t45 = w[0] * t6;
-    const real t46 = t44 - t45;
-    const real t47 = H[5] * d_s[0];
-    const real t48 = s[0] * d_H[5];
-    const real t49 = t47 + t48;
-    const real t50 = d_c[5] + t49;
-    const real t51 = theta[1] * Q[3];
-    const real t52 = Q[0] * d_w[1];
-    const real t53 = Q[1] * d_w[0];
-    const real t54 = t52 - t53;
-    const real t55 = t51 + t54;
-    const real t56 = theta[0] * Q[4];
-    const real t57 = t55 - t56;
-    const real t58 = t50 + t57;
-    const real t59 = t46 + t58;
-    B[5] = t59;
-    const real t60 = v[2] * 2.0;
-    const real t61 = t6 * t60;
-    const real t62 = v[1] * 2.0;
-    const real t63 = t10 * t62;
-    const real t64 = t61 - t63;
-    const real t65 = H[0] * d_s[0];
-    const real t66 = s[0] * d_H[0];
-    const real t67 = t65 + t66;
-    const real t68 = d_c[0] + t67;
-    const real t69 = theta[2] * Q[7];
-    const real t70 = x[2] * Q[4];
-    const real t71 = Q[1] * d_v[2];
-    const real t72 = 2.0 * t71;
-    const real t73 = x[1] * Q[0];
-    const real t74 = x[0] * Q[1];
-    const real t75 = t73 - t74;
-    const real t76 = Q[1] * t75;
-    const real t77 = x[0] * Q[2];
-    const real t78 = x[2] * Q[0];
-    const real t79 = t77 - t78;
-    const real t80 = Q[2] * t79;
-    const real t81 = t76 - t80;
-    const real t82 = t72 + t81;
-    const real t83 = Q[2] * d_v[1];
-    const real t84 = 2.0 * t83;
-    const real t85 = t82 - t84;
-    const real t86 = t70 + t85;
-    const real t87 = x[1] * Q[5];
-    const real t88 = t86 - t87;
-    const real t89 = t69 + t88;
-    const real t90 = theta[1] * Q[8];
-    const real t91 = t89 - t90;
-    const real t92 = t68 + t91;
-    const real t93 = t64 + t92;
-    B[6] = t93;
-    const real t94 = v[0] * 2.0;
-    const real t95 = t10 * t94;
-    const real t96 = t2 * t60;
-    const real t97 = t95 - t96;
-    const real t98 = H[1] * d_s[0];
-    const real t99 = s[0] * d_H[1];
-    const real t100 = t98 + t99;
-    const real t101 = d_c[1] + t100;
-    const real t102 = theta[0] * Q[8];
-    const real t103 = x[0] * Q[5];
-    const real t104 = Q[2] * d_v[0];
-    const real t105 = 2.0 * t104;
-    const real t106 = x[2] * Q[1];
-    const real t107 = x[1] * Q[2];
-    const real t108 = t106 - t107;
-    const real t109 = Q[2] * t108;
-    const real t110 = Q[0] * t75;
-    const real t111 = t109 - t110;
-    const real t112 = Q[0] * d_v[2];
-    const real t113 = 2.0 * t112;
-    const real t114 = t111 - t113;
-    const real t115 = t105 + t114;
-    const real t116 = x[2] * Q[3];
-    const real t117 = t115 - t116;
-    const real t118 = t103 + t117;
-    const real t119 = theta[2] * Q[6];
-    const real t120 = t118 - t119;
-    const real t121 = t102 + t120;
-    const real t122 = t101 + t121;
-    const real t123 = t97 + t122;
-    B[7] = t123;
-    const real t124 = t2 * t62;
-    const real t125 = t6 * t94;
-    const real t126 = t124 - t125;
-    const real t127 = H[2] * d_s[0];
-    const real t128 = s[0] * d_H[2];
-    const real t129 = t127 + t128;
-    const real t130 = d_c[2] + t129;
-    const real t131 = theta[1] * Q[6];
-    const real t132 = x[1] * Q[3];
-    const real t133 = Q[0] * d_v[1];
-    const real t134 = 2.0 * t133;
-    const real t135 = Q[0] * t79;
-    const real t136 = Q[1] * t108;
-    const real t137 = t135 - t136;
-    const real t138 = t134 + t137;
-    const real t139 = Q[1] * d_v[0];
-    const real t140 = 2.0 * t139;
-    const real t141 = t138 - t140;
-    const real t142 = t132 + t141;
-    const real t143 = x[0] * Q[4];
-    const real t144 = t142 - t143;
-    const real t145 = t131 + t144;
-    const real t146 = theta[0] * Q[7];
-    const real t147 = t145 - t146;
-    const real t148 = t130 + t147;
-    const real t149 = t126 + t148;
-    B[8] = t149;
-    const real t150 = theta[1] * f[2];
-    const real t151 = theta[2] * f[1];
-    const real t152 = t150 - t151;
-    G[0] = t152;
-    const real t153 = theta[2] * f[0];
-    const real t154 = theta[0] * f[2];
-    const real t155 = t153 - t154;
-    G[1] = t155;
-    const real t156 = theta[0] * f[1];
-    const real t157 = theta[1] * f[0];
-    const real t158 = t156 - t157;
-    G[2] = t158;
-    const real t159 = theta[1] * f[5];
-    const real t160 = x[1] * f[2];
-    const real t161 = x[2] * f[1];
-    const real t162 = t160 - t161;
-    const real t163 = theta[2] * f[4];
-    const real t164 = t162 - t163;
-    const real t165 = t159 + t164;
-    G[3] = t165;
-    const real t166 = theta[2] * f[3];
-    const real t167 = x[2] * f[0];
-    const real t168 = x[0] * f[2];
-    const real t169 = t167 - t168;
-    const real t170 = t166 + t169;
-    const real t171 = theta[0] * f[5];
-    const real t172 = t170 - t171;
-    G[4] = t172;
-    const real t173 = theta[0] * f[4];
-    const real t174 = x[0] * f[1];
-    const real t175 = x[1] * f[0];
-    const real t176 = t174 - t175;
-    const real t177 = theta[1] * f[3];
-    const real t178 = t176 - t177;
-    const real t179 = t173 + t178;
-    G[5] = t179;
-    const real t180 = d_s[0] * J[0];
-    const real t181 = f[0] * d_H[0];
-    const real t182 = f[1] * d_H[1];
-    const real t183 = t181 + t182;
-    const real t184 = f[2] * d_H[2];
-    const real t185 = t183 + t184;
-    const real t186 = f[3] * d_H[3];
-    const real t187 = t185 + t186;
-    const real t188 = f[4] * d_H[4];
-    const real t189 = t187 + t188;
-    const real t190 = f[5] * d_H[5];
-    const real t191 = t189 + t190;
-    const real t192 = t191 - laws[0];
-    const real t193 = t180 + t192;
-    row[0] = t193;
-    return 0;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (H[3] * d_s[0] + s[0] * d_H[3]) + (theta[2] * Q[4] +
+    (Q[1] * d_w[2] - Q[2] * d_w[1]) - theta[1] * Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (H[4] * d_s[0] + s[0] * d_H[4]) + (theta[0] * Q[5] +
+    (Q[2] * d_w[0] - Q[0] * d_w[2] - theta[2] * Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (H[5] * d_s[0] + s[0] * d_H[5]) + (theta[1] * Q[3] +
+    (Q[0] * d_w[1] - Q[1] * d_w[0]) - theta[0] * Q[4]));
+  real t60 = v[2] * 2.0;
+  real t62 = v[1] * 2.0;
+  real t75 = x[1] * Q[0] - x[0] * Q[1];
+  real t79 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t60 - t10 * t62 + (d_c[0] + (H[0] * d_s[0] + s[0] * d_H[0]) + (theta[2] * Q[7] + (x[2]
+    * Q[4] + (2.0 * (Q[1] * d_v[2]) + (Q[1] * t75 - Q[2] * t79) - 2.0 * (Q[2] * d_v[1])) - x[1] *
+    Q[5]) - theta[1] * Q[8]));
+  real t94 = v[0] * 2.0;
+  real t108 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t94 - t2 * t60 + (d_c[1] + (H[1] * d_s[0] + s[0] * d_H[1]) + (theta[0] * Q[8] + (x[0]
+    * Q[5] + (2.0 * (Q[2] * d_v[0]) + (Q[2] * t108 - Q[0] * t75 - 2.0 * (Q[0] * d_v[2])) - x[2] *
+    Q[3]) - theta[2] * Q[6])));
+  B[8] = t2 * t62 - t6 * t94 + (d_c[2] + (H[2] * d_s[0] + s[0] * d_H[2]) + (theta[1] * Q[6] + (x[1]
+    * Q[3] + (2.0 * (Q[0] * d_v[1]) + (Q[0] * t79 - Q[1] * t108) - 2.0 * (Q[1] * d_v[0])) - x[0] *
+    Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] + (f[0] * d_H[0] + f[1] * d_H[1] + f[2] * d_H[2] + f[3] * d_H[3] + f[4] *
+    d_H[4] + f[5] * d_H[5] - laws[0]);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 6, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 1, "", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"laws", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* rotation and displacement along coordinates of a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3074,39 +883,18 @@ static const mstmm_port mstmm_sweep_generic1_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic1_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x)
+int mstmm_sweep_generic1_tangent_coordinate_change(in_t H, in_t d_q, out_t theta, out_t x)
 {
-    const real t0 = H[3] * d_q[0];
-    theta[0] = t0;
-    const real t1 = H[4] * d_q[0];
-    theta[1] = t1;
-    const real t2 = H[5] * d_q[0];
-    theta[2] = t2;
-    const real t3 = H[0] * d_q[0];
-    x[0] = t3;
-    const real t4 = H[1] * d_q[0];
-    x[1] = t4;
-    const real t5 = H[2] * d_q[0];
-    x[2] = t5;
-    return 0;
+  theta[0] = H[3] * d_q[0];
+  theta[1] = H[4] * d_q[0];
+  theta[2] = H[5] * d_q[0];
+  x[0] = H[0] * d_q[0];
+  x[1] = H[1] * d_q[0];
+  x[2] = H[2] * d_q[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_coordinate_change_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"d_q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_coordinate_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_coordinate_change, (in[0], in[1], out[0], out[1]))
 
 /* a direction of a hinge with 1 free speed, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3126,250 +914,54 @@ static const mstmm_port mstmm_sweep_generic1_tangent_coordinate_change_outputs[]
  * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic1_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row)
+int mstmm_sweep_generic1_tangent_steady(in_t theta, in_t x, in_t H, in_t v, in_t w, in_t Q, in_t f,
+    in_t d_u, in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[3] * d_u[0];
-    const real t1 = theta[2] * Q[1];
-    const real t2 = theta[1] * Q[2];
-    const real t3 = t1 - t2;
-    const real t4 = t0 + t3;
-    B[0] = t4;
-    const real t5 = H[4] * d_u[0];
-    const real t6 = theta[0] * Q[2];
-    const real t7 = theta[2] * Q[0];
-    const real t8 = t6 - t7;
-    const real t9 = t5 + t8;
-    B[1] = t9;
-    const real t10 = H[5] * d_u[0];
-    const real t11 = theta[1] * Q[0];
-    const real t12 = theta[0] * Q[1];
-    const real t13 = t11 - t12;
-    const real t14 = t10 + t13;
-    B[2] = t14;
-    const real t15 = w[2] * t8;
-    const real t16 = w[1] * t13;
-    const real t17 = t15 - t16;
-    const real t18 = H[3] * d_s[0];
-    const real t19 = theta[2] * Q[4];
-    const real t20 = Q[1] * t10;
-    const real t21 = Q[2] * t5;
-    const real t22 = t20 - t21;
-    const real t23 = t19 + t22;
-    const real t24 = theta[1] * Q[5];
-    const real t25 = t23 - t24;
-    const real t26 = t18 + t25;
-    const real t27 = t17 + t26;
-    B[3] = t27;
-    const real t28 = w[0] * t13;
-    const real t29 = w[2] * t3;
-    const real t30 = t28 - t29;
-    const real t31 = H[4] * d_s[0];
-    const real t32 = theta[0] * Q[5];
-    const real t33 = Q[2] * t0;
-    const real t34 = Q[0] * t10;
-    const real t35 = t33 - t34;
-    const real t36 = theta[2] * Q[3];
-    const real t37 = t35 - t36;
-    const real t38 = t32 + t37;
-    const real t39 = t31 + t38;
-    const real t40 = t30 + t39;
-    B[4] = t40;
-    const real t41 = w[1] * t3;
-    const real t42 = w[0] * t8;
-    const real t43 = t41 - t42;
-    const real t44 = H[5] * d_s[0];
-    const real t45 = theta[1] * Q[3];
-    const real t46 = Q[0] * t5;
-    const real t47 = Q[1] * t0;
-    const real t48 = t46 - t47;
-    const real t49 = t45 + t48;
-    const real t50 = theta[0] * Q[4];
-    const real t51 = t49 - t50;
-    const real t52 = t44 + t51;
-    const real t53 = t43 + t52;
-    B[5] = t53;
-    const real t54 = v[2] * 2.0;
-    const real t55 = t8 * t54;
-    const real t56 = v[1] * 2.0;
-    const real t57 = t13 * t56;
-    const real t58 = t55 - t57;
-    const real t59 = H[0] * d_s[0];
-    const real t60 = v[2] * t5;
-    const real t61 = H[2] * d_u[0];
-    const real t62 = w[1] * t61;
-    const real t63 = H[1] * d_u[0];
-    const real t64 = w[2] * t63;
-    const real t65 = t62 - t64;
-    const real t66 = t60 + t65;
-    const real t67 = v[1] * t10;
-    const real t68 = t66 - t67;
-    const real t69 = t59 + t68;
-    const real t70 = theta[2] * Q[7];
-    const real t71 = x[2] * Q[4];
-    const real t72 = Q[1] * t61;
-    const real t73 = 2.0 * t72;
-    const real t74 = x[1] * Q[0];
-    const real t75 = x[0] * Q[1];
-    const real t76 = t74 - t75;
-    const real t77 = Q[1] * t76;
-    const real t78 = x[0] * Q[2];
-    const real t79 = x[2] * Q[0];
-    const real t80 = t78 - t79;
-    const real t81 = Q[2] * t80;
-    const real t82 = t77 - t81;
-    const real t83 = t73 + t82;
-    const real t84 = Q[2] * t63;
-    const real t85 = 2.0 * t84;
-    const real t86 = t83 - t85;
-    const real t87 = t71 + t86;
-    const real t88 = x[1] * Q[5];
-    const real t89 = t87 - t88;
-    const real t90 = t70 + t89;
-    const real t91 = theta[1] * Q[8];
-    const real t92 = t90 - t91;
-    const real t93 = t69 + t92;
-    const real t94 = t58 + t93;
-    B[6] = t94;
-    const real t95 = v[0] * 2.0;
-    const real t96 = t13 * t95;
-    const real t97 = t3 * t54;
-    const real t98 = t96 - t97;
-    const real t99 = H[1] * d_s[0];
-    const real t100 = v[0] * t10;
-    const real t101 = H[0] * d_u[0];
-    const real t102 = w[2] * t101;
-    const real t103 = w[0] * t61;
-    const real t104 = t102 - t103;
-    const real t105 = v[2] * t0;
-    const real t106 = t104 - t105;
-    const real t107 = t100 + t106;
-    const real t108 = t99 + t107;
-    const real t109 = theta[0] * Q[8];
-    const real t110 = x[0] * Q[5];
-    const real t111 = Q[2] * t101;
-    const real t112 = 2.0 * t111;
-    const real t113 = x[2] * Q[1];
-    const real t114 = x[1] * Q[2];
-    const real t115 = t113 - t114;
-    const real t116 = Q[2] * t115;
-    const real t117 = Q[0] * t76;
-    const real t118 = t116 - t117;
-    const real t119 = Q[0] * t61;
-    const real t120 = 2.0 * t119;
-    const real t121 = t118 - t120;
-    const real t122 = t112 + t121;
-    const real t123 = x[2] * Q[3];
-    const real t124 = t122 - t123;
-    const real t125 = t110 + t124;
-    const real t126 = theta[2] * Q[6];
-    const real t127 = t125 - t126;
-    const real t128 = t109 + t127;
-    const real t129 = t108 + t128;
-    const real t130 = t98 + t129;
-    B[7] = t130;
-    const real t131 = t3 * t56;
-    const real t132 = t8 * t95;
-    const real t133 = t131 - t132;
-    const real t134 = H[2] * d_s[0];
-    const real t135 = v[1] * t0;
-    const real t136 = w[0] * t63;
-    const real t137 = w[1] * t101;
-    const real t138 = t136 - t137;
-    const real t139 = t135 + t138;
-    const real t140 = v[0] * t5;
-    const real t141 = t139 - t140;
-    const real t142 = t134 + t141;
-    const real t143 = theta[1] * Q[6];
-    const real t144 = x[1] * Q[3];
-    const real t145 = Q[0] * t63;
-    const real t146 = 2.0 * t145;
-    const real t147 = Q[0] * t80;
-    const real t148 = Q[1] * t115;
-    const real t149 = t147 - t148;
-    const real t150 = t146 + t149;
-    const real t151 = Q[1] * t101;
-    const real t152 = 2.0 * t151;
-    const real t153 = t150 - t152;
-    const real t154 = t144 + t153;
-    const real t155 = x[0] * Q[4];
-    const real t156 = t154 - t155;
-    const real t157 = t143 + t156;
-    const real t158 = theta[0] * Q[7];
-    const real t159 = t157 - t158;
-    const real t160 = t142 + t159;
-    const real t161 = t133 + t160;
-    B[8] = t161;
-    const real t162 = theta[1] * f[2];
-    const real t163 = theta[2] * f[1];
-    const real t164 = t162 - t163;
-    G[0] = t164;
-    const real t165 = theta[2] * f[0];
-    const real t166 = theta[0] * f[2];
-    const real t167 = t165 - t166;
-    G[1] = t167;
-    const real t168 = theta[0] * f[1];
-    const real t169 = theta[1] * f[0];
-    const real t170 = t168 - t169;
-    G[2] = t170;
-    const real t171 = theta[1] * f[5];
-    const real t172 = x[1] * f[2];
-    const real t173 = x[2] * f[1];
-    const real t174 = t172 - t173;
-    const real t175 = theta[2] * f[4];
-    const real t176 = t174 - t175;
-    const real t177 = t171 + t176;
-    G[3] = t177;
-    const real t178 = theta[2] * f[3];
-    const real t179 = x[2] * f[0];
-    const real t180 = x[0] * f[2];
-    const real t181 = t179 - t180;
-    const real t182 = t178 + t181;
-    const real t183 = theta[0] * f[5];
-    const real t184 = t182 - t183;
-    G[4] = t184;
-    const real t185 = theta[0] * f[4];
-    const real t186 = x[0] * f[1];
-    const real t187 = x[1] * f[0];
-    const real t188 = t186 - t187;
-    const real t189 = theta[1] * f[3];
-    const real t190 = t188 - t189;
-    const real t191 = t185 + t190;
-    G[5] = t191;
-    const real t192 = d_s[0] * J[0];
-    const real t193 = t192 - laws[0];
-    row[0] = t193;
-    return 0;
+  real t0 = H[3] * d_u[0];
+  real t3 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t0 + t3;
+  real t5 = H[4] * d_u[0];
+  real t8 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t5 + t8;
+  real t10 = H[5] * d_u[0];
+  real t13 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t10 + t13;
+  B[3] = w[2] * t8 - w[1] * t13 + (H[3] * d_s[0] + (theta[2] * Q[4] + (Q[1] * t10 - Q[2] * t5) -
+    theta[1] * Q[5]));
+  B[4] = w[0] * t13 - w[2] * t3 + (H[4] * d_s[0] + (theta[0] * Q[5] + (Q[2] * t0 - Q[0] * t10 -
+    theta[2] * Q[3])));
+  B[5] = w[1] * t3 - w[0] * t8 + (H[5] * d_s[0] + (theta[1] * Q[3] + (Q[0] * t5 - Q[1] * t0) -
+    theta[0] * Q[4]));
+  real t54 = v[2] * 2.0;
+  real t56 = v[1] * 2.0;
+  real t61 = H[2] * d_u[0];
+  real t63 = H[1] * d_u[0];
+  real t76 = x[1] * Q[0] - x[0] * Q[1];
+  real t80 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t8 * t54 - t13 * t56 + (H[0] * d_s[0] + (v[2] * t5 + (w[1] * t61 - w[2] * t63) - v[1] *
+    t10) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * t61) + (Q[1] * t76 - Q[2] * t80) - 2.0 *
+    (Q[2] * t63)) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t95 = v[0] * 2.0;
+  real t101 = H[0] * d_u[0];
+  real t115 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t13 * t95 - t3 * t54 + (H[1] * d_s[0] + (v[0] * t10 + (w[2] * t101 - w[0] * t61 - v[2] *
+    t0)) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * t101) + (Q[2] * t115 - Q[0] * t76 - 2.0
+    * (Q[0] * t61)) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t3 * t56 - t8 * t95 + (H[2] * d_s[0] + (v[1] * t0 + (w[0] * t63 - w[1] * t101) - v[0] * t5)
+    + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * t63) + (Q[0] * t80 - Q[1] * t115) - 2.0 *
+    (Q[1] * t101)) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] - laws[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_steady_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_steady_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 1, "", 0, 0},
-    {"d_s", 1, "", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"laws", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_steady_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_steady, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], out[0], out[1], out[2]))
 
 /* a direction of a hinge with 1 free speed, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3387,136 +979,39 @@ static const mstmm_port mstmm_sweep_generic1_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[1] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic1_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+int mstmm_sweep_generic1_tangent_rotational(in_t theta, in_t H, in_t w, in_t Q, in_t f, in_t d_u,
+    in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[3] * d_u[0];
-    const real t1 = theta[2] * Q[1];
-    const real t2 = theta[1] * Q[2];
-    const real t3 = t1 - t2;
-    const real t4 = t0 + t3;
-    B[0] = t4;
-    const real t5 = H[4] * d_u[0];
-    const real t6 = theta[0] * Q[2];
-    const real t7 = theta[2] * Q[0];
-    const real t8 = t6 - t7;
-    const real t9 = t5 + t8;
-    B[1] = t9;
-    const real t10 = H[5] * d_u[0];
-    const real t11 = theta[1] * Q[0];
-    const real t12 = theta[0] * Q[1];
-    const real t13 = t11 - t12;
-    const real t14 = t10 + t13;
-    B[2] = t14;
-    const real t15 = w[2] * t8;
-    const real t16 = w[1] * t13;
-    const real t17 = t15 - t16;
-    const real t18 = H[3] * d_s[0];
-    const real t19 = theta[2] * Q[4];
-    const real t20 = Q[1] * t10;
-    const real t21 = Q[2] * t5;
-    const real t22 = t20 - t21;
-    const real t23 = t19 + t22;
-    const real t24 = theta[1] * Q[5];
-    const real t25 = t23 - t24;
-    const real t26 = t18 + t25;
-    const real t27 = t17 + t26;
-    B[3] = t27;
-    const real t28 = w[0] * t13;
-    const real t29 = w[2] * t3;
-    const real t30 = t28 - t29;
-    const real t31 = H[4] * d_s[0];
-    const real t32 = theta[0] * Q[5];
-    const real t33 = Q[2] * t0;
-    const real t34 = Q[0] * t10;
-    const real t35 = t33 - t34;
-    const real t36 = theta[2] * Q[3];
-    const real t37 = t35 - t36;
-    const real t38 = t32 + t37;
-    const real t39 = t31 + t38;
-    const real t40 = t30 + t39;
-    B[4] = t40;
-    const real t41 = w[1] * t3;
-    const real t42 = w[0] * t8;
-    const real t43 = t41 - t42;
-    const real t44 = H[5] * d_s[0];
-    const real t45 = theta[1] * Q[3];
-    const real t46 = Q[0] * t5;
-    const real t47 = Q[1] * t0;
-    const real t48 = t46 - t47;
-    const real t49 = t45 + t48;
-    const real t50 = theta[0] * Q[4];
-    const real t51 = t49 - t50;
-    const real t52 = t44 + t51;
-    const real t53 = t43 + t52;
-    B[5] = t53;
-    const real t54 = theta[2] * Q[7];
-    const real t55 = theta[1] * Q[8];
-    const real t56 = t54 - t55;
-    B[6] = t56;
-    const real t57 = theta[0] * Q[8];
-    const real t58 = theta[2] * Q[6];
-    const real t59 = t57 - t58;
-    B[7] = t59;
-    const real t60 = theta[1] * Q[6];
-    const real t61 = theta[0] * Q[7];
-    const real t62 = t60 - t61;
-    B[8] = t62;
-    const real t63 = theta[1] * f[2];
-    const real t64 = theta[2] * f[1];
-    const real t65 = t63 - t64;
-    G[0] = t65;
-    const real t66 = theta[2] * f[0];
-    const real t67 = theta[0] * f[2];
-    const real t68 = t66 - t67;
-    G[1] = t68;
-    const real t69 = theta[0] * f[1];
-    const real t70 = theta[1] * f[0];
-    const real t71 = t69 - t70;
-    G[2] = t71;
-    const real t72 = theta[1] * f[5];
-    const real t73 = theta[2] * f[4];
-    const real t74 = t72 - t73;
-    G[3] = t74;
-    const real t75 = theta[2] * f[3];
-    const real t76 = theta[0] * f[5];
-    const real t77 = t75 - t76;
-    G[4] = t77;
-    const real t78 = theta[0] * f[4];
-    const real t79 = theta[1] * f[3];
-    const real t80 = t78 - t79;
-    G[5] = t80;
-    const real t81 = d_s[0] * J[0];
-    const real t82 = t81 - laws[0];
-    row[0] = t82;
-    return 0;
+  real t0 = H[3] * d_u[0];
+  real t3 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t0 + t3;
+  real t5 = H[4] * d_u[0];
+  real t8 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t5 + t8;
+  real t10 = H[5] * d_u[0];
+  real t13 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t10 + t13;
+  B[3] = w[2] * t8 - w[1] * t13 + (H[3] * d_s[0] + (theta[2] * Q[4] + (Q[1] * t10 - Q[2] * t5) -
+    theta[1] * Q[5]));
+  B[4] = w[0] * t13 - w[2] * t3 + (H[4] * d_s[0] + (theta[0] * Q[5] + (Q[2] * t0 - Q[0] * t10 -
+    theta[2] * Q[3])));
+  B[5] = w[1] * t3 - w[0] * t8 + (H[5] * d_s[0] + (theta[1] * Q[3] + (Q[0] * t5 - Q[1] * t0) -
+    theta[0] * Q[4]));
+  B[6] = theta[2] * Q[7] - theta[1] * Q[8];
+  B[7] = theta[0] * Q[8] - theta[2] * Q[6];
+  B[8] = theta[1] * Q[6] - theta[0] * Q[7];
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] - theta[2] * f[4];
+  G[4] = theta[2] * f[3] - theta[0] * f[5];
+  G[5] = theta[0] * f[4] - theta[1] * f[3];
+  row[0] = d_s[0] * J[0] - laws[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_rotational_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_rotational_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 1, "", 0, 0},
-    {"d_s", 1, "", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"laws", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_rotational_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_rotational, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2]))
 
 /* rows of a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3530,95 +1025,67 @@ static const mstmm_port mstmm_sweep_generic1_tangent_rotational_outputs[] = {
  * out D[1] rows by unknowns
  * out one[1] unit matrix
  */
-int mstmm_sweep_generic1_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one)
+int mstmm_sweep_generic1_tangent_rows(in_t H, in_t B, in_t W, in_t S, out_t K, out_t right, out_t D,
+    out_t one)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = B[0] * v0;
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = B[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = B[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = B[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = B[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = B[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = B[6] * v17;
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = B[7] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = B[8] * v23;
-        const two_t v25 = v22 + v24;
-        *(two_free_t *)(K + 0 + k) = v25;
-    }
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
-        const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
-        const two_t v3 = H[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
-        const two_t v6 = H[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
-        const two_t v9 = H[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
-        const two_t v12 = H[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
-        const two_t v15 = H[5] * v14;
-        const two_t v16 = v13 + v15;
-        *(two_free_t *)(right + 0 + k) = v16;
-    }
-    const real t201 = H[0] * K[0];
-    const real t202 = H[1] * K[1];
-    const real t203 = t201 + t202;
-    const real t204 = H[2] * K[2];
-    const real t205 = t203 + t204;
-    const real t206 = H[3] * K[3];
-    const real t207 = t205 + t206;
-    const real t208 = H[4] * K[4];
-    const real t209 = t207 + t208;
-    const real t210 = H[5] * K[5];
-    const real t211 = t209 + t210;
-    const real t212 = W[0] + t211;
-    D[0] = t212;
-    one[0] = 1.0;
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = B[0] * v0;
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = B[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = B[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = B[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = B[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = B[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = B[6] * v17;
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = B[7] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = B[8] * v23;
+    const two_t v25 = v22 + v24;
+    *(two_free_t *)(K + 0 + k) = v25;
+  }
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
+    const two_t v1 = H[0] * v0;
+    const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
+    const two_t v3 = H[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
+    const two_t v6 = H[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
+    const two_t v9 = H[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
+    const two_t v12 = H[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
+    const two_t v15 = H[5] * v14;
+    const two_t v16 = v13 + v15;
+    *(two_free_t *)(right + 0 + k) = v16;
+  }
+  real t212 = W[0] + (H[0] * K[0] + H[1] * K[1] + H[2] * K[2] + H[3] * K[3] + H[4] * K[4] + H[5] *
+    K[5]);
+  D[0] = t212;
+  one[0] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_rows_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_rows_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"W", 1, "", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_rows_outputs[] = {
-    {"K", 6, "", 0, 0},
-    {"right", 9, "", 0, 0},
-    {"D", 1, "", 0, 0},
-    {"one", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_rows, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3]))
 
 /* S without the unknowns of a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3631,63 +1098,46 @@ static const mstmm_port mstmm_sweep_generic1_tangent_rows_outputs[] = {
  * out V[1][6] K + G, one row per direction
  * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
-int mstmm_sweep_generic1_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S)
+int mstmm_sweep_generic1_tangent_reduce(in_t inverse, in_t right, in_t K, in_t G, out_t gain,
+    out_t V, out_t S)
 {
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_beside(right + 0 + k);
-        const two_t v1 = inverse[0] * v0;
-        *(two_free_t *)(gain + 0 + k) = v1;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(K + 0 + k);
-        const two_t v1 = mstmm_beside(G + 0 + k);
-        const two_t v2 = v0 + v1;
-        *(two_free_t *)(V + 0 + k) = v2;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(V + 0 + k);
-        const two_t v1 = gain[0] * v0;
-        const two_t v3 = gain[1] * v0;
-        const two_t v5 = gain[2] * v0;
-        const two_t v7 = gain[3] * v0;
-        const two_t v9 = gain[4] * v0;
-        const two_t v11 = gain[5] * v0;
-        const two_t v13 = gain[6] * v0;
-        const two_t v15 = gain[7] * v0;
-        const two_t v17 = gain[8] * v0;
-        *(two_free_t *)(S + 0 + k) -= v1;
-        *(two_free_t *)(S + 6 + k) -= v3;
-        *(two_free_t *)(S + 12 + k) -= v5;
-        *(two_free_t *)(S + 18 + k) -= v7;
-        *(two_free_t *)(S + 24 + k) -= v9;
-        *(two_free_t *)(S + 30 + k) -= v11;
-        *(two_free_t *)(S + 36 + k) -= v13;
-        *(two_free_t *)(S + 42 + k) -= v15;
-        *(two_free_t *)(S + 48 + k) -= v17;
-    }
-    return 0;
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_beside(right + 0 + k);
+    const two_t v1 = inverse[0] * v0;
+    *(two_free_t *)(gain + 0 + k) = v1;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(K + 0 + k);
+    const two_t v1 = mstmm_beside(G + 0 + k);
+    const two_t v2 = v0 + v1;
+    *(two_free_t *)(V + 0 + k) = v2;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(V + 0 + k);
+    const two_t v1 = gain[0] * v0;
+    const two_t v3 = gain[1] * v0;
+    const two_t v5 = gain[2] * v0;
+    const two_t v7 = gain[3] * v0;
+    const two_t v9 = gain[4] * v0;
+    const two_t v11 = gain[5] * v0;
+    const two_t v13 = gain[6] * v0;
+    const two_t v15 = gain[7] * v0;
+    const two_t v17 = gain[8] * v0;
+    *(two_free_t *)(S + 0 + k) -= v1;
+    *(two_free_t *)(S + 6 + k) -= v3;
+    *(two_free_t *)(S + 12 + k) -= v5;
+    *(two_free_t *)(S + 18 + k) -= v7;
+    *(two_free_t *)(S + 24 + k) -= v9;
+    *(two_free_t *)(S + 30 + k) -= v11;
+    *(two_free_t *)(S + 36 + k) -= v13;
+    *(two_free_t *)(S + 42 + k) -= v15;
+    *(two_free_t *)(S + 48 + k) -= v17;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_reduce_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_reduce_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"right", 9, "", 0, 0},
-    {"K", 6, "", 0, 0},
-    {"G", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_reduce_outputs[] = {
-    {"gain", 9, "", 0, 0},
-    {"V", 6, "", 0, 0},
-    {"S", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_reduce, (in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* a right-hand side carried across a hinge with 1 free speed
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3702,141 +1152,32 @@ static const mstmm_port mstmm_sweep_generic1_tangent_reduce_outputs[] = {
  * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic1_tangent_load(in_t Rc, in_t r, in_t H, in_t V, in_t inverse, in_t e,
+    in_t e_f, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[1] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = -t12;
-    y[0] = t13;
-    const real t14 = V[0] * t12;
-    const real t15 = e[0] - t14;
-    const real t16 = Rc[0] * t15;
-    const real t17 = V[1] * t12;
-    const real t18 = e[1] - t17;
-    const real t19 = Rc[1] * t18;
-    const real t20 = t16 + t19;
-    const real t21 = V[2] * t12;
-    const real t22 = e[2] - t21;
-    const real t23 = Rc[2] * t22;
-    const real t24 = t20 + t23;
-    e_I[0] += t24;
-    const real t25 = Rc[3] * t15;
-    const real t26 = Rc[4] * t18;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[5] * t22;
-    const real t29 = t27 + t28;
-    e_I[1] += t29;
-    const real t30 = Rc[6] * t15;
-    const real t31 = Rc[7] * t18;
-    const real t32 = t30 + t31;
-    const real t33 = Rc[8] * t22;
-    const real t34 = t32 + t33;
-    e_I[2] += t34;
-    const real t35 = V[3] * t12;
-    const real t36 = e[3] - t35;
-    const real t37 = Rc[0] * t36;
-    const real t38 = V[4] * t12;
-    const real t39 = e[4] - t38;
-    const real t40 = Rc[1] * t39;
-    const real t41 = t37 + t40;
-    const real t42 = V[5] * t12;
-    const real t43 = e[5] - t42;
-    const real t44 = Rc[2] * t43;
-    const real t45 = t41 + t44;
-    const real t46 = Rc[6] * r[1];
-    const real t47 = Rc[3] * r[2];
-    const real t48 = t46 - t47;
-    const real t49 = t15 * t48;
-    const real t50 = Rc[7] * r[1];
-    const real t51 = Rc[4] * r[2];
-    const real t52 = t50 - t51;
-    const real t53 = t18 * t52;
-    const real t54 = t49 + t53;
-    const real t55 = Rc[8] * r[1];
-    const real t56 = Rc[5] * r[2];
-    const real t57 = t55 - t56;
-    const real t58 = t22 * t57;
-    const real t59 = t54 + t58;
-    const real t60 = t45 + t59;
-    e_I[3] += t60;
-    const real t61 = Rc[3] * t36;
-    const real t62 = Rc[4] * t39;
-    const real t63 = t61 + t62;
-    const real t64 = Rc[5] * t43;
-    const real t65 = t63 + t64;
-    const real t66 = Rc[0] * r[2];
-    const real t67 = Rc[6] * r[0];
-    const real t68 = t66 - t67;
-    const real t69 = t15 * t68;
-    const real t70 = Rc[1] * r[2];
-    const real t71 = Rc[7] * r[0];
-    const real t72 = t70 - t71;
-    const real t73 = t18 * t72;
-    const real t74 = t69 + t73;
-    const real t75 = Rc[2] * r[2];
-    const real t76 = Rc[8] * r[0];
-    const real t77 = t75 - t76;
-    const real t78 = t22 * t77;
-    const real t79 = t74 + t78;
-    const real t80 = t65 + t79;
-    e_I[4] += t80;
-    const real t81 = Rc[6] * t36;
-    const real t82 = Rc[7] * t39;
-    const real t83 = t81 + t82;
-    const real t84 = Rc[8] * t43;
-    const real t85 = t83 + t84;
-    const real t86 = Rc[3] * r[0];
-    const real t87 = Rc[0] * r[1];
-    const real t88 = t86 - t87;
-    const real t89 = t15 * t88;
-    const real t90 = Rc[4] * r[0];
-    const real t91 = Rc[1] * r[1];
-    const real t92 = t90 - t91;
-    const real t93 = t18 * t92;
-    const real t94 = t89 + t93;
-    const real t95 = Rc[5] * r[0];
-    const real t96 = Rc[2] * r[1];
-    const real t97 = t95 - t96;
-    const real t98 = t22 * t97;
-    const real t99 = t94 + t98;
-    const real t100 = t85 + t99;
-    e_I[5] += t100;
-    return 0;
+  real t12 = inverse[0] * (e_f[0] + (H[0] * e[0] + H[1] * e[1] + H[2] * e[2] + H[3] * e[3] + H[4] *
+    e[4] + H[5] * e[5]));
+  y[0] = -t12;
+  real t15 = e[0] - V[0] * t12;
+  real t18 = e[1] - V[1] * t12;
+  real t22 = e[2] - V[2] * t12;
+  e_I[0] += Rc[0] * t15 + Rc[1] * t18 + Rc[2] * t22;
+  e_I[1] += Rc[3] * t15 + Rc[4] * t18 + Rc[5] * t22;
+  e_I[2] += Rc[6] * t15 + Rc[7] * t18 + Rc[8] * t22;
+  real t36 = e[3] - V[3] * t12;
+  real t39 = e[4] - V[4] * t12;
+  real t43 = e[5] - V[5] * t12;
+  e_I[3] += Rc[0] * t36 + Rc[1] * t39 + Rc[2] * t43 + (t15 * (Rc[6] * r[1] - Rc[3] * r[2]) + t18 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t22 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t36 + Rc[4] * t39 + Rc[5] * t43 + (t15 * (Rc[0] * r[2] - Rc[6] * r[0]) + t18 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t22 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t36 + Rc[7] * t39 + Rc[8] * t43 + (t15 * (Rc[3] * r[0] - Rc[0] * r[1]) + t18 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t22 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"V", 6, "", 0, 0},
-    {"inverse", 1, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_load_outputs[] = {
-    {"y", 1, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_load, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* solution of a hinge with 1 free speed for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3853,208 +1194,53 @@ static const mstmm_port mstmm_sweep_generic1_tangent_load_outputs[] = {
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic1_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z)
+int mstmm_sweep_generic1_tangent_solution(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I,
+    in_t B, in_t gain, in_t y, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = gain[0] * t4;
-    const real t6 = Rc[1] * z_I[0];
-    const real t7 = Rc[4] * z_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[7] * z_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = gain[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[2] * z_I[0];
-    const real t14 = Rc[5] * z_I[1];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[8] * z_I[2];
-    const real t17 = t15 + t16;
-    const real t18 = gain[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = w[2] * t10;
-    const real t21 = w[1] * t17;
-    const real t22 = t20 - t21;
-    const real t23 = Rc[0] * z_I[3];
-    const real t24 = Rc[3] * z_I[4];
-    const real t25 = t23 + t24;
-    const real t26 = Rc[6] * z_I[5];
-    const real t27 = t25 + t26;
-    const real t28 = t22 + t27;
-    const real t29 = gain[3] * t28;
-    const real t30 = t19 + t29;
-    const real t31 = w[0] * t17;
-    const real t32 = w[2] * t4;
-    const real t33 = t31 - t32;
-    const real t34 = Rc[1] * z_I[3];
-    const real t35 = Rc[4] * z_I[4];
-    const real t36 = t34 + t35;
-    const real t37 = Rc[7] * z_I[5];
-    const real t38 = t36 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = gain[4] * t39;
-    const real t41 = t30 + t40;
-    const real t42 = w[1] * t4;
-    const real t43 = w[0] * t10;
-    const real t44 = t42 - t43;
-    const real t45 = Rc[2] * z_I[3];
-    const real t46 = Rc[5] * z_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[8] * z_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = t44 + t49;
-    const real t51 = gain[5] * t50;
-    const real t52 = t41 + t51;
-    const real t53 = v[2] * 2.0;
-    const real t54 = t10 * t53;
-    const real t55 = v[1] * 2.0;
-    const real t56 = t17 * t55;
-    const real t57 = t54 - t56;
-    const real t58 = r[2] * z_I[4];
-    const real t59 = r[1] * w_I[1];
-    const real t60 = r[2] * w_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = z_I[0] * t61;
-    const real t63 = r[0] * w_I[1];
-    const real t64 = 2.0 * t63;
-    const real t65 = r[1] * w_I[0];
-    const real t66 = t64 - t65;
-    const real t67 = z_I[1] * t66;
-    const real t68 = r[0] * w_I[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = r[2] * w_I[0];
-    const real t71 = t69 - t70;
-    const real t72 = z_I[2] * t71;
-    const real t73 = t67 + t72;
-    const real t74 = t62 - t73;
-    const real t75 = r[1] * z_I[5];
-    const real t76 = t74 - t75;
-    const real t77 = t58 + t76;
-    const real t78 = z_I[6] + t77;
-    const real t79 = Rc[0] * t78;
-    const real t80 = r[0] * z_I[5];
-    const real t81 = r[0] * w_I[0];
-    const real t82 = t60 + t81;
-    const real t83 = z_I[1] * t82;
-    const real t84 = 2.0 * t65;
-    const real t85 = t84 - t63;
-    const real t86 = z_I[0] * t85;
-    const real t87 = t83 - t86;
-    const real t88 = r[1] * w_I[2];
-    const real t89 = 2.0 * t88;
-    const real t90 = r[2] * w_I[1];
-    const real t91 = t89 - t90;
-    const real t92 = z_I[2] * t91;
-    const real t93 = t87 - t92;
-    const real t94 = t80 + t93;
-    const real t95 = r[2] * z_I[3];
-    const real t96 = t94 - t95;
-    const real t97 = z_I[7] + t96;
-    const real t98 = Rc[3] * t97;
-    const real t99 = t79 + t98;
-    const real t100 = r[1] * z_I[3];
-    const real t101 = t59 + t81;
-    const real t102 = z_I[2] * t101;
-    const real t103 = 2.0 * t70;
-    const real t104 = t103 - t68;
-    const real t105 = z_I[0] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = 2.0 * t90;
-    const real t108 = t107 - t88;
-    const real t109 = z_I[1] * t108;
-    const real t110 = t106 - t109;
-    const real t111 = r[0] * z_I[4];
-    const real t112 = t110 - t111;
-    const real t113 = t100 + t112;
-    const real t114 = z_I[8] + t113;
-    const real t115 = Rc[6] * t114;
-    const real t116 = t99 + t115;
-    const real t117 = t57 + t116;
-    const real t118 = gain[6] * t117;
-    const real t119 = t52 + t118;
-    const real t120 = v[0] * 2.0;
-    const real t121 = t17 * t120;
-    const real t122 = t4 * t53;
-    const real t123 = t121 - t122;
-    const real t124 = Rc[1] * t78;
-    const real t125 = Rc[4] * t97;
-    const real t126 = t124 + t125;
-    const real t127 = Rc[7] * t114;
-    const real t128 = t126 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = gain[7] * t129;
-    const real t131 = t119 + t130;
-    const real t132 = t4 * t55;
-    const real t133 = t10 * t120;
-    const real t134 = t132 - t133;
-    const real t135 = Rc[2] * t78;
-    const real t136 = Rc[5] * t97;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * t114;
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = gain[8] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = y[0] - t142;
-    x[0] = t143;
-    const real t144 = B[0] * t143;
-    const real t145 = t4 + t144;
-    z[0] = t145;
-    const real t146 = B[1] * t143;
-    const real t147 = t10 + t146;
-    z[1] = t147;
-    const real t148 = B[2] * t143;
-    const real t149 = t17 + t148;
-    z[2] = t149;
-    const real t150 = B[3] * t143;
-    const real t151 = t28 + t150;
-    z[3] = t151;
-    const real t152 = B[4] * t143;
-    const real t153 = t39 + t152;
-    z[4] = t153;
-    const real t154 = B[5] * t143;
-    const real t155 = t50 + t154;
-    z[5] = t155;
-    const real t156 = B[6] * t143;
-    const real t157 = t117 + t156;
-    z[6] = t157;
-    const real t158 = B[7] * t143;
-    const real t159 = t129 + t158;
-    z[7] = t159;
-    const real t160 = B[8] * t143;
-    const real t161 = t140 + t160;
-    z[8] = t161;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t10 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t17 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t28 = w[2] * t10 - w[1] * t17 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  real t39 = w[0] * t17 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  real t50 = w[1] * t4 - w[0] * t10 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t53 = v[2] * 2.0;
+  real t55 = v[1] * 2.0;
+  real t59 = r[1] * w_I[1];
+  real t60 = r[2] * w_I[2];
+  real t63 = r[0] * w_I[1];
+  real t65 = r[1] * w_I[0];
+  real t68 = r[0] * w_I[2];
+  real t70 = r[2] * w_I[0];
+  real t78 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t59 + t60) - (z_I[1] * (2.0 * t63 - t65) + z_I[2]
+    * (2.0 * t68 - t70)) - r[1] * z_I[5]));
+  real t81 = r[0] * w_I[0];
+  real t88 = r[1] * w_I[2];
+  real t90 = r[2] * w_I[1];
+  real t97 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t60 + t81) - z_I[0] * (2.0 * t65 - t63) - z_I[2] *
+    (2.0 * t88 - t90)) - r[2] * z_I[3]);
+  real t114 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t59 + t81) - z_I[0] * (2.0 * t70 - t68) - z_I[1]
+    * (2.0 * t90 - t88) - r[0] * z_I[4]));
+  real t117 = t10 * t53 - t17 * t55 + (Rc[0] * t78 + Rc[3] * t97 + Rc[6] * t114);
+  real t120 = v[0] * 2.0;
+  real t129 = t17 * t120 - t4 * t53 + (Rc[1] * t78 + Rc[4] * t97 + Rc[7] * t114);
+  real t140 = t4 * t55 - t10 * t120 + (Rc[2] * t78 + Rc[5] * t97 + Rc[8] * t114);
+  real t143 = y[0] - (gain[0] * t4 + gain[1] * t10 + gain[2] * t17 + gain[3] * t28 + gain[4] * t39 +
+    gain[5] * t50 + gain[6] * t117 + gain[7] * t129 + gain[8] * t140);
+  x[0] = t143;
+  z[0] = t4 + B[0] * t143;
+  z[1] = t10 + B[1] * t143;
+  z[2] = t17 + B[2] * t143;
+  z[3] = t28 + B[3] * t143;
+  z[4] = t39 + B[4] * t143;
+  z[5] = t50 + B[5] * t143;
+  z[6] = t117 + B[6] * t143;
+  z[7] = t129 + B[7] * t143;
+  z[8] = t140 + B[8] * t143;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_solution_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_solution_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"gain", 9, "", 0, 0},
-    {"y", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_solution_outputs[] = {
-    {"x", 1, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_solution, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1]))
 
 /* a right-hand side carried across a hinge with 1 free speed and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4070,149 +1256,32 @@ static const mstmm_port mstmm_sweep_generic1_tangent_solution_outputs[] = {
  * out y[1] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic1_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic1_tangent_load_with_increments(in_t Rc, in_t r, in_t H, in_t V, in_t inverse,
+    in_t e, in_t e_f, in_t e_b, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[1] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = -t12;
-    y[0] = t13;
-    const real t14 = V[0] * t12;
-    const real t15 = e[0] - t14;
-    const real t16 = e_b[0] + t15;
-    const real t17 = Rc[0] * t16;
-    const real t18 = V[1] * t12;
-    const real t19 = e[1] - t18;
-    const real t20 = e_b[1] + t19;
-    const real t21 = Rc[1] * t20;
-    const real t22 = t17 + t21;
-    const real t23 = V[2] * t12;
-    const real t24 = e[2] - t23;
-    const real t25 = e_b[2] + t24;
-    const real t26 = Rc[2] * t25;
-    const real t27 = t22 + t26;
-    e_I[0] += t27;
-    const real t28 = Rc[3] * t16;
-    const real t29 = Rc[4] * t20;
-    const real t30 = t28 + t29;
-    const real t31 = Rc[5] * t25;
-    const real t32 = t30 + t31;
-    e_I[1] += t32;
-    const real t33 = Rc[6] * t16;
-    const real t34 = Rc[7] * t20;
-    const real t35 = t33 + t34;
-    const real t36 = Rc[8] * t25;
-    const real t37 = t35 + t36;
-    e_I[2] += t37;
-    const real t38 = V[3] * t12;
-    const real t39 = e[3] - t38;
-    const real t40 = e_b[3] + t39;
-    const real t41 = Rc[0] * t40;
-    const real t42 = V[4] * t12;
-    const real t43 = e[4] - t42;
-    const real t44 = e_b[4] + t43;
-    const real t45 = Rc[1] * t44;
-    const real t46 = t41 + t45;
-    const real t47 = V[5] * t12;
-    const real t48 = e[5] - t47;
-    const real t49 = e_b[5] + t48;
-    const real t50 = Rc[2] * t49;
-    const real t51 = t46 + t50;
-    const real t52 = Rc[6] * r[1];
-    const real t53 = Rc[3] * r[2];
-    const real t54 = t52 - t53;
-    const real t55 = t16 * t54;
-    const real t56 = Rc[7] * r[1];
-    const real t57 = Rc[4] * r[2];
-    const real t58 = t56 - t57;
-    const real t59 = t20 * t58;
-    const real t60 = t55 + t59;
-    const real t61 = Rc[8] * r[1];
-    const real t62 = Rc[5] * r[2];
-    const real t63 = t61 - t62;
-    const real t64 = t25 * t63;
-    const real t65 = t60 + t64;
-    const real t66 = t51 + t65;
-    e_I[3] += t66;
-    const real t67 = Rc[3] * t40;
-    const real t68 = Rc[4] * t44;
-    const real t69 = t67 + t68;
-    const real t70 = Rc[5] * t49;
-    const real t71 = t69 + t70;
-    const real t72 = Rc[0] * r[2];
-    const real t73 = Rc[6] * r[0];
-    const real t74 = t72 - t73;
-    const real t75 = t16 * t74;
-    const real t76 = Rc[1] * r[2];
-    const real t77 = Rc[7] * r[0];
-    const real t78 = t76 - t77;
-    const real t79 = t20 * t78;
-    const real t80 = t75 + t79;
-    const real t81 = Rc[2] * r[2];
-    const real t82 = Rc[8] * r[0];
-    const real t83 = t81 - t82;
-    const real t84 = t25 * t83;
-    const real t85 = t80 + t84;
-    const real t86 = t71 + t85;
-    e_I[4] += t86;
-    const real t87 = Rc[6] * t40;
-    const real t88 = Rc[7] * t44;
-    const real t89 = t87 + t88;
-    const real t90 = Rc[8] * t49;
-    const real t91 = t89 + t90;
-    const real t92 = Rc[3] * r[0];
-    const real t93 = Rc[0] * r[1];
-    const real t94 = t92 - t93;
-    const real t95 = t16 * t94;
-    const real t96 = Rc[4] * r[0];
-    const real t97 = Rc[1] * r[1];
-    const real t98 = t96 - t97;
-    const real t99 = t20 * t98;
-    const real t100 = t95 + t99;
-    const real t101 = Rc[5] * r[0];
-    const real t102 = Rc[2] * r[1];
-    const real t103 = t101 - t102;
-    const real t104 = t25 * t103;
-    const real t105 = t100 + t104;
-    const real t106 = t91 + t105;
-    e_I[5] += t106;
-    return 0;
+  real t12 = inverse[0] * (e_f[0] + (H[0] * e[0] + H[1] * e[1] + H[2] * e[2] + H[3] * e[3] + H[4] *
+    e[4] + H[5] * e[5]));
+  y[0] = -t12;
+  real t16 = e_b[0] + (e[0] - V[0] * t12);
+  real t20 = e_b[1] + (e[1] - V[1] * t12);
+  real t25 = e_b[2] + (e[2] - V[2] * t12);
+  e_I[0] += Rc[0] * t16 + Rc[1] * t20 + Rc[2] * t25;
+  e_I[1] += Rc[3] * t16 + Rc[4] * t20 + Rc[5] * t25;
+  e_I[2] += Rc[6] * t16 + Rc[7] * t20 + Rc[8] * t25;
+  real t40 = e_b[3] + (e[3] - V[3] * t12);
+  real t44 = e_b[4] + (e[4] - V[4] * t12);
+  real t49 = e_b[5] + (e[5] - V[5] * t12);
+  e_I[3] += Rc[0] * t40 + Rc[1] * t44 + Rc[2] * t49 + (t16 * (Rc[6] * r[1] - Rc[3] * r[2]) + t20 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t25 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t40 + Rc[4] * t44 + Rc[5] * t49 + (t16 * (Rc[0] * r[2] - Rc[6] * r[0]) + t20 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t25 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t40 + Rc[7] * t44 + Rc[8] * t49 + (t16 * (Rc[3] * r[0] - Rc[0] * r[1]) + t20 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t25 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_load_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"V", 6, "", 0, 0},
-    {"inverse", 1, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_load_with_increments_outputs[] = {
-    {"y", 1, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_load_with_increments, (in[0], in[1], in[2], in[3], in[4],
+  in[5], in[6], in[7], out[0], out[1]))
 
 /* solution of a hinge with 1 free speed for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4230,359 +1299,131 @@ static const mstmm_port mstmm_sweep_generic1_tangent_load_with_increments_output
  * out x[1] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic1_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_generic1_tangent_solution_with_increments(in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t z_I, in_t B, in_t gain, in_t y, in_t b, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = b[0] + t4;
-    const real t6 = gain[0] * t5;
-    const real t7 = Rc[1] * z_I[0];
-    const real t8 = Rc[4] * z_I[1];
-    const real t9 = t7 + t8;
-    const real t10 = Rc[7] * z_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = b[1] + t11;
-    const real t13 = gain[1] * t12;
-    const real t14 = t6 + t13;
-    const real t15 = Rc[2] * z_I[0];
-    const real t16 = Rc[5] * z_I[1];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[8] * z_I[2];
-    const real t19 = t17 + t18;
-    const real t20 = b[2] + t19;
-    const real t21 = gain[2] * t20;
-    const real t22 = t14 + t21;
-    const real t23 = w[2] * t11;
-    const real t24 = w[1] * t19;
-    const real t25 = t23 - t24;
-    const real t26 = Rc[0] * z_I[3];
-    const real t27 = Rc[3] * z_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[6] * z_I[5];
-    const real t30 = t28 + t29;
-    const real t31 = t25 + t30;
-    const real t32 = b[3] + t31;
-    const real t33 = gain[3] * t32;
-    const real t34 = t22 + t33;
-    const real t35 = w[0] * t19;
-    const real t36 = w[2] * t4;
-    const real t37 = t35 - t36;
-    const real t38 = Rc[1] * z_I[3];
-    const real t39 = Rc[4] * z_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[7] * z_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = b[4] + t43;
-    const real t45 = gain[4] * t44;
-    const real t46 = t34 + t45;
-    const real t47 = w[1] * t4;
-    const real t48 = w[0] * t11;
-    const real t49 = t47 - t48;
-    const real t50 = Rc[2] * z_I[3];
-    const real t51 = Rc[5] * z_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rc[8] * z_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = b[5] + t55;
-    const real t57 = gain[5] * t56;
-    const real t58 = t46 + t57;
-    const real t59 = v[2] * 2.0;
-    const real t60 = t11 * t59;
-    const real t61 = v[1] * 2.0;
-    const real t62 = t19 * t61;
-    const real t63 = t60 - t62;
-    const real t64 = r[2] * z_I[4];
-    const real t65 = r[1] * w_I[1];
-    const real t66 = r[2] * w_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = z_I[0] * t67;
-    const real t69 = r[0] * w_I[1];
-    const real t70 = 2.0 * t69;
-    const real t71 = r[1] * w_I[0];
-    const real t72 = t70 - t71;
-    const real t73 = z_I[1] * t72;
-    const real t74 = r[0] * w_I[2];
-    const real t75 = 2.0 * t74;
-    const real t76 = r[2] * w_I[0];
-    const real t77 = t75 - t76;
-    const real t78 = z_I[2] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = t68 - t79;
-    const real t81 = r[1] * z_I[5];
-    const real t82 = t80 - t81;
-    const real t83 = t64 + t82;
-    const real t84 = z_I[6] + t83;
-    const real t85 = Rc[0] * t84;
-    const real t86 = r[0] * z_I[5];
-    const real t87 = r[0] * w_I[0];
-    const real t88 = t66 + t87;
-    const real t89 = z_I[1] * t88;
-    const real t90 = 2.0 * t71;
-    const real t91 = t90 - t69;
-    const real t92 = z_I[0] * t91;
-    const real t93 = t89 - t92;
-    const real t94 = r[1] * w_I[2];
-    const real t95 = 2.0 * t94;
-    const real t96 = r[2] * w_I[1];
-    const real t97 = t95 - t96;
-    const real t98 = z_I[2] * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t86 + t99;
-    const real t101 = r[2] * z_I[3];
-    const real t102 = t100 - t101;
-    const real t103 = z_I[7] + t102;
-    const real t104 = Rc[3] * t103;
-    const real t105 = t85 + t104;
-    const real t106 = r[1] * z_I[3];
-    const real t107 = t65 + t87;
-    const real t108 = z_I[2] * t107;
-    const real t109 = 2.0 * t76;
-    const real t110 = t109 - t74;
-    const real t111 = z_I[0] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = 2.0 * t96;
-    const real t114 = t113 - t94;
-    const real t115 = z_I[1] * t114;
-    const real t116 = t112 - t115;
-    const real t117 = r[0] * z_I[4];
-    const real t118 = t116 - t117;
-    const real t119 = t106 + t118;
-    const real t120 = z_I[8] + t119;
-    const real t121 = Rc[6] * t120;
-    const real t122 = t105 + t121;
-    const real t123 = t63 + t122;
-    const real t124 = b[6] + t123;
-    const real t125 = gain[6] * t124;
-    const real t126 = t58 + t125;
-    const real t127 = v[0] * 2.0;
-    const real t128 = t19 * t127;
-    const real t129 = t4 * t59;
-    const real t130 = t128 - t129;
-    const real t131 = Rc[1] * t84;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[7] * t120;
-    const real t135 = t133 + t134;
-    const real t136 = t130 + t135;
-    const real t137 = b[7] + t136;
-    const real t138 = gain[7] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = t4 * t61;
-    const real t141 = t11 * t127;
-    const real t142 = t140 - t141;
-    const real t143 = Rc[2] * t84;
-    const real t144 = Rc[5] * t103;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[8] * t120;
-    const real t147 = t145 + t146;
-    const real t148 = t142 + t147;
-    const real t149 = b[8] + t148;
-    const real t150 = gain[8] * t149;
-    const real t151 = t139 + t150;
-    const real t152 = y[0] - t151;
-    x[0] = t152;
-    const real t153 = B[0] * t152;
-    const real t154 = t5 + t153;
-    z[0] = t154;
-    const real t155 = B[1] * t152;
-    const real t156 = t12 + t155;
-    z[1] = t156;
-    const real t157 = B[2] * t152;
-    const real t158 = t20 + t157;
-    z[2] = t158;
-    const real t159 = B[3] * t152;
-    const real t160 = t32 + t159;
-    z[3] = t160;
-    const real t161 = B[4] * t152;
-    const real t162 = t44 + t161;
-    z[4] = t162;
-    const real t163 = B[5] * t152;
-    const real t164 = t56 + t163;
-    z[5] = t164;
-    const real t165 = B[6] * t152;
-    const real t166 = t124 + t165;
-    z[6] = t166;
-    const real t167 = B[7] * t152;
-    const real t168 = t137 + t167;
-    z[7] = t168;
-    const real t169 = B[8] * t152;
-    const real t170 = t149 + t169;
-    z[8] = t170;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t5 = b[0] + t4;
+  real t11 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t12 = b[1] + t11;
+  real t19 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t20 = b[2] + t19;
+  real t32 = b[3] + (w[2] * t11 - w[1] * t19 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]));
+  real t44 = b[4] + (w[0] * t19 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]));
+  real t56 = b[5] + (w[1] * t4 - w[0] * t11 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]));
+  real t59 = v[2] * 2.0;
+  real t61 = v[1] * 2.0;
+  real t65 = r[1] * w_I[1];
+  real t66 = r[2] * w_I[2];
+  real t69 = r[0] * w_I[1];
+  real t71 = r[1] * w_I[0];
+  real t74 = r[0] * w_I[2];
+  real t76 = r[2] * w_I[0];
+  real t84 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t65 + t66) - (z_I[1] * (2.0 * t69 - t71) + z_I[2]
+    * (2.0 * t74 - t76)) - r[1] * z_I[5]));
+  real t87 = r[0] * w_I[0];
+  real t94 = r[1] * w_I[2];
+  real t96 = r[2] * w_I[1];
+  real t103 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t66 + t87) - z_I[0] * (2.0 * t71 - t69) - z_I[2]
+    * (2.0 * t94 - t96)) - r[2] * z_I[3]);
+  real t120 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t65 + t87) - z_I[0] * (2.0 * t76 - t74) - z_I[1]
+    * (2.0 * t96 - t94) - r[0] * z_I[4]));
+  real t124 = b[6] + (t11 * t59 - t19 * t61 + (Rc[0] * t84 + Rc[3] * t103 + Rc[6] * t120));
+  real t127 = v[0] * 2.0;
+  real t137 = b[7] + (t19 * t127 - t4 * t59 + (Rc[1] * t84 + Rc[4] * t103 + Rc[7] * t120));
+  real t149 = b[8] + (t4 * t61 - t11 * t127 + (Rc[2] * t84 + Rc[5] * t103 + Rc[8] * t120));
+  real t152 = y[0] - (gain[0] * t5 + gain[1] * t12 + gain[2] * t20 + gain[3] * t32 + gain[4] * t44 +
+    gain[5] * t56 + gain[6] * t124 + gain[7] * t137 + gain[8] * t149);
+  x[0] = t152;
+  z[0] = t5 + B[0] * t152;
+  z[1] = t12 + B[1] * t152;
+  z[2] = t20 + B[2] * t152;
+  z[3] = t32 + B[3] * t152;
+  z[4] = t44 + B[4] * t152;
+  z[5] = t56 + B[5] * t152;
+  z[6] = t124 + B[6] * t152;
+  z[7] = t137 + B[7] * t152;
+  z[8] = t149 + B[8] * t152;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_tangent_solution_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"gain", 9, "", 0, 0},
-    {"y", 1, "", 0, 0},
-    {"b", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_tangent_solution_with_increments_outputs[] = {
-    {"x", 1, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_tangent_solution_with_increments, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]))
 
 /* free and constrained directions of a hinge with 1 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic1_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic1_complement(in_t H, out_t W)
 {
-    const real t0 = H[5] * H[5];
-    const real t1 = H[4] * H[4];
-    const real t2 = H[3] * H[3];
-    const real t3 = H[2] * H[2];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[1] * H[1];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t12 = 1.0 / t10;
-    const real t13 = H[0] * t12;
-    W[0] = t13;
-    const real t14 = H[1] * t12;
-    W[1] = t14;
-    const real t15 = H[2] * t12;
-    W[2] = t15;
-    const real t16 = H[3] * t12;
-    W[3] = t16;
-    const real t17 = H[4] * t12;
-    W[4] = t17;
-    const real t18 = H[5] * t12;
-    W[5] = t18;
-    const real t19 = H[0] < 0.0;
-    const real t20 = sqrt(t10);
-    const real t21 = -t20;
-    const real t22 = t19 != 0 ? t21 : t20;
-    const real t23 = H[0] + t22;
-    const real t24 = fabs(H[0]);
-    const real t25 = t20 + t24;
-    const real t26 = t20 * t25;
-    const real t27 = 0.0 < t26;
-    const real t28 = 1.0 / t26;
-    const real t29 = t27 != 0 ? t28 : 0.0;
-    const real t30 = t23 * t29;
-    const real t31 = H[1] * t30;
-    const real t32 = -t31;
-    W[6] = t32;
-    const real t33 = t5 * t29;
-    const real t34 = 1.0 - t33;
-    W[7] = t34;
-    const real t35 = H[1] * t29;
-    const real t36 = H[2] * t35;
-    const real t37 = -t36;
-    W[8] = t37;
-    const real t38 = H[3] * t35;
-    const real t39 = -t38;
-    W[9] = t39;
-    const real t40 = H[4] * t35;
-    const real t41 = -t40;
-    W[10] = t41;
-    const real t42 = H[5] * t35;
-    const real t43 = -t42;
-    W[11] = t43;
-    const real t44 = H[2] * t30;
-    const real t45 = -t44;
-    W[12] = t45;
-    W[13] = t37;
-    const real t46 = t3 * t29;
-    const real t47 = 1.0 - t46;
-    W[14] = t47;
-    const real t48 = H[2] * t29;
-    const real t49 = H[3] * t48;
-    const real t50 = -t49;
-    W[15] = t50;
-    const real t51 = H[4] * t48;
-    const real t52 = -t51;
-    W[16] = t52;
-    const real t53 = H[5] * t48;
-    const real t54 = -t53;
-    W[17] = t54;
-    const real t55 = H[3] * t30;
-    const real t56 = -t55;
-    W[18] = t56;
-    W[19] = t39;
-    W[20] = t50;
-    const real t57 = t2 * t29;
-    const real t58 = 1.0 - t57;
-    W[21] = t58;
-    const real t59 = H[3] * t29;
-    const real t60 = H[4] * t59;
-    const real t61 = -t60;
-    W[22] = t61;
-    const real t62 = H[5] * t59;
-    const real t63 = -t62;
-    W[23] = t63;
-    const real t64 = H[4] * t30;
-    const real t65 = -t64;
-    W[24] = t65;
-    W[25] = t41;
-    W[26] = t52;
-    W[27] = t61;
-    const real t66 = t1 * t29;
-    const real t67 = 1.0 - t66;
-    W[28] = t67;
-    const real t68 = H[4] * t29;
-    const real t69 = H[5] * t68;
-    const real t70 = -t69;
-    W[29] = t70;
-    const real t71 = H[5] * t30;
-    const real t72 = -t71;
-    W[30] = t72;
-    W[31] = t43;
-    W[32] = t54;
-    W[33] = t63;
-    W[34] = t70;
-    const real t73 = t0 * t29;
-    const real t74 = 1.0 - t73;
-    W[35] = t74;
-    return 0;
+  real t0 = H[5] * H[5];
+  real t1 = H[4] * H[4];
+  real t2 = H[3] * H[3];
+  real t3 = H[2] * H[2];
+  real t5 = H[1] * H[1];
+  real t10 = t0 + (t1 + (t2 + (t3 + (H[0] * H[0] + t5))));
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t12 = 1.0 / t10;
+  W[0] = H[0] * t12;
+  W[1] = H[1] * t12;
+  W[2] = H[2] * t12;
+  W[3] = H[3] * t12;
+  W[4] = H[4] * t12;
+  W[5] = H[5] * t12;
+  real t20 = sqrt(t10);
+  real t21 = -t20;
+  real t26 = t20 * (t20 + (fabs(H[0])));
+  real t28 = 1.0 / t26;
+  real t29 = (0.0 < t26) ? t28 : 0.0;
+  real t30 = (H[0] + ((H[0] < 0.0) ? t21 : t20)) * t29;
+  W[6] = -(H[1] * t30);
+  W[7] = 1.0 - t5 * t29;
+  real t35 = H[1] * t29;
+  real t37 = -(H[2] * t35);
+  W[8] = t37;
+  real t39 = -(H[3] * t35);
+  W[9] = t39;
+  real t41 = -(H[4] * t35);
+  W[10] = t41;
+  real t43 = -(H[5] * t35);
+  W[11] = t43;
+  W[12] = -(H[2] * t30);
+  W[13] = t37;
+  W[14] = 1.0 - t3 * t29;
+  real t48 = H[2] * t29;
+  real t50 = -(H[3] * t48);
+  W[15] = t50;
+  real t52 = -(H[4] * t48);
+  W[16] = t52;
+  real t54 = -(H[5] * t48);
+  W[17] = t54;
+  W[18] = -(H[3] * t30);
+  W[19] = t39;
+  W[20] = t50;
+  W[21] = 1.0 - t2 * t29;
+  real t59 = H[3] * t29;
+  real t61 = -(H[4] * t59);
+  W[22] = t61;
+  real t63 = -(H[5] * t59);
+  W[23] = t63;
+  W[24] = -(H[4] * t30);
+  W[25] = t41;
+  W[26] = t52;
+  W[27] = t61;
+  W[28] = 1.0 - t1 * t29;
+  real t70 = -(H[5] * (H[4] * t29));
+  W[29] = t70;
+  W[30] = -(H[5] * t30);
+  W[31] = t43;
+  W[32] = t54;
+  W[33] = t63;
+  W[34] = t70;
+  W[35] = 1.0 - t0 * t29;
+  return 0;
 }
 
-static int mstmm_sweep_generic1_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_complement_inputs[] = {
-    {"H", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic1_complement_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic1_complement, (in[0], out[0]))
 
 /* a column's rows divided by D, across a hinge with 1 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4591,27 +1432,13 @@ static const mstmm_guard mstmm_sweep_generic1_complement_guards[] = {
  * in  y[1] -H^T K - C
  * out z[1] D^-1 y
  */
-int mstmm_sweep_generic1_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_generic1_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    z[0] = t0;
-    return 0;
+  z[0] = F[0] * y[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_divide_inputs[] = {
-    {"F", 1, "", 0, 0},
-    {"y", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_divide_outputs[] = {
-    {"z", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 1 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4620,27 +1447,13 @@ static const mstmm_port mstmm_sweep_generic1_divide_outputs[] = {
  * in  z[1] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_generic1_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+int mstmm_sweep_generic1_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    L_ij[0] += t0;
-    return 0;
+  L_ij[0] += y[0] * z[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_couple_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"z", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 1 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4649,29 +1462,13 @@ static const mstmm_port mstmm_sweep_generic1_couple_outputs[] = {
  * in  z[1] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic1_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_generic1_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = -t0;
-    l[0] += t1;
-    return 0;
+  l[0] += -(y[0] * z[0]);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_add_known_part_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"z", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 1 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4680,28 +1477,13 @@ static const mstmm_port mstmm_sweep_generic1_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[1] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic1_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_generic1_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_outputs[] = {
-    {"y_0", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of the bodies accelerated by a hinge with 1 speeds
  * in  S[21] inertia of everything outboard, at P
@@ -4709,152 +1491,41 @@ static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_outputs[] = {
  * in  udot[1] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic1_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e)
+int mstmm_sweep_generic1_required_load(in_t S, in_t H, in_t udot, out_t e)
 {
-    const real t0 = S[0] * H[0];
-    const real t1 = S[1] * H[1];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * H[2];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * H[3];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * H[4];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * H[5];
-    const real t10 = t8 + t9;
-    const real t11 = udot[0] * t10;
-    e[0] = t11;
-    const real t12 = S[1] * H[0];
-    const real t13 = S[6] * H[1];
-    const real t14 = t12 + t13;
-    const real t15 = S[7] * H[2];
-    const real t16 = t14 + t15;
-    const real t17 = S[8] * H[3];
-    const real t18 = t16 + t17;
-    const real t19 = S[9] * H[4];
-    const real t20 = t18 + t19;
-    const real t21 = S[10] * H[5];
-    const real t22 = t20 + t21;
-    const real t23 = udot[0] * t22;
-    e[1] = t23;
-    const real t24 = S[2] * H[0];
-    const real t25 = S[7] * H[1];
-    const real t26 = t24 + t25;
-    const real t27 = S[11] * H[2];
-    const real t28 = t26 + t27;
-    const real t29 = S[12] * H[3];
-    const real t30 = t28 + t29;
-    const real t31 = S[13] * H[4];
-    const real t32 = t30 + t31;
-    const real t33 = S[14] * H[5];
-    const real t34 = t32 + t33;
-    const real t35 = udot[0] * t34;
-    e[2] = t35;
-    const real t36 = S[3] * H[0];
-    const real t37 = S[8] * H[1];
-    const real t38 = t36 + t37;
-    const real t39 = S[12] * H[2];
-    const real t40 = t38 + t39;
-    const real t41 = S[15] * H[3];
-    const real t42 = t40 + t41;
-    const real t43 = S[16] * H[4];
-    const real t44 = t42 + t43;
-    const real t45 = S[17] * H[5];
-    const real t46 = t44 + t45;
-    const real t47 = udot[0] * t46;
-    e[3] = t47;
-    const real t48 = S[4] * H[0];
-    const real t49 = S[9] * H[1];
-    const real t50 = t48 + t49;
-    const real t51 = S[13] * H[2];
-    const real t52 = t50 + t51;
-    const real t53 = S[16] * H[3];
-    const real t54 = t52 + t53;
-    const real t55 = S[18] * H[4];
-    const real t56 = t54 + t55;
-    const real t57 = S[19] * H[5];
-    const real t58 = t56 + t57;
-    const real t59 = udot[0] * t58;
-    e[4] = t59;
-    const real t60 = S[5] * H[0];
-    const real t61 = S[10] * H[1];
-    const real t62 = t60 + t61;
-    const real t63 = S[14] * H[2];
-    const real t64 = t62 + t63;
-    const real t65 = S[17] * H[3];
-    const real t66 = t64 + t65;
-    const real t67 = S[19] * H[4];
-    const real t68 = t66 + t67;
-    const real t69 = S[20] * H[5];
-    const real t70 = t68 + t69;
-    const real t71 = udot[0] * t70;
-    e[5] = t71;
-    return 0;
+  e[0] = udot[0] * (S[0] * H[0] + S[1] * H[1] + S[2] * H[2] + S[3] * H[3] + S[4] * H[4] + S[5] *
+    H[5]);
+  e[1] = udot[0] * (S[1] * H[0] + S[6] * H[1] + S[7] * H[2] + S[8] * H[3] + S[9] * H[4] + S[10] *
+    H[5]);
+  e[2] = udot[0] * (S[2] * H[0] + S[7] * H[1] + S[11] * H[2] + S[12] * H[3] + S[13] * H[4] + S[14] *
+    H[5]);
+  e[3] = udot[0] * (S[3] * H[0] + S[8] * H[1] + S[12] * H[2] + S[15] * H[3] + S[16] * H[4] + S[17] *
+    H[5]);
+  e[4] = udot[0] * (S[4] * H[0] + S[9] * H[1] + S[13] * H[2] + S[16] * H[3] + S[18] * H[4] + S[19] *
+    H[5]);
+  e[5] = udot[0] * (S[5] * H[0] + S[10] * H[1] + S[14] * H[2] + S[17] * H[3] + S[19] * H[4] + S[20]
+    * H[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_required_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_required_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_required_load_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"udot", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_required_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_required_load, (in[0], in[1], in[2], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 1 free speed
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic1_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y)
+int mstmm_sweep_generic1_ground_column_load(in_t H, in_t e, in_t tau, out_t y)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[1] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[2] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[3] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[4] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[5] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    return 0;
+  y[0] = tau[0] - (H[0] * e[0] + H[1] * e[1] + H[2] * e[2] + H[3] * e[3] + H[4] * e[4] + H[5] *
+    e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_ground_column_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_ground_column_load_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_ground_column_load_outputs[] = {
-    {"y", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_ground_column_load, (in[0], in[1], in[2], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -4877,488 +1548,116 @@ static const mstmm_port mstmm_sweep_generic1_ground_column_load_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic1_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic1_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)c;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = s[0] * d_H[3];
-    const real t159 = H[3] * d_s[0];
-    const real t160 = t158 + t159;
-    const real t161 = d_c[3] + t160;
-    const real t162 = t157 + t161;
-    const real t163 = motion_I[5] * t34;
-    const real t164 = t65 * d_motion_I[5];
-    const real t165 = t163 + t164;
-    const real t166 = motion_I[4] * t19;
-    const real t167 = t73 * d_motion_I[4];
-    const real t168 = t166 + t167;
-    const real t169 = motion_I[3] * t4;
-    const real t170 = t81 * d_motion_I[3];
-    const real t171 = t169 + t170;
-    const real t172 = t168 + t171;
-    const real t173 = t165 + t172;
-    const real t174 = t162 + t173;
-    d_motion[3] = t174;
-    const real t175 = t153 * d_w[0];
-    const real t176 = w[0] * t139;
-    const real t177 = t175 + t176;
-    const real t178 = w[2] * t85;
-    const real t179 = t81 * motion_I[0];
-    const real t180 = t73 * motion_I[1];
-    const real t181 = t179 + t180;
-    const real t182 = t65 * motion_I[2];
-    const real t183 = t181 + t182;
-    const real t184 = t183 * d_w[2];
-    const real t185 = t178 + t184;
-    const real t186 = t177 - t185;
-    const real t187 = H[4] * d_s[0];
-    const real t188 = s[0] * d_H[4];
-    const real t189 = t187 + t188;
-    const real t190 = d_c[4] + t189;
-    const real t191 = t186 + t190;
-    const real t192 = motion_I[5] * t39;
-    const real t193 = t92 * d_motion_I[5];
-    const real t194 = t192 + t193;
-    const real t195 = motion_I[4] * t24;
-    const real t196 = t100 * d_motion_I[4];
-    const real t197 = t195 + t196;
-    const real t198 = motion_I[3] * t9;
-    const real t199 = t108 * d_motion_I[3];
-    const real t200 = t198 + t199;
-    const real t201 = t197 + t200;
-    const real t202 = t194 + t201;
-    const real t203 = t191 + t202;
-    d_motion[4] = t203;
-    const real t204 = w[1] * t85;
-    const real t205 = t183 * d_w[1];
-    const real t206 = t204 + t205;
-    const real t207 = t146 * d_w[0];
-    const real t208 = w[0] * t112;
-    const real t209 = t207 + t208;
-    const real t210 = t206 - t209;
-    const real t211 = H[5] * d_s[0];
-    const real t212 = s[0] * d_H[5];
-    const real t213 = t211 + t212;
-    const real t214 = d_c[5] + t213;
-    const real t215 = t210 + t214;
-    const real t216 = motion_I[5] * t44;
-    const real t217 = t119 * d_motion_I[5];
-    const real t218 = t216 + t217;
-    const real t219 = motion_I[4] * t29;
-    const real t220 = t127 * d_motion_I[4];
-    const real t221 = t219 + t220;
-    const real t222 = motion_I[3] * t14;
-    const real t223 = t135 * d_motion_I[3];
-    const real t224 = t222 + t223;
-    const real t225 = t221 + t224;
-    const real t226 = t218 + t225;
-    const real t227 = t215 + t226;
-    d_motion[5] = t227;
-    const real t228 = v[2] * t112;
-    const real t229 = t146 * d_v[2];
-    const real t230 = t228 + t229;
-    const real t231 = 2.0 * t230;
-    const real t232 = v[1] * t139;
-    const real t233 = t153 * d_v[1];
-    const real t234 = t232 + t233;
-    const real t235 = 2.0 * t234;
-    const real t236 = t231 - t235;
-    const real t237 = H[0] * d_s[0];
-    const real t238 = s[0] * d_H[0];
-    const real t239 = t237 + t238;
-    const real t240 = d_c[0] + t239;
-    const real t241 = t236 + t240;
-    const real t242 = Rt[0] * d[0];
-    const real t243 = Rt[1] * d[1];
-    const real t244 = t242 + t243;
-    const real t245 = Rt[2] * d[2];
-    const real t246 = t244 + t245;
-    const real t247 = t246 + ro[0];
-    const real t248 = motion_I[0] * motion_I[2];
-    const real t249 = t248 - motion_I[4];
-    const real t250 = t247 * t249;
-    const real t251 = Rt[3] * d[0];
-    const real t252 = Rt[4] * d[1];
-    const real t253 = t251 + t252;
-    const real t254 = Rt[5] * d[2];
-    const real t255 = t253 + t254;
-    const real t256 = t255 + ro[1];
-    const real t257 = motion_I[1] * motion_I[2];
-    const real t258 = motion_I[3] + t257;
-    const real t259 = t256 * t258;
-    const real t260 = t250 + t259;
-    const real t261 = Rt[6] * d[0];
-    const real t262 = Rt[7] * d[1];
-    const real t263 = t261 + t262;
-    const real t264 = Rt[8] * d[2];
-    const real t265 = t263 + t264;
-    const real t266 = t265 + ro[2];
-    const real t267 = motion_I[1] * motion_I[1];
-    const real t268 = motion_I[0] * motion_I[0];
-    const real t269 = t267 + t268;
-    const real t270 = t266 * t269;
-    const real t271 = t260 - t270;
-    const real t272 = t271 + motion_I[8];
-    const real t273 = t272 * t34;
-    const real t274 = t258 * t54;
-    const real t275 = motion_I[2] * d_motion_I[1];
-    const real t276 = motion_I[1] * d_motion_I[2];
-    const real t277 = t275 + t276;
-    const real t278 = d_motion_I[3] + t277;
-    const real t279 = t256 * t278;
-    const real t280 = t274 + t279;
-    const real t281 = t249 * t49;
-    const real t282 = motion_I[2] * d_motion_I[0];
-    const real t283 = motion_I[0] * d_motion_I[2];
-    const real t284 = t282 + t283;
-    const real t285 = t284 - d_motion_I[4];
-    const real t286 = t247 * t285;
-    const real t287 = t281 + t286;
-    const real t288 = t280 + t287;
-    const real t289 = t269 * t59;
-    const real t290 = motion_I[0] * d_motion_I[0];
-    const real t291 = t290 + t290;
-    const real t292 = motion_I[1] * d_motion_I[1];
-    const real t293 = t292 + t292;
-    const real t294 = t291 + t293;
-    const real t295 = t266 * t294;
-    const real t296 = t289 + t295;
-    const real t297 = t288 - t296;
-    const real t298 = d_motion_I[8] + t297;
-    const real t299 = t65 * t298;
-    const real t300 = t273 + t299;
-    const real t301 = motion_I[0] * motion_I[1];
-    const real t302 = motion_I[5] + t301;
-    const real t303 = t247 * t302;
-    const real t304 = motion_I[2] * motion_I[2];
-    const real t305 = t304 + t268;
-    const real t306 = t256 * t305;
-    const real t307 = t303 - t306;
-    const real t308 = t257 - motion_I[3];
-    const real t309 = t266 * t308;
-    const real t310 = t307 + t309;
-    const real t311 = t310 + motion_I[7];
-    const real t312 = t311 * t19;
-    const real t313 = t308 * t59;
-    const real t314 = t277 - d_motion_I[3];
-    const real t315 = t266 * t314;
-    const real t316 = t313 + t315;
-    const real t317 = t302 * t49;
-    const real t318 = motion_I[1] * d_motion_I[0];
-    const real t319 = motion_I[0] * d_motion_I[1];
-    const real t320 = t318 + t319;
-    const real t321 = d_motion_I[5] + t320;
-    const real t322 = t247 * t321;
-    const real t323 = t317 + t322;
-    const real t324 = t305 * t54;
-    const real t325 = motion_I[2] * d_motion_I[2];
-    const real t326 = t325 + t325;
-    const real t327 = t291 + t326;
-    const real t328 = t256 * t327;
-    const real t329 = t324 + t328;
-    const real t330 = t323 - t329;
-    const real t331 = t316 + t330;
-    const real t332 = d_motion_I[7] + t331;
-    const real t333 = t73 * t332;
-    const real t334 = t312 + t333;
-    const real t335 = t301 - motion_I[5];
-    const real t336 = t256 * t335;
-    const real t337 = t267 + t304;
-    const real t338 = t247 * t337;
-    const real t339 = t336 - t338;
-    const real t340 = motion_I[4] + t248;
-    const real t341 = t266 * t340;
-    const real t342 = t339 + t341;
-    const real t343 = t342 + motion_I[6];
-    const real t344 = t343 * t4;
-    const real t345 = t340 * t59;
-    const real t346 = d_motion_I[4] + t284;
-    const real t347 = t266 * t346;
-    const real t348 = t345 + t347;
-    const real t349 = t335 * t54;
-    const real t350 = t320 - d_motion_I[5];
-    const real t351 = t256 * t350;
-    const real t352 = t349 + t351;
-    const real t353 = t337 * t49;
-    const real t354 = t293 + t326;
-    const real t355 = t247 * t354;
-    const real t356 = t353 + t355;
-    const real t357 = t352 - t356;
-    const real t358 = t348 + t357;
-    const real t359 = d_motion_I[6] + t358;
-    const real t360 = t81 * t359;
-    const real t361 = t344 + t360;
-    const real t362 = t334 + t361;
-    const real t363 = t300 + t362;
-    const real t364 = t241 + t363;
-    d_motion[6] = t364;
-    const real t365 = v[0] * t139;
-    const real t366 = t153 * d_v[0];
-    const real t367 = t365 + t366;
-    const real t368 = 2.0 * t367;
-    const real t369 = v[2] * t85;
-    const real t370 = t183 * d_v[2];
-    const real t371 = t369 + t370;
-    const real t372 = 2.0 * t371;
-    const real t373 = t368 - t372;
-    const real t374 = H[1] * d_s[0];
-    const real t375 = s[0] * d_H[1];
-    const real t376 = t374 + t375;
-    const real t377 = d_c[1] + t376;
-    const real t378 = t373 + t377;
-    const real t379 = t272 * t39;
-    const real t380 = t92 * t298;
-    const real t381 = t379 + t380;
-    const real t382 = t311 * t24;
-    const real t383 = t100 * t332;
-    const real t384 = t382 + t383;
-    const real t385 = t343 * t9;
-    const real t386 = t108 * t359;
-    const real t387 = t385 + t386;
-    const real t388 = t384 + t387;
-    const real t389 = t381 + t388;
-    const real t390 = t378 + t389;
-    d_motion[7] = t390;
-    const real t391 = v[1] * t85;
-    const real t392 = t183 * d_v[1];
-    const real t393 = t391 + t392;
-    const real t394 = 2.0 * t393;
-    const real t395 = v[0] * t112;
-    const real t396 = t146 * d_v[0];
-    const real t397 = t395 + t396;
-    const real t398 = 2.0 * t397;
-    const real t399 = t394 - t398;
-    const real t400 = H[2] * d_s[0];
-    const real t401 = s[0] * d_H[2];
-    const real t402 = t400 + t401;
-    const real t403 = d_c[2] + t402;
-    const real t404 = t399 + t403;
-    const real t405 = t272 * t44;
-    const real t406 = t119 * t298;
-    const real t407 = t405 + t406;
-    const real t408 = t311 * t29;
-    const real t409 = t127 * t332;
-    const real t410 = t408 + t409;
-    const real t411 = t343 * t14;
-    const real t412 = t135 * t359;
-    const real t413 = t411 + t412;
-    const real t414 = t410 + t413;
-    const real t415 = t407 + t414;
-    const real t416 = t404 + t415;
-    d_motion[8] = t416;
-    return 0;
+  (void)c;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139) + (d_c[3] + (s[0] *
+    d_H[3] + H[3] * d_s[0])) + (motion_I[5] * t34 + t65 * d_motion_I[5] + (motion_I[4] * t19 + t73 *
+    d_motion_I[4] + (motion_I[3] * t4 + t81 * d_motion_I[3])));
+  real t183 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t183 * d_w[2]) + (d_c[4] + (H[4] *
+    d_s[0] + s[0] * d_H[4])) + (motion_I[5] * t39 + t92 * d_motion_I[5] + (motion_I[4] * t24 + t100
+    * d_motion_I[4] + (motion_I[3] * t9 + t108 * d_motion_I[3])));
+  d_motion[5] = w[1] * t85 + t183 * d_w[1] - (t146 * d_w[0] + w[0] * t112) + (d_c[5] + (H[5] *
+    d_s[0] + s[0] * d_H[5])) + (motion_I[5] * t44 + t119 * d_motion_I[5] + (motion_I[4] * t29 + t127
+    * d_motion_I[4] + (motion_I[3] * t14 + t135 * d_motion_I[3])));
+  real t247 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t248 = motion_I[0] * motion_I[2];
+  real t249 = t248 - motion_I[4];
+  real t256 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t257 = motion_I[1] * motion_I[2];
+  real t258 = motion_I[3] + t257;
+  real t266 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t267 = motion_I[1] * motion_I[1];
+  real t268 = motion_I[0] * motion_I[0];
+  real t269 = t267 + t268;
+  real t272 = t247 * t249 + t256 * t258 - t266 * t269 + motion_I[8];
+  real t277 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t284 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t290 = motion_I[0] * d_motion_I[0];
+  real t291 = t290 + t290;
+  real t292 = motion_I[1] * d_motion_I[1];
+  real t293 = t292 + t292;
+  real t298 = d_motion_I[8] + (t258 * t54 + t256 * (d_motion_I[3] + t277) + (t249 * t49 + t247 *
+    (t284 - d_motion_I[4])) - (t269 * t59 + t266 * (t291 + t293)));
+  real t301 = motion_I[0] * motion_I[1];
+  real t302 = motion_I[5] + t301;
+  real t304 = motion_I[2] * motion_I[2];
+  real t305 = t304 + t268;
+  real t308 = t257 - motion_I[3];
+  real t311 = t247 * t302 - t256 * t305 + t266 * t308 + motion_I[7];
+  real t320 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t325 = motion_I[2] * d_motion_I[2];
+  real t326 = t325 + t325;
+  real t332 = d_motion_I[7] + (t308 * t59 + t266 * (t277 - d_motion_I[3]) + (t302 * t49 + t247 *
+    (d_motion_I[5] + t320) - (t305 * t54 + t256 * (t291 + t326))));
+  real t335 = t301 - motion_I[5];
+  real t337 = t267 + t304;
+  real t340 = motion_I[4] + t248;
+  real t343 = t256 * t335 - t247 * t337 + t266 * t340 + motion_I[6];
+  real t359 = d_motion_I[6] + (t340 * t59 + t266 * (d_motion_I[4] + t284) + (t335 * t54 + t256 *
+    (t320 - d_motion_I[5]) - (t337 * t49 + t247 * (t293 + t326))));
+  d_motion[6] = 2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]) + (d_c[0]
+    + (H[0] * d_s[0] + s[0] * d_H[0])) + (t272 * t34 + t65 * t298 + (t311 * t19 + t73 * t332 + (t343
+    * t4 + t81 * t359)));
+  d_motion[7] = 2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t183 * d_v[2]) + (d_c[1] +
+    (H[1] * d_s[0] + s[0] * d_H[1])) + (t272 * t39 + t92 * t298 + (t311 * t24 + t100 * t332 + (t343
+    * t9 + t108 * t359)));
+  d_motion[8] = 2.0 * (v[1] * t85 + t183 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]) + (d_c[2] +
+    (H[2] * d_s[0] + s[0] * d_H[2])) + (t272 * t44 + t119 * t298 + (t311 * t29 + t127 * t332 + (t343
+    * t14 + t135 * t359)));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 6, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 6, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 1, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6] motion subspace
@@ -5367,52 +1666,15 @@ static const mstmm_port mstmm_sweep_generic1_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[1] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic1_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic1_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    const real t0 = f[5] * d_H[5];
-    const real t1 = H[5] * d_f[5];
-    const real t2 = t0 + t1;
-    const real t3 = f[4] * d_H[4];
-    const real t4 = H[4] * d_f[4];
-    const real t5 = t3 + t4;
-    const real t6 = f[3] * d_H[3];
-    const real t7 = H[3] * d_f[3];
-    const real t8 = t6 + t7;
-    const real t9 = f[2] * d_H[2];
-    const real t10 = H[2] * d_f[2];
-    const real t11 = t9 + t10;
-    const real t12 = f[1] * d_H[1];
-    const real t13 = H[1] * d_f[1];
-    const real t14 = t12 + t13;
-    const real t15 = f[0] * d_H[0];
-    const real t16 = H[0] * d_f[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_tau[0] = t22;
-    return 0;
+  d_tau[0] = f[5] * d_H[5] + H[5] * d_f[5] + (f[4] * d_H[4] + H[4] * d_f[4] + (f[3] * d_H[3] + H[3]
+    * d_f[3] + (f[2] * d_H[2] + H[2] * d_f[2] + (f[1] * d_H[1] + H[1] * d_f[1] + (f[0] * d_H[0] +
+    H[0] * d_f[0])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic1_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_effort_slope_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 6, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_effort_slope_outputs[] = {
-    {"d_tau", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -5420,237 +1682,100 @@ static const mstmm_port mstmm_sweep_generic1_effort_slope_outputs[] = {
  * in  d_H[6] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic1_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic1_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    const real t0 = H[5] * H[5];
-    const real t1 = H[4] * H[4];
-    const real t2 = H[3] * H[3];
-    const real t3 = H[2] * H[2];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[1] * H[1];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 1.0 / t10;
-    const real t12 = t11 * d_H[0];
-    const real t13 = H[1] * d_H[1];
-    const real t14 = t13 + t13;
-    const real t15 = H[0] * d_H[0];
-    const real t16 = t15 + t15;
-    const real t17 = t14 + t16;
-    const real t18 = H[2] * d_H[2];
-    const real t19 = t18 + t18;
-    const real t20 = t17 + t19;
-    const real t21 = H[3] * d_H[3];
-    const real t22 = t21 + t21;
-    const real t23 = t20 + t22;
-    const real t24 = H[4] * d_H[4];
-    const real t25 = t24 + t24;
-    const real t26 = t23 + t25;
-    const real t27 = H[5] * d_H[5];
-    const real t28 = t27 + t27;
-    const real t29 = t26 + t28;
-    const real t30 = t11 * t29;
-    const real t31 = t30 / t10;
-    const real t32 = H[0] * t31;
-    const real t33 = t12 - t32;
-    d_W[0] = t33;
-    const real t34 = t11 * d_H[1];
-    const real t35 = H[1] * t31;
-    const real t36 = t34 - t35;
-    d_W[1] = t36;
-    const real t37 = t11 * d_H[2];
-    const real t38 = H[2] * t31;
-    const real t39 = t37 - t38;
-    d_W[2] = t39;
-    const real t40 = t11 * d_H[3];
-    const real t41 = H[3] * t31;
-    const real t42 = t40 - t41;
-    d_W[3] = t42;
-    const real t43 = t11 * d_H[4];
-    const real t44 = H[4] * t31;
-    const real t45 = t43 - t44;
-    d_W[4] = t45;
-    const real t46 = t11 * d_H[5];
-    const real t47 = H[5] * t31;
-    const real t48 = t46 - t47;
-    d_W[5] = t48;
-    const real t49 = H[0] < 0.0;
-    const real t50 = sqrt(t10);
-    const real t51 = -t50;
-    const real t52 = t49 != 0 ? t51 : t50;
-    const real t53 = H[0] + t52;
-    const real t54 = fabs(H[0]);
-    const real t55 = t50 + t54;
-    const real t56 = t50 * t55;
-    const real t57 = 0.0 < t56;
-    const real t58 = 1.0 / t56;
-    const real t59 = t57 != 0 ? t58 : 0.0;
-    const real t60 = t53 * t59;
-    const real t61 = t60 * d_H[1];
-    const real t62 = t50 * 2.0;
-    const real t63 = t29 / t62;
-    const real t64 = -t63;
-    const real t65 = t49 != 0 ? t64 : t63;
-    const real t66 = d_H[0] + t65;
-    const real t67 = t59 * t66;
-    const real t68 = t55 * t63;
-    const real t69 = H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0]);
-    const real t70 = d_H[0] * t69;
-    const real t71 = t70 + t63;
-    const real t72 = t50 * t71;
-    const real t73 = t68 + t72;
-    const real t74 = t58 * t73;
-    const real t75 = t74 / t56;
-    const real t76 = -t75;
-    const real t77 = t57 != 0 ? t76 : 0.0;
-    const real t78 = t53 * t77;
-    const real t79 = t67 + t78;
-    const real t80 = H[1] * t79;
-    const real t81 = t61 + t80;
-    const real t82 = -t81;
-    d_W[6] = t82;
-    const real t83 = t59 * t14;
-    const real t84 = t5 * t77;
-    const real t85 = t83 + t84;
-    const real t86 = -t85;
-    d_W[7] = t86;
-    const real t87 = H[1] * t59;
-    const real t88 = t87 * d_H[2];
-    const real t89 = t59 * d_H[1];
-    const real t90 = H[1] * t77;
-    const real t91 = t89 + t90;
-    const real t92 = H[2] * t91;
-    const real t93 = t88 + t92;
-    const real t94 = -t93;
-    d_W[8] = t94;
-    const real t95 = t87 * d_H[3];
-    const real t96 = H[3] * t91;
-    const real t97 = t95 + t96;
-    const real t98 = -t97;
-    d_W[9] = t98;
-    const real t99 = t87 * d_H[4];
-    const real t100 = H[4] * t91;
-    const real t101 = t99 + t100;
-    const real t102 = -t101;
-    d_W[10] = t102;
-    const real t103 = t87 * d_H[5];
-    const real t104 = H[5] * t91;
-    const real t105 = t103 + t104;
-    const real t106 = -t105;
-    d_W[11] = t106;
-    const real t107 = t60 * d_H[2];
-    const real t108 = H[2] * t79;
-    const real t109 = t107 + t108;
-    const real t110 = -t109;
-    d_W[12] = t110;
-    d_W[13] = t94;
-    const real t111 = t59 * t19;
-    const real t112 = t3 * t77;
-    const real t113 = t111 + t112;
-    const real t114 = -t113;
-    d_W[14] = t114;
-    const real t115 = H[2] * t59;
-    const real t116 = t115 * d_H[3];
-    const real t117 = t59 * d_H[2];
-    const real t118 = H[2] * t77;
-    const real t119 = t117 + t118;
-    const real t120 = H[3] * t119;
-    const real t121 = t116 + t120;
-    const real t122 = -t121;
-    d_W[15] = t122;
-    const real t123 = t115 * d_H[4];
-    const real t124 = H[4] * t119;
-    const real t125 = t123 + t124;
-    const real t126 = -t125;
-    d_W[16] = t126;
-    const real t127 = t115 * d_H[5];
-    const real t128 = H[5] * t119;
-    const real t129 = t127 + t128;
-    const real t130 = -t129;
-    d_W[17] = t130;
-    const real t131 = t60 * d_H[3];
-    const real t132 = H[3] * t79;
-    const real t133 = t131 + t132;
-    const real t134 = -t133;
-    d_W[18] = t134;
-    d_W[19] = t98;
-    d_W[20] = t122;
-    const real t135 = t59 * t22;
-    const real t136 = t2 * t77;
-    const real t137 = t135 + t136;
-    const real t138 = -t137;
-    d_W[21] = t138;
-    const real t139 = H[3] * t59;
-    const real t140 = t139 * d_H[4];
-    const real t141 = t59 * d_H[3];
-    const real t142 = H[3] * t77;
-    const real t143 = t141 + t142;
-    const real t144 = H[4] * t143;
-    const real t145 = t140 + t144;
-    const real t146 = -t145;
-    d_W[22] = t146;
-    const real t147 = t139 * d_H[5];
-    const real t148 = H[5] * t143;
-    const real t149 = t147 + t148;
-    const real t150 = -t149;
-    d_W[23] = t150;
-    const real t151 = t60 * d_H[4];
-    const real t152 = H[4] * t79;
-    const real t153 = t151 + t152;
-    const real t154 = -t153;
-    d_W[24] = t154;
-    d_W[25] = t102;
-    d_W[26] = t126;
-    d_W[27] = t146;
-    const real t155 = t59 * t25;
-    const real t156 = t1 * t77;
-    const real t157 = t155 + t156;
-    const real t158 = -t157;
-    d_W[28] = t158;
-    const real t159 = H[4] * t59;
-    const real t160 = t159 * d_H[5];
-    const real t161 = t59 * d_H[4];
-    const real t162 = H[4] * t77;
-    const real t163 = t161 + t162;
-    const real t164 = H[5] * t163;
-    const real t165 = t160 + t164;
-    const real t166 = -t165;
-    d_W[29] = t166;
-    const real t167 = t60 * d_H[5];
-    const real t168 = H[5] * t79;
-    const real t169 = t167 + t168;
-    const real t170 = -t169;
-    d_W[30] = t170;
-    d_W[31] = t106;
-    d_W[32] = t130;
-    d_W[33] = t150;
-    d_W[34] = t166;
-    const real t171 = t59 * t28;
-    const real t172 = t0 * t77;
-    const real t173 = t171 + t172;
-    const real t174 = -t173;
-    d_W[35] = t174;
-    return 0;
+  real t0 = H[5] * H[5];
+  real t1 = H[4] * H[4];
+  real t2 = H[3] * H[3];
+  real t3 = H[2] * H[2];
+  real t5 = H[1] * H[1];
+  real t10 = t0 + (t1 + (t2 + (t3 + (H[0] * H[0] + t5))));
+  real t11 = 1.0 / t10;
+  real t13 = H[1] * d_H[1];
+  real t14 = t13 + t13;
+  real t15 = H[0] * d_H[0];
+  real t18 = H[2] * d_H[2];
+  real t19 = t18 + t18;
+  real t21 = H[3] * d_H[3];
+  real t22 = t21 + t21;
+  real t24 = H[4] * d_H[4];
+  real t25 = t24 + t24;
+  real t27 = H[5] * d_H[5];
+  real t28 = t27 + t27;
+  real t29 = t14 + (t15 + t15) + t19 + t22 + t25 + t28;
+  real t31 = t11 * t29 / t10;
+  d_W[0] = t11 * d_H[0] - H[0] * t31;
+  d_W[1] = t11 * d_H[1] - H[1] * t31;
+  d_W[2] = t11 * d_H[2] - H[2] * t31;
+  d_W[3] = t11 * d_H[3] - H[3] * t31;
+  d_W[4] = t11 * d_H[4] - H[4] * t31;
+  d_W[5] = t11 * d_H[5] - H[5] * t31;
+  real t49 = H[0] < 0.0;
+  real t50 = sqrt(t10);
+  real t51 = -t50;
+  real t53 = H[0] + (t49 != 0 ? t51 : t50);
+  real t55 = t50 + (fabs(H[0]));
+  real t56 = t50 * t55;
+  real t57 = 0.0 < t56;
+  real t58 = 1.0 / t56;
+  real t59 = t57 != 0 ? t58 : 0.0;
+  real t60 = t53 * t59;
+  real t63 = t29 / (t50 * 2.0);
+  real t64 = -t63;
+  real t76 = -(t58 * (t55 * t63 + t50 * (d_H[0] * (H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0])) + t63)) /
+    t56);
+  real t77 = t57 != 0 ? t76 : 0.0;
+  real t79 = t59 * (d_H[0] + (t49 != 0 ? t64 : t63)) + t53 * t77;
+  d_W[6] = -(t60 * d_H[1] + H[1] * t79);
+  d_W[7] = -(t59 * t14 + t5 * t77);
+  real t87 = H[1] * t59;
+  real t91 = t59 * d_H[1] + H[1] * t77;
+  real t94 = -(t87 * d_H[2] + H[2] * t91);
+  d_W[8] = t94;
+  real t98 = -(t87 * d_H[3] + H[3] * t91);
+  d_W[9] = t98;
+  real t102 = -(t87 * d_H[4] + H[4] * t91);
+  d_W[10] = t102;
+  real t106 = -(t87 * d_H[5] + H[5] * t91);
+  d_W[11] = t106;
+  d_W[12] = -(t60 * d_H[2] + H[2] * t79);
+  d_W[13] = t94;
+  d_W[14] = -(t59 * t19 + t3 * t77);
+  real t115 = H[2] * t59;
+  real t119 = t59 * d_H[2] + H[2] * t77;
+  real t122 = -(t115 * d_H[3] + H[3] * t119);
+  d_W[15] = t122;
+  real t126 = -(t115 * d_H[4] + H[4] * t119);
+  d_W[16] = t126;
+  real t130 = -(t115 * d_H[5] + H[5] * t119);
+  d_W[17] = t130;
+  d_W[18] = -(t60 * d_H[3] + H[3] * t79);
+  d_W[19] = t98;
+  d_W[20] = t122;
+  d_W[21] = -(t59 * t22 + t2 * t77);
+  real t139 = H[3] * t59;
+  real t143 = t59 * d_H[3] + H[3] * t77;
+  real t146 = -(t139 * d_H[4] + H[4] * t143);
+  d_W[22] = t146;
+  real t150 = -(t139 * d_H[5] + H[5] * t143);
+  d_W[23] = t150;
+  d_W[24] = -(t60 * d_H[4] + H[4] * t79);
+  d_W[25] = t102;
+  d_W[26] = t126;
+  d_W[27] = t146;
+  d_W[28] = -(t59 * t25 + t1 * t77);
+  real t166 = -(H[4] * t59 * d_H[5] + H[5] * (t59 * d_H[4] + H[4] * t77));
+  d_W[29] = t166;
+  d_W[30] = -(t60 * d_H[5] + H[5] * t79);
+  d_W[31] = t106;
+  d_W[32] = t130;
+  d_W[33] = t150;
+  d_W[34] = t166;
+  d_W[35] = -(t59 * t28 + t0 * t77);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_complement_slope_inputs[] = {
-    {"H", 6, "", 0, 0},
-    {"d_H", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_complement_slope, (in[0], in[1], out[0]))
 
 /* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -5661,33 +1786,13 @@ static const mstmm_port mstmm_sweep_generic1_complement_slope_outputs[] = {
  * in  d_z[1] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic1_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+int mstmm_sweep_generic1_add_known_part_slope(in_t y, in_t z, in_t d_y, in_t d_z, out_t d_l)
 {
-    const real t0 = z[0] * d_y[0];
-    const real t1 = y[0] * d_z[0];
-    const real t2 = t0 + t1;
-    const real t3 = -t2;
-    d_l[0] += t3;
-    return 0;
+  d_l[0] += -(z[0] * d_y[0] + y[0] * d_z[0]);
+  return 0;
 }
 
-static int mstmm_sweep_generic1_add_known_part_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_add_known_part_slope_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"z", 1, "", 0, 0},
-    {"d_y", 1, "", 0, 0},
-    {"d_z", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_add_known_part_slope_outputs[] = {
-    {"d_l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_add_known_part_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -5698,425 +1803,177 @@ static const mstmm_port mstmm_sweep_generic1_add_known_part_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[1] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic1_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+int mstmm_sweep_generic1_add_multiplier_effort_slope(in_t y, in_t x, in_t d_y, in_t d_x,
+    out_t d_y_0)
 {
-    const real t0 = x[0] * d_y[0];
-    const real t1 = y[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_y_0[0] += t2;
-    return 0;
+  d_y_0[0] += x[0] * d_y[0] + y[0] * d_x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic1_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic1_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_slope_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_y", 1, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic1_add_multiplier_effort_slope_outputs[] = {
-    {"d_y_0", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic1_add_multiplier_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic1_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic1_forward,
-        .call = mstmm_sweep_generic1_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_forward_inputs,
-        .outputs = mstmm_sweep_generic1_forward_outputs,
-        .ir_hash = "ddc2ccfbd08e65c2f687ed9352f821c351e7dbc450707346b03fc416d34e9553",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic1_condense,
-        .call = mstmm_sweep_generic1_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic1_condense_inputs,
-        .outputs = mstmm_sweep_generic1_condense_outputs,
-        .ir_hash = "67cd4f21746a53e3a7e6514ef64284f0e829423e95ecab912f4ac8c68b17c03c",
-        .n_guards = 3,
-        .guards = mstmm_sweep_generic1_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic1_recover,
-        .call = mstmm_sweep_generic1_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_recover_inputs,
-        .outputs = mstmm_sweep_generic1_recover_outputs,
-        .ir_hash = "84b420c92e58f8b002fed602d27f4edb6f7c6e17832bb6447284ae424ff4d4d7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic1_effort,
-        .call = mstmm_sweep_generic1_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_effort_inputs,
-        .outputs = mstmm_sweep_generic1_effort_outputs,
-        .ir_hash = "3a7c736a8dd2692fe2d462256dc746f6a1508cebf17eec9539fdd51699264e06",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic1_project,
-        .call = mstmm_sweep_generic1_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_project_inputs,
-        .outputs = mstmm_sweep_generic1_project_outputs,
-        .ir_hash = "5f6475ea60dbd3fc522a41cb9b8e734cac79db28e47007550d32e305766c0f23",
-        .n_guards = 1,
-        .guards = mstmm_sweep_generic1_project_guards,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic1_factor,
-        .call = mstmm_sweep_generic1_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_factor_inputs,
-        .outputs = mstmm_sweep_generic1_factor_outputs,
-        .ir_hash = "e822f4a56f680d1341eb74e0adcbf39229d116481b85562a0e03eb89bc67f4c4",
-        .n_guards = 2,
-        .guards = mstmm_sweep_generic1_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic1_column_load,
-        .call = mstmm_sweep_generic1_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_column_load_inputs,
-        .outputs = mstmm_sweep_generic1_column_load_outputs,
-        .ir_hash = "480f574c050fb47a69daae2dc8e2993327ef8c7312d2526024b07f9e49ef7963",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic1_column_acceleration,
-        .call = mstmm_sweep_generic1_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic1_column_acceleration_outputs,
-        .ir_hash = "0382dc0e6458c1787b926c32bc437782b4802155560fac79e582443cb3f88f28",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic1_qr_eliminate,
-        .call = mstmm_sweep_generic1_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic1_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic1_qr_eliminate_outputs,
-        .ir_hash = "9e6f7f9d61b99e3635a14c3c99ac5f34ae3fa49e6f66576d61f0d9ab9c3b2c7b",
-        .n_guards = 2,
-        .guards = mstmm_sweep_generic1_qr_eliminate_guards,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_carrier,
-        .call = mstmm_sweep_generic1_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_carrier_outputs,
-        .ir_hash = "a576fb8bdf631fac00373fffdc3e1ffe60f24a257d019189353f75f4405e16d1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_column,
-        .call = mstmm_sweep_generic1_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_column_outputs,
-        .ir_hash = "1ac39035da6f0d43e96a15aecb5a9cb067afdbe85a9fa02711aef1f32b1b3197",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_coordinate_change",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_coordinate_change,
-        .call = mstmm_sweep_generic1_tangent_coordinate_change_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_coordinate_change_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_coordinate_change_outputs,
-        .ir_hash = "4eda3f3ad2046a02ba43cf2b53649d07d786cb03a3096f5ee28b3340d3b68e64",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_steady",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_steady,
-        .call = mstmm_sweep_generic1_tangent_steady_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_tangent_steady_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_steady_outputs,
-        .ir_hash = "17616ee422027c3ee26ca93b9e8f5bb250f30d959134192f6e89b0187a186627",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rotational",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_rotational,
-        .call = mstmm_sweep_generic1_tangent_rotational_call,
-        .n_inputs = 9,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_tangent_rotational_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_rotational_outputs,
-        .ir_hash = "f5df49d71d021175eb4244aa28b212f581dc4a9b67213c8eeae3e8c76316da22",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rows",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_rows,
-        .call = mstmm_sweep_generic1_tangent_rows_call,
-        .n_inputs = 4,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic1_tangent_rows_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_rows_outputs,
-        .ir_hash = "7d1d397d44c5ac2e9dfb99a0a4db4466343960b334c7923f9eccf78090dcc606",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_reduce",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_reduce,
-        .call = mstmm_sweep_generic1_tangent_reduce_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_tangent_reduce_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_reduce_outputs,
-        .ir_hash = "c67fb1fad1556554cb2bd0b07b1f8bee7d8d897a2e733263b9692dc2b5d84a93",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_load,
-        .call = mstmm_sweep_generic1_tangent_load_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_load_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_load_outputs,
-        .ir_hash = "0add2299e385945c7f4a6152b41da854849f6aaa6e083071120223dacb70e515",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_solution,
-        .call = mstmm_sweep_generic1_tangent_solution_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_solution_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_solution_outputs,
-        .ir_hash = "5ff6e2f3d2db5316a368452d4aeb5d49a1961264d85fc6e77555b7b35b9ad392",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_load_with_increments,
-        .call = mstmm_sweep_generic1_tangent_load_with_increments_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_load_with_increments_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_load_with_increments_outputs,
-        .ir_hash = "82a0a56a47ae6b00cfd01a590f15d371aefa1d90e182be0b98a7c5fab4f2f35c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic1_tangent_solution_with_increments,
-        .call = mstmm_sweep_generic1_tangent_solution_with_increments_call,
-        .n_inputs = 10,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic1_tangent_solution_with_increments_inputs,
-        .outputs = mstmm_sweep_generic1_tangent_solution_with_increments_outputs,
-        .ir_hash = "8c9f830f8187156f74aab6d68dc9c193fd6f22545a4d4272d87e923505c019b3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic1_complement,
-        .call = mstmm_sweep_generic1_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_complement_inputs,
-        .outputs = mstmm_sweep_generic1_complement_outputs,
-        .ir_hash = "49e82f52039709002fa21e6c8341c2f45ffc52fd4ebb8a963ac4adf6ac8c0ece",
-        .n_guards = 1,
-        .guards = mstmm_sweep_generic1_complement_guards,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_generic1_divide,
-        .call = mstmm_sweep_generic1_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_divide_inputs,
-        .outputs = mstmm_sweep_generic1_divide_outputs,
-        .ir_hash = "d8d33510ef94d72840b486a4a776e5bf9c5df4f31bb22521b582981d5f68bf4f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_generic1_couple,
-        .call = mstmm_sweep_generic1_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_couple_inputs,
-        .outputs = mstmm_sweep_generic1_couple_outputs,
-        .ir_hash = "6fbc32d0b4e7742186c8f84ab15144647e4bd720f7c869ec0a502a1fb5a7bb1b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_generic1_add_known_part,
-        .call = mstmm_sweep_generic1_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_add_known_part_inputs,
-        .outputs = mstmm_sweep_generic1_add_known_part_outputs,
-        .ir_hash = "8ffdcbe3b5905b31727108a41a45227795c0343f5b87e5d14281fcbf9b3702e3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_generic1_add_multiplier_effort,
-        .call = mstmm_sweep_generic1_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_generic1_add_multiplier_effort_outputs,
-        .ir_hash = "f5e432d29084336d4a94dfcb919861cfc72db310bfb03caee28593c58140218e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_load",
-        .function = (void (*)(void))mstmm_sweep_generic1_required_load,
-        .call = mstmm_sweep_generic1_required_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_required_load_inputs,
-        .outputs = mstmm_sweep_generic1_required_load_outputs,
-        .ir_hash = "22f167201363c0c063cf4308fd75452842326cfeb9d2491881be304ad8902d62",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_generic1_ground_column_load,
-        .call = mstmm_sweep_generic1_ground_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_ground_column_load_inputs,
-        .outputs = mstmm_sweep_generic1_ground_column_load_outputs,
-        .ir_hash = "de8a1bb482427c6dd2e4962b7506e82be82bd0ca7cf3327a2b9add655bb3c244",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_forward_slope,
-        .call = mstmm_sweep_generic1_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic1_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic1_forward_slope_outputs,
-        .ir_hash = "485ece46b2c602d608a2d3d9a7e116d7df0476f417c5a53044a33a544e9bfdf5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_effort_slope,
-        .call = mstmm_sweep_generic1_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic1_effort_slope_outputs,
-        .ir_hash = "447de3da211f3eeb91eb0dd72de82715b3afaa62c30bba0fc11b82192a3cd00f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_complement_slope,
-        .call = mstmm_sweep_generic1_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic1_complement_slope_outputs,
-        .ir_hash = "0507e02251edd20f66c41b7f47906d828fac8651a5529283c6f3efcd00ef2eef",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_add_known_part_slope,
-        .call = mstmm_sweep_generic1_add_known_part_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_add_known_part_slope_inputs,
-        .outputs = mstmm_sweep_generic1_add_known_part_slope_outputs,
-        .ir_hash = "01b47c330bb0c6719804e8e9602c37587f335a52b2212fa8be1cce0b2d3c8e8f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic1_add_multiplier_effort_slope,
-        .call = mstmm_sweep_generic1_add_multiplier_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic1_add_multiplier_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic1_add_multiplier_effort_slope_outputs,
-        .ir_hash = "897fa67eed2540918ea6c301d8cbc89862e777cb30c0badba6a99788372be2ac",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic1_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 6, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 1, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "d9085cc09c581cdce30b883df9dd870b1a085db3272afbf0b191a8bd66384f21", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic1_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "ae70c4f81dfd9005c57327eb205e00e7242dc81000d12e742a664df2c3d21442", 3, (const
+    mstmm_guard[]){{1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic1_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"G", 6, "", 0, 0}, {"g", 1, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "1b2dab1fee6325a7fc36861d807d7bbb9b22cff936163d04fc166751d42cba9a", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic1_effort), 2, 1, (const mstmm_port[]){{"H", 6, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 1, "N, N*m", 0, 0}},
+    "775b000b97be6368056d9920148d359dbb4bdfe5c88cc7f22da1cb1c9df1da09", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic1_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0}},
+    "a8f97506a437dd93c07f5419c6f58a993d776810ab491c1992bcb4ffa5d5a5a1", 1, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic1_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"W", 1, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 1, "", 0,
+    0}, {"G", 6, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "f9648b6a24aee040ab32998e9de567b22afca39aff2addfdcc4d3edf69987c56", 2, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic1_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"G", 6, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 1, "N, N*m",
+    0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "0c809f382512a1dc1af6e42772fec0557a6bafc25c9c57fc133ca511b70b4d89", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic1_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"F", 1, "", 0, 0},
+    {"G", 6, "", 0, 0}, {"y", 1, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "ac2361a0fa14291105aeb0a535980a1be0636adfc0f03781c721ae09a72c4492", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic1_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 6, "", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "1dc4cf8c4bb25bda21e457157e242d2b0844e7c4f1ba4f9e65aae262835799c0", 2, (const mstmm_guard[]){{1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 0}, {"s", 1, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "e77d154c057044f7794104fbdfe4be904b04d1c87d0b6fc1352078c949cebf17", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 6, "", 0, 0}, {"s", 1, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 6, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    1, "", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"laws", 1, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 1, "", 0, 0}},
+    "bd6e0fa5a7719abe7e51844125210599866f59a860a394279fd228555a04c811", 0, NULL},
+  {"tangent_coordinate_change", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_coordinate_change), 2,
+    2, (const mstmm_port[]){{"H", 6, "", 0, 0}, {"d_q", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "5bf8bcf5b34e9bbc8a6e1bc0221389a6964eea024e98436367f7904cdafac321", 0, NULL},
+  {"tangent_steady", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_steady), 11, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 6, "", 0, 0}, {"v", 3, "", 0,
+    0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 1, "", 0, 0},
+    {"d_s", 1, "", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"laws", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 1, "", 0, 0}},
+    "e2a85515acf19b4ef4c73aee0d5d8c3937c485656f4b4d5128eb938d71528238", 0, NULL},
+  {"tangent_rotational", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_rotational), 9, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"H", 6, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 1, "", 0, 0}, {"d_s", 1, "", 0, 0}, {"J", 1,
+    "kg*m2 or kg", 0, 0}, {"laws", 1, "", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6,
+    "", 0, 0}, {"row", 1, "", 0, 0}},
+    "f61ac9ddbfd2768f6435233700c8c2ab8a7fe135fd905c946f4a4a5c00c6651b", 0, NULL},
+  {"tangent_rows", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_rows), 4, 4, (const
+    mstmm_port[]){{"H", 6, "", 0, 0}, {"B", 9, "", 0, 0}, {"W", 1, "", 0, 0}, {"S", 54, "", 0, 0}},
+    (const mstmm_port[]){{"K", 6, "", 0, 0}, {"right", 9, "", 0, 0}, {"D", 1, "", 0, 0}, {"one", 1,
+    "", 0, 0}}, "a62d06ec957e4416fd0215194f79642ba4e1b7b7754a6da35c3b9ce3ab32a4a8", 0, NULL},
+  {"tangent_reduce", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_reduce), 4, 3, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"right", 9, "", 0, 0}, {"K", 6, "", 0, 0}, {"G", 6, "",
+    0, 0}}, (const mstmm_port[]){{"gain", 9, "", 0, 0}, {"V", 6, "", 0, 0}, {"S", 54, "", 1, 0}},
+    "5be7ba096ffcaab15832feb1310e7bb0c2e379418506642574fda90f50e6c576", 0, NULL},
+  {"tangent_load", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_load), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"V", 6, "", 0, 0},
+    {"inverse", 1, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"y", 1, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "f5c734bc76f8c645393f0b07ddb439e9d8de2b6e988abe220c59c0cd3fa5c1db", 0, NULL},
+  {"tangent_solution", MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_solution), 9, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 9, "", 0, 0}, {"gain", 9, "",
+    0, 0}, {"y", 1, "", 0, 0}}, (const mstmm_port[]){{"x", 1, "", 0, 0}, {"z", 9, "", 0, 0}},
+    "936624f4256325aa3c39df514a3db1d88fe5213e5ecdea9eb49972882d45619b", 0, NULL},
+  {"tangent_load_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_load_with_increments), 8, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 0}, {"V", 6, "", 0, 0},
+    {"inverse", 1, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 0}, {"e_b", 6, "N, N*m",
+    0, 0}}, (const mstmm_port[]){{"y", 1, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "4070e04d446f6bc72b9c6de7541f52b940d5cb51f1096e645c79c65dab78aecf", 0, NULL},
+  {"tangent_solution_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic1_tangent_solution_with_increments), 10, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 9, "", 0, 0}, {"gain", 9, "",
+    0, 0}, {"y", 1, "", 0, 0}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"x", 1, "", 0, 0}, {"z",
+    9, "", 0, 0}}, "af1b3a8fa8eee87f8ec41e949153f4b260d3f737f662fb01f57232cef4353ce6", 0, NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic1_complement), 1, 1, (const mstmm_port[]){{"H",
+    6, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "e106e8639eebfe4f5e9f76aea38b4702131ac6892d231d80138c52fb916c501f", 1, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}}},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_generic1_divide), 2, 1, (const mstmm_port[]){{"F", 1, "",
+    0, 0}, {"y", 1, "", 0, 0}}, (const mstmm_port[]){{"z", 1, "", 0, 0}},
+    "e0e65147955b493fbdb861ce0152b29398af2abfcd62ada9db7f277931473b54", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_generic1_couple), 2, 1, (const mstmm_port[]){{"y", 1, "",
+    0, 0}, {"z", 1, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "dba55d8050f78f7fd65224aac46d6f6862730865fa6d8dd26f8ba37519b16737", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_generic1_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 1, "", 0, 0}, {"z", 1, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "ed40cdfce89969c34a6c0a9ec35b963ad87d4baf9aa4f57c6357faa18679b095", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_generic1_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 1, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    1, "", 1, 0}}, "85b783066072f01b4b8da9fe6f4319ddaf8c31d2fcb3268694ebd2330e0ccf6c", 0, NULL},
+  {"required_load", MSTMM_FUNCTIONS(mstmm_sweep_generic1_required_load), 3, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"H", 6, "", 0, 0}, {"udot", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "43c3104775f69980db82473f6f2ee5d37675421d981eebbea6f5edca4db6aa09", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic1_ground_column_load), 3, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"y", 1, "N, N*m", 0, 0}},
+    "8187846efdffd11dcb436501961f02823f24b6743698909270f80bd0479be68e", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic1_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 6, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 1, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 6, "", 0, 0},
+    {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 1, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "b58c72dd8c9cc9f4d93b5376bfbf1d3b49d5f1880443b95a60dbffd98caa4989",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic1_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 6, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 1, "N, N*m", 0, 0}},
+    "dcbadbf717047550a3ea344c8b75e994b1a71d3fd59848d4811a0985169ce091", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic1_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 0}, {"d_H", 6, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "", 0,
+    0}}, "bd95951b09c633c1b60b34a7b993d8d9ee597a93aab50e00534edc23914ef074", 0, NULL},
+  {"add_known_part_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic1_add_known_part_slope), 4, 1, (const
+    mstmm_port[]){{"y", 1, "", 0, 0}, {"z", 1, "", 0, 0}, {"d_y", 1, "", 0, 0}, {"d_z", 1, "", 0,
+    0}}, (const mstmm_port[]){{"d_l", 1, "", 1, 0}},
+    "9edb16591a0498a7e3022a6ab5f785d69393a29f94861ac0a99687266a7c074f", 0, NULL},
+  {"add_multiplier_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic1_add_multiplier_effort_slope),
+    4, 1, (const mstmm_port[]){{"y", 1, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_y", 1, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_y_0", 1, "", 1, 0}},
+    "a855db26eb123640e2ef9aadccec08b4417fd670dd0cfbf8a42c7f1e105bbc2b", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic1 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic1",
-    .hash = "8aa0c7990621980c5a86fc5506b46343dc9351f5593558dd82df4854575daee6",
+    .hash = "cda229e1d0fbadaf3286b25bfd74974d919b904a769dfd7d477c5c9c5b011589",
     .nq = 0,
     .nu = 0,
     .np = 0,

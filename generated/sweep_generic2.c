@@ -10,105 +10,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic2;
-int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic2_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic2_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic2_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic2_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic2_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x);
-int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row);
-int mstmm_sweep_generic2_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
-int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one);
-int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S);
-int mstmm_sweep_generic2_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic2_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic2_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z);
-int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic2_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_generic2_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_generic2_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic2_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y);
-int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic2_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-int mstmm_sweep_generic2_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic2_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -127,8 +28,6 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 #endif
 
 /* bias motion outboard of a hinge with 2 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -143,267 +42,70 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic2_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic2_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = H[6] * s[0];
-    const real t87 = H[7] * s[1];
-    const real t88 = t86 + t87;
-    const real t89 = c[3] + t88;
-    const real t90 = w[2] * t73;
-    const real t91 = w[1] * t79;
-    const real t92 = t90 - t91;
-    const real t93 = t89 + t92;
-    const real t94 = t85 + t93;
-    motion[3] = t94;
-    const real t95 = motion_I[3] * t9;
-    const real t96 = motion_I[4] * t24;
-    const real t97 = t95 + t96;
-    const real t98 = motion_I[5] * t39;
-    const real t99 = t97 + t98;
-    const real t100 = H[8] * s[0];
-    const real t101 = H[9] * s[1];
-    const real t102 = t100 + t101;
-    const real t103 = c[4] + t102;
-    const real t104 = w[0] * t79;
-    const real t105 = w[2] * t67;
-    const real t106 = t104 - t105;
-    const real t107 = t103 + t106;
-    const real t108 = t99 + t107;
-    motion[4] = t108;
-    const real t109 = motion_I[3] * t14;
-    const real t110 = motion_I[4] * t29;
-    const real t111 = t109 + t110;
-    const real t112 = motion_I[5] * t44;
-    const real t113 = t111 + t112;
-    const real t114 = H[10] * s[0];
-    const real t115 = H[11] * s[1];
-    const real t116 = t114 + t115;
-    const real t117 = c[5] + t116;
-    const real t118 = w[1] * t67;
-    const real t119 = w[0] * t73;
-    const real t120 = t118 - t119;
-    const real t121 = t117 + t120;
-    const real t122 = t113 + t121;
-    motion[5] = t122;
-    const real t123 = motion_I[0] * motion_I[1];
-    const real t124 = t123 - motion_I[5];
-    const real t125 = t56 * t124;
-    const real t126 = motion_I[1] * motion_I[1];
-    const real t127 = motion_I[2] * motion_I[2];
-    const real t128 = t126 + t127;
-    const real t129 = t50 * t128;
-    const real t130 = t125 - t129;
-    const real t131 = motion_I[0] * motion_I[2];
-    const real t132 = motion_I[4] + t131;
-    const real t133 = t62 * t132;
-    const real t134 = t130 + t133;
-    const real t135 = motion_I[6] + t134;
-    const real t136 = t4 * t135;
-    const real t137 = motion_I[5] + t123;
-    const real t138 = t50 * t137;
-    const real t139 = motion_I[0] * motion_I[0];
-    const real t140 = t127 + t139;
-    const real t141 = t56 * t140;
-    const real t142 = t138 - t141;
-    const real t143 = motion_I[1] * motion_I[2];
-    const real t144 = t143 - motion_I[3];
-    const real t145 = t62 * t144;
-    const real t146 = t142 + t145;
-    const real t147 = motion_I[7] + t146;
-    const real t148 = t19 * t147;
-    const real t149 = t136 + t148;
-    const real t150 = t131 - motion_I[4];
-    const real t151 = t50 * t150;
-    const real t152 = motion_I[3] + t143;
-    const real t153 = t56 * t152;
-    const real t154 = t151 + t153;
-    const real t155 = t126 + t139;
-    const real t156 = t62 * t155;
-    const real t157 = t154 - t156;
-    const real t158 = motion_I[8] + t157;
-    const real t159 = t34 * t158;
-    const real t160 = t149 + t159;
-    const real t161 = H[0] * s[0];
-    const real t162 = H[1] * s[1];
-    const real t163 = t161 + t162;
-    const real t164 = c[0] + t163;
-    const real t165 = v[2] * t73;
-    const real t166 = 2.0 * t165;
-    const real t167 = v[1] * t79;
-    const real t168 = 2.0 * t167;
-    const real t169 = t166 - t168;
-    const real t170 = t164 + t169;
-    const real t171 = t160 + t170;
-    motion[6] = t171;
-    const real t172 = t9 * t135;
-    const real t173 = t24 * t147;
-    const real t174 = t172 + t173;
-    const real t175 = t39 * t158;
-    const real t176 = t174 + t175;
-    const real t177 = H[2] * s[0];
-    const real t178 = H[3] * s[1];
-    const real t179 = t177 + t178;
-    const real t180 = c[1] + t179;
-    const real t181 = v[0] * t79;
-    const real t182 = 2.0 * t181;
-    const real t183 = v[2] * t67;
-    const real t184 = 2.0 * t183;
-    const real t185 = t182 - t184;
-    const real t186 = t180 + t185;
-    const real t187 = t176 + t186;
-    motion[7] = t187;
-    const real t188 = t14 * t135;
-    const real t189 = t29 * t147;
-    const real t190 = t188 + t189;
-    const real t191 = t44 * t158;
-    const real t192 = t190 + t191;
-    const real t193 = H[4] * s[0];
-    const real t194 = H[5] * s[1];
-    const real t195 = t193 + t194;
-    const real t196 = c[2] + t195;
-    const real t197 = v[1] * t67;
-    const real t198 = 2.0 * t197;
-    const real t199 = v[0] * t73;
-    const real t200 = 2.0 * t199;
-    const real t201 = t198 - t200;
-    const real t202 = t196 + t201;
-    const real t203 = t192 + t202;
-    motion[8] = t203;
-    return 0;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + (H[6] * s[0] + H[7]
+    * s[1]) + (w[2] * t73 - w[1] * t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + (H[8] * s[0] + H[9]
+    * s[1]) + (w[0] * t79 - w[2] * t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + (H[10] * s[0] +
+    H[11] * s[1]) + (w[1] * t67 - w[0] * t73));
+  real t123 = motion_I[0] * motion_I[1];
+  real t126 = motion_I[1] * motion_I[1];
+  real t127 = motion_I[2] * motion_I[2];
+  real t131 = motion_I[0] * motion_I[2];
+  real t135 = motion_I[6] + (t56 * (t123 - motion_I[5]) - t50 * (t126 + t127) + t62 * (motion_I[4] +
+    t131));
+  real t139 = motion_I[0] * motion_I[0];
+  real t143 = motion_I[1] * motion_I[2];
+  real t147 = motion_I[7] + (t50 * (motion_I[5] + t123) - t56 * (t127 + t139) + t62 * (t143 -
+    motion_I[3]));
+  real t158 = motion_I[8] + (t50 * (t131 - motion_I[4]) + t56 * (motion_I[3] + t143) - t62 * (t126 +
+    t139));
+  motion[6] = t4 * t135 + t19 * t147 + t34 * t158 + (c[0] + (H[0] * s[0] + H[1] * s[1]) + (2.0 *
+    (v[2] * t73) - 2.0 * (v[1] * t79)));
+  motion[7] = t9 * t135 + t24 * t147 + t39 * t158 + (c[1] + (H[2] * s[0] + H[3] * s[1]) + (2.0 *
+    (v[0] * t79) - 2.0 * (v[2] * t67)));
+  motion[8] = t14 * t135 + t29 * t147 + t44 * t158 + (c[2] + (H[4] * s[0] + H[5] * s[1]) + (2.0 *
+    (v[1] * t67) - 2.0 * (v[0] * t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with 2 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the free coordinates
@@ -417,880 +119,195 @@ static const mstmm_port mstmm_sweep_generic2_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic2_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[2] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[2] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[4] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[6] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[8] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[10] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[2] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[2] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[4] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[6] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[8] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[10] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[4] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[2] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[4] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[6] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[8] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[10] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[6] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[2] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[4] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[6] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[8] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[10] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[8] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[2] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[4] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[6] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[8] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[10] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[10] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t79 = H[1] * S[0];
-    const real t80 = H[3] * S[1];
-    const real t81 = t79 + t80;
-    const real t82 = H[5] * S[2];
-    const real t83 = t81 + t82;
-    const real t84 = H[7] * S[3];
-    const real t85 = t83 + t84;
-    const real t86 = H[9] * S[4];
-    const real t87 = t85 + t86;
-    const real t88 = H[11] * S[5];
-    const real t89 = t87 + t88;
-    const real t90 = H[1] * t89;
-    const real t91 = H[1] * S[1];
-    const real t92 = H[3] * S[6];
-    const real t93 = t91 + t92;
-    const real t94 = H[5] * S[7];
-    const real t95 = t93 + t94;
-    const real t96 = H[7] * S[8];
-    const real t97 = t95 + t96;
-    const real t98 = H[9] * S[9];
-    const real t99 = t97 + t98;
-    const real t100 = H[11] * S[10];
-    const real t101 = t99 + t100;
-    const real t102 = H[3] * t101;
-    const real t103 = t90 + t102;
-    const real t104 = H[1] * S[2];
-    const real t105 = H[3] * S[7];
-    const real t106 = t104 + t105;
-    const real t107 = H[5] * S[11];
-    const real t108 = t106 + t107;
-    const real t109 = H[7] * S[12];
-    const real t110 = t108 + t109;
-    const real t111 = H[9] * S[13];
-    const real t112 = t110 + t111;
-    const real t113 = H[11] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = H[5] * t114;
-    const real t116 = t103 + t115;
-    const real t117 = H[1] * S[3];
-    const real t118 = H[3] * S[8];
-    const real t119 = t117 + t118;
-    const real t120 = H[5] * S[12];
-    const real t121 = t119 + t120;
-    const real t122 = H[7] * S[15];
-    const real t123 = t121 + t122;
-    const real t124 = H[9] * S[16];
-    const real t125 = t123 + t124;
-    const real t126 = H[11] * S[17];
-    const real t127 = t125 + t126;
-    const real t128 = H[7] * t127;
-    const real t129 = t116 + t128;
-    const real t130 = H[1] * S[4];
-    const real t131 = H[3] * S[9];
-    const real t132 = t130 + t131;
-    const real t133 = H[5] * S[13];
-    const real t134 = t132 + t133;
-    const real t135 = H[7] * S[16];
-    const real t136 = t134 + t135;
-    const real t137 = H[9] * S[18];
-    const real t138 = t136 + t137;
-    const real t139 = H[11] * S[19];
-    const real t140 = t138 + t139;
-    const real t141 = H[9] * t140;
-    const real t142 = t129 + t141;
-    const real t143 = H[1] * S[5];
-    const real t144 = H[3] * S[10];
-    const real t145 = t143 + t144;
-    const real t146 = H[5] * S[14];
-    const real t147 = t145 + t146;
-    const real t148 = H[7] * S[17];
-    const real t149 = t147 + t148;
-    const real t150 = H[9] * S[19];
-    const real t151 = t149 + t150;
-    const real t152 = H[11] * S[20];
-    const real t153 = t151 + t152;
-    const real t154 = H[11] * t153;
-    const real t155 = t142 + t154;
-    const real t156 = J[1] + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * t89;
-    const real t159 = H[2] * t101;
-    const real t160 = t158 + t159;
-    const real t161 = H[4] * t114;
-    const real t162 = t160 + t161;
-    const real t163 = H[6] * t127;
-    const real t164 = t162 + t163;
-    const real t165 = H[8] * t140;
-    const real t166 = t164 + t165;
-    const real t167 = H[10] * t153;
-    const real t168 = t166 + t167;
-    const real t169 = 1.0 / t77;
-    const real t170 = t168 * t169;
-    const real t171 = t168 * t170;
-    const real t172 = t156 - t171;
-    const real t173 = t157 < t172;
-    if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t174 = H[4] * H[4];
-    const real t175 = H[0] * H[0];
-    const real t176 = H[2] * H[2];
-    const real t177 = t175 + t176;
-    const real t178 = t174 + t177;
-    const real t179 = 0.0 < floor_[0];
-    const real t180 = S[0] + S[6];
-    const real t181 = S[11] + t180;
-    const real t182 = ((real)1 / (real)300000000000000) * t181;
-    const real t183 = t179 != 0 ? floor_[0] : t182;
-    const real t184 = t178 * t183;
-    const real t185 = H[10] * H[10];
-    const real t186 = H[6] * H[6];
-    const real t187 = H[8] * H[8];
-    const real t188 = t186 + t187;
-    const real t189 = t185 + t188;
-    const real t190 = 0.0 < floor_[1];
-    const real t191 = S[15] + S[18];
-    const real t192 = S[20] + t191;
-    const real t193 = ((real)1 / (real)300000000000000) * t192;
-    const real t194 = t190 != 0 ? floor_[1] : t193;
-    const real t195 = t189 * t194;
-    const real t196 = t184 + t195;
-    const real t197 = t196 < t77;
-    if (!(t197 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
-    const real t198 = H[5] * H[5];
-    const real t199 = H[1] * H[1];
-    const real t200 = H[3] * H[3];
-    const real t201 = t199 + t200;
-    const real t202 = t198 + t201;
-    const real t203 = t183 * t202;
-    const real t204 = H[11] * H[11];
-    const real t205 = H[7] * H[7];
-    const real t206 = H[9] * H[9];
-    const real t207 = t205 + t206;
-    const real t208 = t204 + t207;
-    const real t209 = t194 * t208;
-    const real t210 = t203 + t209;
-    const real t211 = t210 < t156;
-    if (!(t211 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
-    const real t212 = t10 * t169;
-    const real t213 = 1.0 / t172;
-    const real t214 = t10 * t170;
-    const real t215 = t89 - t214;
-    const real t216 = t213 * t215;
-    const real t217 = t170 * t216;
-    const real t218 = t212 - t217;
-    G[0] = t218;
-    const real t219 = t22 * t169;
-    const real t220 = t22 * t170;
-    const real t221 = t101 - t220;
-    const real t222 = t213 * t221;
-    const real t223 = t170 * t222;
-    const real t224 = t219 - t223;
-    G[1] = t224;
-    const real t225 = t35 * t169;
-    const real t226 = t35 * t170;
-    const real t227 = t114 - t226;
-    const real t228 = t213 * t227;
-    const real t229 = t170 * t228;
-    const real t230 = t225 - t229;
-    G[2] = t230;
-    const real t231 = t48 * t169;
-    const real t232 = t48 * t170;
-    const real t233 = t127 - t232;
-    const real t234 = t213 * t233;
-    const real t235 = t170 * t234;
-    const real t236 = t231 - t235;
-    G[3] = t236;
-    const real t237 = t61 * t169;
-    const real t238 = t61 * t170;
-    const real t239 = t140 - t238;
-    const real t240 = t213 * t239;
-    const real t241 = t170 * t240;
-    const real t242 = t237 - t241;
-    G[4] = t242;
-    const real t243 = t74 * t169;
-    const real t244 = t74 * t170;
-    const real t245 = t153 - t244;
-    const real t246 = t213 * t245;
-    const real t247 = t170 * t246;
-    const real t248 = t243 - t247;
-    G[5] = t248;
-    G[6] = t216;
-    G[7] = t222;
-    G[8] = t228;
-    G[9] = t234;
-    G[10] = t240;
-    G[11] = t246;
-    const real t249 = H[0] * e[0];
-    const real t250 = H[2] * e[1];
-    const real t251 = t249 + t250;
-    const real t252 = H[4] * e[2];
-    const real t253 = t251 + t252;
-    const real t254 = H[6] * e[3];
-    const real t255 = t253 + t254;
-    const real t256 = H[8] * e[4];
-    const real t257 = t255 + t256;
-    const real t258 = H[10] * e[5];
-    const real t259 = t257 + t258;
-    const real t260 = tau[0] - t259;
-    const real t261 = t169 * t260;
-    const real t262 = H[1] * e[0];
-    const real t263 = H[3] * e[1];
-    const real t264 = t262 + t263;
-    const real t265 = H[5] * e[2];
-    const real t266 = t264 + t265;
-    const real t267 = H[7] * e[3];
-    const real t268 = t266 + t267;
-    const real t269 = H[9] * e[4];
-    const real t270 = t268 + t269;
-    const real t271 = H[11] * e[5];
-    const real t272 = t270 + t271;
-    const real t273 = tau[1] - t272;
-    const real t274 = t170 * t260;
-    const real t275 = t273 - t274;
-    const real t276 = t213 * t275;
-    const real t277 = t170 * t276;
-    const real t278 = t261 - t277;
-    g[0] = t278;
-    g[1] = t276;
-    const real t279 = t10 * t218;
-    const real t280 = t89 * t216;
-    const real t281 = t279 + t280;
-    const real t282 = S[0] - t281;
-    const real t283 = Rc[0] * t282;
-    const real t284 = t10 * t224;
-    const real t285 = t89 * t222;
-    const real t286 = t284 + t285;
-    const real t287 = S[1] - t286;
-    const real t288 = Rc[1] * t287;
-    const real t289 = t283 + t288;
-    const real t290 = t10 * t230;
-    const real t291 = t89 * t228;
-    const real t292 = t290 + t291;
-    const real t293 = S[2] - t292;
-    const real t294 = Rc[2] * t293;
-    const real t295 = t289 + t294;
-    const real t296 = Rc[0] * t295;
-    const real t297 = Rc[0] * t287;
-    const real t298 = t22 * t224;
-    const real t299 = t101 * t222;
-    const real t300 = t298 + t299;
-    const real t301 = S[6] - t300;
-    const real t302 = Rc[1] * t301;
-    const real t303 = t297 + t302;
-    const real t304 = t22 * t230;
-    const real t305 = t101 * t228;
-    const real t306 = t304 + t305;
-    const real t307 = S[7] - t306;
-    const real t308 = Rc[2] * t307;
-    const real t309 = t303 + t308;
-    const real t310 = Rc[1] * t309;
-    const real t311 = t296 + t310;
-    const real t312 = Rc[0] * t293;
-    const real t313 = Rc[1] * t307;
-    const real t314 = t312 + t313;
-    const real t315 = t35 * t230;
-    const real t316 = t114 * t228;
-    const real t317 = t315 + t316;
-    const real t318 = S[11] - t317;
-    const real t319 = Rc[2] * t318;
-    const real t320 = t314 + t319;
-    const real t321 = Rc[2] * t320;
-    const real t322 = t311 + t321;
-    S_I[0] += t322;
-    const real t323 = Rc[3] * t295;
-    const real t324 = Rc[4] * t309;
-    const real t325 = t323 + t324;
-    const real t326 = Rc[5] * t320;
-    const real t327 = t325 + t326;
-    S_I[1] += t327;
-    const real t328 = Rc[6] * t295;
-    const real t329 = Rc[7] * t309;
-    const real t330 = t328 + t329;
-    const real t331 = Rc[8] * t320;
-    const real t332 = t330 + t331;
-    S_I[2] += t332;
-    const real t333 = t10 * t236;
-    const real t334 = t89 * t234;
-    const real t335 = t333 + t334;
-    const real t336 = S[3] - t335;
-    const real t337 = Rc[0] * t336;
-    const real t338 = t22 * t236;
-    const real t339 = t101 * t234;
-    const real t340 = t338 + t339;
-    const real t341 = S[8] - t340;
-    const real t342 = Rc[1] * t341;
-    const real t343 = t337 + t342;
-    const real t344 = t35 * t236;
-    const real t345 = t114 * t234;
-    const real t346 = t344 + t345;
-    const real t347 = S[12] - t346;
-    const real t348 = Rc[2] * t347;
-    const real t349 = t343 + t348;
-    const real t350 = Rc[0] * t349;
-    const real t351 = t10 * t242;
-    const real t352 = t89 * t240;
-    const real t353 = t351 + t352;
-    const real t354 = S[4] - t353;
-    const real t355 = Rc[0] * t354;
-    const real t356 = t22 * t242;
-    const real t357 = t101 * t240;
-    const real t358 = t356 + t357;
-    const real t359 = S[9] - t358;
-    const real t360 = Rc[1] * t359;
-    const real t361 = t355 + t360;
-    const real t362 = t35 * t242;
-    const real t363 = t114 * t240;
-    const real t364 = t362 + t363;
-    const real t365 = S[13] - t364;
-    const real t366 = Rc[2] * t365;
-    const real t367 = t361 + t366;
-    const real t368 = Rc[1] * t367;
-    const real t369 = t350 + t368;
-    const real t370 = t10 * t248;
-    const real t371 = t89 * t246;
-    const real t372 = t370 + t371;
-    const real t373 = S[5] - t372;
-    const real t374 = Rc[0] * t373;
-    const real t375 = t22 * t248;
-    const real t376 = t101 * t246;
-    const real t377 = t375 + t376;
-    const real t378 = S[10] - t377;
-    const real t379 = Rc[1] * t378;
-    const real t380 = t374 + t379;
-    const real t381 = t35 * t248;
-    const real t382 = t114 * t246;
-    const real t383 = t381 + t382;
-    const real t384 = S[14] - t383;
-    const real t385 = Rc[2] * t384;
-    const real t386 = t380 + t385;
-    const real t387 = Rc[2] * t386;
-    const real t388 = t369 + t387;
-    const real t389 = r[1] * t332;
-    const real t390 = r[2] * t327;
-    const real t391 = t389 - t390;
-    const real t392 = t388 + t391;
-    S_I[3] += t392;
-    const real t393 = Rc[3] * t349;
-    const real t394 = Rc[4] * t367;
-    const real t395 = t393 + t394;
-    const real t396 = Rc[5] * t386;
-    const real t397 = t395 + t396;
-    const real t398 = r[2] * t322;
-    const real t399 = r[0] * t332;
-    const real t400 = t398 - t399;
-    const real t401 = t397 + t400;
-    S_I[4] += t401;
-    const real t402 = Rc[6] * t349;
-    const real t403 = Rc[7] * t367;
-    const real t404 = t402 + t403;
-    const real t405 = Rc[8] * t386;
-    const real t406 = t404 + t405;
-    const real t407 = r[0] * t327;
-    const real t408 = r[1] * t322;
-    const real t409 = t407 - t408;
-    const real t410 = t406 + t409;
-    S_I[5] += t410;
-    const real t411 = Rc[3] * t282;
-    const real t412 = Rc[4] * t287;
-    const real t413 = t411 + t412;
-    const real t414 = Rc[5] * t293;
-    const real t415 = t413 + t414;
-    const real t416 = Rc[3] * t415;
-    const real t417 = Rc[3] * t287;
-    const real t418 = Rc[4] * t301;
-    const real t419 = t417 + t418;
-    const real t420 = Rc[5] * t307;
-    const real t421 = t419 + t420;
-    const real t422 = Rc[4] * t421;
-    const real t423 = t416 + t422;
-    const real t424 = Rc[3] * t293;
-    const real t425 = Rc[4] * t307;
-    const real t426 = t424 + t425;
-    const real t427 = Rc[5] * t318;
-    const real t428 = t426 + t427;
-    const real t429 = Rc[5] * t428;
-    const real t430 = t423 + t429;
-    S_I[6] += t430;
-    const real t431 = Rc[6] * t415;
-    const real t432 = Rc[7] * t421;
-    const real t433 = t431 + t432;
-    const real t434 = Rc[8] * t428;
-    const real t435 = t433 + t434;
-    S_I[7] += t435;
-    const real t436 = Rc[3] * t336;
-    const real t437 = Rc[4] * t341;
-    const real t438 = t436 + t437;
-    const real t439 = Rc[5] * t347;
-    const real t440 = t438 + t439;
-    const real t441 = Rc[0] * t440;
-    const real t442 = Rc[3] * t354;
-    const real t443 = Rc[4] * t359;
-    const real t444 = t442 + t443;
-    const real t445 = Rc[5] * t365;
-    const real t446 = t444 + t445;
-    const real t447 = Rc[1] * t446;
-    const real t448 = t441 + t447;
-    const real t449 = Rc[3] * t373;
-    const real t450 = Rc[4] * t378;
-    const real t451 = t449 + t450;
-    const real t452 = Rc[5] * t384;
-    const real t453 = t451 + t452;
-    const real t454 = Rc[2] * t453;
-    const real t455 = t448 + t454;
-    const real t456 = r[1] * t435;
-    const real t457 = r[2] * t430;
-    const real t458 = t456 - t457;
-    const real t459 = t455 + t458;
-    S_I[8] += t459;
-    const real t460 = Rc[3] * t440;
-    const real t461 = Rc[4] * t446;
-    const real t462 = t460 + t461;
-    const real t463 = Rc[5] * t453;
-    const real t464 = t462 + t463;
-    const real t465 = r[0] * t435;
-    const real t466 = t390 - t465;
-    const real t467 = t464 + t466;
-    S_I[9] += t467;
-    const real t468 = Rc[6] * t440;
-    const real t469 = Rc[7] * t446;
-    const real t470 = t468 + t469;
-    const real t471 = Rc[8] * t453;
-    const real t472 = t470 + t471;
-    const real t473 = r[0] * t430;
-    const real t474 = r[1] * t327;
-    const real t475 = t473 - t474;
-    const real t476 = t472 + t475;
-    S_I[10] += t476;
-    const real t477 = Rc[6] * t282;
-    const real t478 = Rc[7] * t287;
-    const real t479 = t477 + t478;
-    const real t480 = Rc[8] * t293;
-    const real t481 = t479 + t480;
-    const real t482 = Rc[6] * t481;
-    const real t483 = Rc[6] * t287;
-    const real t484 = Rc[7] * t301;
-    const real t485 = t483 + t484;
-    const real t486 = Rc[8] * t307;
-    const real t487 = t485 + t486;
-    const real t488 = Rc[7] * t487;
-    const real t489 = t482 + t488;
-    const real t490 = Rc[6] * t293;
-    const real t491 = Rc[7] * t307;
-    const real t492 = t490 + t491;
-    const real t493 = Rc[8] * t318;
-    const real t494 = t492 + t493;
-    const real t495 = Rc[8] * t494;
-    const real t496 = t489 + t495;
-    S_I[11] += t496;
-    const real t497 = Rc[6] * t336;
-    const real t498 = Rc[7] * t341;
-    const real t499 = t497 + t498;
-    const real t500 = Rc[8] * t347;
-    const real t501 = t499 + t500;
-    const real t502 = Rc[0] * t501;
-    const real t503 = Rc[6] * t354;
-    const real t504 = Rc[7] * t359;
-    const real t505 = t503 + t504;
-    const real t506 = Rc[8] * t365;
-    const real t507 = t505 + t506;
-    const real t508 = Rc[1] * t507;
-    const real t509 = t502 + t508;
-    const real t510 = Rc[6] * t373;
-    const real t511 = Rc[7] * t378;
-    const real t512 = t510 + t511;
-    const real t513 = Rc[8] * t384;
-    const real t514 = t512 + t513;
-    const real t515 = Rc[2] * t514;
-    const real t516 = t509 + t515;
-    const real t517 = r[1] * t496;
-    const real t518 = r[2] * t435;
-    const real t519 = t517 - t518;
-    const real t520 = t516 + t519;
-    S_I[12] += t520;
-    const real t521 = Rc[3] * t501;
-    const real t522 = Rc[4] * t507;
-    const real t523 = t521 + t522;
-    const real t524 = Rc[5] * t514;
-    const real t525 = t523 + t524;
-    const real t526 = r[2] * t332;
-    const real t527 = r[0] * t496;
-    const real t528 = t526 - t527;
-    const real t529 = t525 + t528;
-    S_I[13] += t529;
-    const real t530 = Rc[6] * t501;
-    const real t531 = Rc[7] * t507;
-    const real t532 = t530 + t531;
-    const real t533 = Rc[8] * t514;
-    const real t534 = t532 + t533;
-    const real t535 = t465 - t389;
-    const real t536 = t534 + t535;
-    S_I[14] += t536;
-    const real t537 = t48 * t236;
-    const real t538 = t127 * t234;
-    const real t539 = t537 + t538;
-    const real t540 = S[15] - t539;
-    const real t541 = Rc[0] * t540;
-    const real t542 = t48 * t242;
-    const real t543 = t127 * t240;
-    const real t544 = t542 + t543;
-    const real t545 = S[16] - t544;
-    const real t546 = Rc[1] * t545;
-    const real t547 = t541 + t546;
-    const real t548 = t48 * t248;
-    const real t549 = t127 * t246;
-    const real t550 = t548 + t549;
-    const real t551 = S[17] - t550;
-    const real t552 = Rc[2] * t551;
-    const real t553 = t547 + t552;
-    const real t554 = Rc[0] * t553;
-    const real t555 = Rc[0] * t545;
-    const real t556 = t61 * t242;
-    const real t557 = t140 * t240;
-    const real t558 = t556 + t557;
-    const real t559 = S[18] - t558;
-    const real t560 = Rc[1] * t559;
-    const real t561 = t555 + t560;
-    const real t562 = t61 * t248;
-    const real t563 = t140 * t246;
-    const real t564 = t562 + t563;
-    const real t565 = S[19] - t564;
-    const real t566 = Rc[2] * t565;
-    const real t567 = t561 + t566;
-    const real t568 = Rc[1] * t567;
-    const real t569 = t554 + t568;
-    const real t570 = Rc[0] * t551;
-    const real t571 = Rc[1] * t565;
-    const real t572 = t570 + t571;
-    const real t573 = t74 * t248;
-    const real t574 = t153 * t246;
-    const real t575 = t573 + t574;
-    const real t576 = S[20] - t575;
-    const real t577 = Rc[2] * t576;
-    const real t578 = t572 + t577;
-    const real t579 = Rc[2] * t578;
-    const real t580 = t569 + t579;
-    const real t581 = r[1] * t520;
-    const real t582 = r[2] * t459;
-    const real t583 = t581 - t582;
-    const real t584 = r[1] * t516;
-    const real t585 = r[2] * t455;
-    const real t586 = t584 - t585;
-    const real t587 = t583 + t586;
-    const real t588 = t580 + t587;
-    S_I[15] += t588;
-    const real t589 = Rc[3] * t553;
-    const real t590 = Rc[4] * t567;
-    const real t591 = t589 + t590;
-    const real t592 = Rc[5] * t578;
-    const real t593 = t591 + t592;
-    const real t594 = r[1] * t529;
-    const real t595 = r[2] * t467;
-    const real t596 = t594 - t595;
-    const real t597 = r[2] * t388;
-    const real t598 = r[0] * t516;
-    const real t599 = t597 - t598;
-    const real t600 = t596 + t599;
-    const real t601 = t593 + t600;
-    S_I[16] += t601;
-    const real t602 = Rc[6] * t553;
-    const real t603 = Rc[7] * t567;
-    const real t604 = t602 + t603;
-    const real t605 = Rc[8] * t578;
-    const real t606 = t604 + t605;
-    const real t607 = r[1] * t536;
-    const real t608 = r[2] * t476;
-    const real t609 = t607 - t608;
-    const real t610 = r[0] * t455;
-    const real t611 = r[1] * t388;
-    const real t612 = t610 - t611;
-    const real t613 = t609 + t612;
-    const real t614 = t606 + t613;
-    S_I[17] += t614;
-    const real t615 = Rc[3] * t540;
-    const real t616 = Rc[4] * t545;
-    const real t617 = t615 + t616;
-    const real t618 = Rc[5] * t551;
-    const real t619 = t617 + t618;
-    const real t620 = Rc[3] * t619;
-    const real t621 = Rc[3] * t545;
-    const real t622 = Rc[4] * t559;
-    const real t623 = t621 + t622;
-    const real t624 = Rc[5] * t565;
-    const real t625 = t623 + t624;
-    const real t626 = Rc[4] * t625;
-    const real t627 = t620 + t626;
-    const real t628 = Rc[3] * t551;
-    const real t629 = Rc[4] * t565;
-    const real t630 = t628 + t629;
-    const real t631 = Rc[5] * t576;
-    const real t632 = t630 + t631;
-    const real t633 = Rc[5] * t632;
-    const real t634 = t627 + t633;
-    const real t635 = r[2] * t401;
-    const real t636 = r[0] * t529;
-    const real t637 = t635 - t636;
-    const real t638 = r[2] * t397;
-    const real t639 = r[0] * t525;
-    const real t640 = t638 - t639;
-    const real t641 = t637 + t640;
-    const real t642 = t634 + t641;
-    S_I[18] += t642;
-    const real t643 = Rc[6] * t619;
-    const real t644 = Rc[7] * t625;
-    const real t645 = t643 + t644;
-    const real t646 = Rc[8] * t632;
-    const real t647 = t645 + t646;
-    const real t648 = r[2] * t410;
-    const real t649 = r[0] * t536;
-    const real t650 = t648 - t649;
-    const real t651 = r[0] * t464;
-    const real t652 = r[1] * t397;
-    const real t653 = t651 - t652;
-    const real t654 = t650 + t653;
-    const real t655 = t647 + t654;
-    S_I[19] += t655;
-    const real t656 = Rc[6] * t540;
-    const real t657 = Rc[7] * t545;
-    const real t658 = t656 + t657;
-    const real t659 = Rc[8] * t551;
-    const real t660 = t658 + t659;
-    const real t661 = Rc[6] * t660;
-    const real t662 = Rc[6] * t545;
-    const real t663 = Rc[7] * t559;
-    const real t664 = t662 + t663;
-    const real t665 = Rc[8] * t565;
-    const real t666 = t664 + t665;
-    const real t667 = Rc[7] * t666;
-    const real t668 = t661 + t667;
-    const real t669 = Rc[6] * t551;
-    const real t670 = Rc[7] * t565;
-    const real t671 = t669 + t670;
-    const real t672 = Rc[8] * t576;
-    const real t673 = t671 + t672;
-    const real t674 = Rc[8] * t673;
-    const real t675 = t668 + t674;
-    const real t676 = r[0] * t476;
-    const real t677 = r[1] * t410;
-    const real t678 = t676 - t677;
-    const real t679 = r[0] * t472;
-    const real t680 = r[1] * t406;
-    const real t681 = t679 - t680;
-    const real t682 = t678 + t681;
-    const real t683 = t675 + t682;
-    S_I[20] += t683;
-    const real t684 = t10 * t278;
-    const real t685 = t89 * t276;
-    const real t686 = t684 + t685;
-    const real t687 = e[0] + t686;
-    const real t688 = Rc[0] * t687;
-    const real t689 = t22 * t278;
-    const real t690 = t101 * t276;
-    const real t691 = t689 + t690;
-    const real t692 = e[1] + t691;
-    const real t693 = Rc[1] * t692;
-    const real t694 = t688 + t693;
-    const real t695 = t35 * t278;
-    const real t696 = t114 * t276;
-    const real t697 = t695 + t696;
-    const real t698 = e[2] + t697;
-    const real t699 = Rc[2] * t698;
-    const real t700 = t694 + t699;
-    e_I[0] += t700;
-    const real t701 = Rc[3] * t687;
-    const real t702 = Rc[4] * t692;
-    const real t703 = t701 + t702;
-    const real t704 = Rc[5] * t698;
-    const real t705 = t703 + t704;
-    e_I[1] += t705;
-    const real t706 = Rc[6] * t687;
-    const real t707 = Rc[7] * t692;
-    const real t708 = t706 + t707;
-    const real t709 = Rc[8] * t698;
-    const real t710 = t708 + t709;
-    e_I[2] += t710;
-    const real t711 = t48 * t278;
-    const real t712 = t127 * t276;
-    const real t713 = t711 + t712;
-    const real t714 = e[3] + t713;
-    const real t715 = Rc[0] * t714;
-    const real t716 = t61 * t278;
-    const real t717 = t140 * t276;
-    const real t718 = t716 + t717;
-    const real t719 = e[4] + t718;
-    const real t720 = Rc[1] * t719;
-    const real t721 = t715 + t720;
-    const real t722 = t74 * t278;
-    const real t723 = t153 * t276;
-    const real t724 = t722 + t723;
-    const real t725 = e[5] + t724;
-    const real t726 = Rc[2] * t725;
-    const real t727 = t721 + t726;
-    const real t728 = Rc[6] * r[1];
-    const real t729 = Rc[3] * r[2];
-    const real t730 = t728 - t729;
-    const real t731 = t687 * t730;
-    const real t732 = Rc[7] * r[1];
-    const real t733 = Rc[4] * r[2];
-    const real t734 = t732 - t733;
-    const real t735 = t692 * t734;
-    const real t736 = t731 + t735;
-    const real t737 = Rc[8] * r[1];
-    const real t738 = Rc[5] * r[2];
-    const real t739 = t737 - t738;
-    const real t740 = t698 * t739;
-    const real t741 = t736 + t740;
-    const real t742 = t727 + t741;
-    e_I[3] += t742;
-    const real t743 = Rc[3] * t714;
-    const real t744 = Rc[4] * t719;
-    const real t745 = t743 + t744;
-    const real t746 = Rc[5] * t725;
-    const real t747 = t745 + t746;
-    const real t748 = Rc[0] * r[2];
-    const real t749 = Rc[6] * r[0];
-    const real t750 = t748 - t749;
-    const real t751 = t687 * t750;
-    const real t752 = Rc[1] * r[2];
-    const real t753 = Rc[7] * r[0];
-    const real t754 = t752 - t753;
-    const real t755 = t692 * t754;
-    const real t756 = t751 + t755;
-    const real t757 = Rc[2] * r[2];
-    const real t758 = Rc[8] * r[0];
-    const real t759 = t757 - t758;
-    const real t760 = t698 * t759;
-    const real t761 = t756 + t760;
-    const real t762 = t747 + t761;
-    e_I[4] += t762;
-    const real t763 = Rc[6] * t714;
-    const real t764 = Rc[7] * t719;
-    const real t765 = t763 + t764;
-    const real t766 = Rc[8] * t725;
-    const real t767 = t765 + t766;
-    const real t768 = Rc[3] * r[0];
-    const real t769 = Rc[0] * r[1];
-    const real t770 = t768 - t769;
-    const real t771 = t687 * t770;
-    const real t772 = Rc[4] * r[0];
-    const real t773 = Rc[1] * r[1];
-    const real t774 = t772 - t773;
-    const real t775 = t692 * t774;
-    const real t776 = t771 + t775;
-    const real t777 = Rc[5] * r[0];
-    const real t778 = Rc[2] * r[1];
-    const real t779 = t777 - t778;
-    const real t780 = t698 * t779;
-    const real t781 = t776 + t780;
-    const real t782 = t767 + t781;
-    e_I[5] += t782;
-    return 0;
+  real t10 = H[0] * S[0] + H[2] * S[1] + H[4] * S[2] + H[6] * S[3] + H[8] * S[4] + H[10] * S[5];
+  real t22 = H[0] * S[1] + H[2] * S[6] + H[4] * S[7] + H[6] * S[8] + H[8] * S[9] + H[10] * S[10];
+  real t35 = H[0] * S[2] + H[2] * S[7] + H[4] * S[11] + H[6] * S[12] + H[8] * S[13] + H[10] * S[14];
+  real t48 = H[0] * S[3] + H[2] * S[8] + H[4] * S[12] + H[6] * S[15] + H[8] * S[16] + H[10] * S[17];
+  real t61 = H[0] * S[4] + H[2] * S[9] + H[4] * S[13] + H[6] * S[16] + H[8] * S[18] + H[10] * S[19];
+  real t74 = H[0] * S[5] + H[2] * S[10] + H[4] * S[14] + H[6] * S[17] + H[8] * S[19] + H[10] *
+    S[20];
+  real t77 = J[0] + (H[0] * t10 + H[2] * t22 + H[4] * t35 + H[6] * t48 + H[8] * t61 + H[10] * t74);
+  real t78 = 0.0 < t77;
+  if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t89 = H[1] * S[0] + H[3] * S[1] + H[5] * S[2] + H[7] * S[3] + H[9] * S[4] + H[11] * S[5];
+  real t101 = H[1] * S[1] + H[3] * S[6] + H[5] * S[7] + H[7] * S[8] + H[9] * S[9] + H[11] * S[10];
+  real t114 = H[1] * S[2] + H[3] * S[7] + H[5] * S[11] + H[7] * S[12] + H[9] * S[13] + H[11] *
+    S[14];
+  real t127 = H[1] * S[3] + H[3] * S[8] + H[5] * S[12] + H[7] * S[15] + H[9] * S[16] + H[11] *
+    S[17];
+  real t140 = H[1] * S[4] + H[3] * S[9] + H[5] * S[13] + H[7] * S[16] + H[9] * S[18] + H[11] *
+    S[19];
+  real t153 = H[1] * S[5] + H[3] * S[10] + H[5] * S[14] + H[7] * S[17] + H[9] * S[19] + H[11] *
+    S[20];
+  real t156 = J[1] + (H[1] * t89 + H[3] * t101 + H[5] * t114 + H[7] * t127 + H[9] * t140 + H[11] *
+    t153);
+  real t168 = H[0] * t89 + H[2] * t101 + H[4] * t114 + H[6] * t127 + H[8] * t140 + H[10] * t153;
+  real t169 = 1.0 / t77;
+  real t170 = t168 * t169;
+  real t172 = t156 - t168 * t170;
+  real t173 = t156 * ((real)1 / (real)10000000000000) < t172;
+  if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t78 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t173 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t182 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t183 = (0.0 < floor_[0]) ? floor_[0] : t182;
+  real t193 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t194 = (0.0 < floor_[1]) ? floor_[1] : t193;
+  if (!(((H[4] * H[4] + (H[0] * H[0] + H[2] * H[2])) * t183 + (H[10] * H[10] + (H[6] * H[6] + H[8] * H[8])) * t194 < t77))) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+  if (!((t183 * (H[5] * H[5] + (H[1] * H[1] + H[3] * H[3])) + t194 * (H[11] * H[11] + (H[7] * H[7] + H[9] * H[9])) < t156))) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+  real t213 = 1.0 / t172;
+  real t216 = t213 * (t89 - t10 * t170);
+  real t218 = t10 * t169 - t170 * t216;
+  G[0] = t218;
+  real t222 = t213 * (t101 - t22 * t170);
+  real t224 = t22 * t169 - t170 * t222;
+  G[1] = t224;
+  real t228 = t213 * (t114 - t35 * t170);
+  real t230 = t35 * t169 - t170 * t228;
+  G[2] = t230;
+  real t234 = t213 * (t127 - t48 * t170);
+  real t236 = t48 * t169 - t170 * t234;
+  G[3] = t236;
+  real t240 = t213 * (t140 - t61 * t170);
+  real t242 = t61 * t169 - t170 * t240;
+  G[4] = t242;
+  real t246 = t213 * (t153 - t74 * t170);
+  real t248 = t74 * t169 - t170 * t246;
+  G[5] = t248;
+  G[6] = t216;
+  G[7] = t222;
+  G[8] = t228;
+  G[9] = t234;
+  G[10] = t240;
+  G[11] = t246;
+  real t260 = tau[0] - (H[0] * e[0] + H[2] * e[1] + H[4] * e[2] + H[6] * e[3] + H[8] * e[4] + H[10]
+    * e[5]);
+  real t276 = t213 * (tau[1] - (H[1] * e[0] + H[3] * e[1] + H[5] * e[2] + H[7] * e[3] + H[9] * e[4]
+    + H[11] * e[5]) - t170 * t260);
+  real t278 = t169 * t260 - t170 * t276;
+  g[0] = t278;
+  g[1] = t276;
+  real t282 = S[0] - (t10 * t218 + t89 * t216);
+  real t287 = S[1] - (t10 * t224 + t89 * t222);
+  real t293 = S[2] - (t10 * t230 + t89 * t228);
+  real t295 = Rc[0] * t282 + Rc[1] * t287 + Rc[2] * t293;
+  real t301 = S[6] - (t22 * t224 + t101 * t222);
+  real t307 = S[7] - (t22 * t230 + t101 * t228);
+  real t309 = Rc[0] * t287 + Rc[1] * t301 + Rc[2] * t307;
+  real t318 = S[11] - (t35 * t230 + t114 * t228);
+  real t320 = Rc[0] * t293 + Rc[1] * t307 + Rc[2] * t318;
+  real t322 = Rc[0] * t295 + Rc[1] * t309 + Rc[2] * t320;
+  S_I[0] += t322;
+  real t327 = Rc[3] * t295 + Rc[4] * t309 + Rc[5] * t320;
+  S_I[1] += t327;
+  real t332 = Rc[6] * t295 + Rc[7] * t309 + Rc[8] * t320;
+  S_I[2] += t332;
+  real t336 = S[3] - (t10 * t236 + t89 * t234);
+  real t341 = S[8] - (t22 * t236 + t101 * t234);
+  real t347 = S[12] - (t35 * t236 + t114 * t234);
+  real t349 = Rc[0] * t336 + Rc[1] * t341 + Rc[2] * t347;
+  real t354 = S[4] - (t10 * t242 + t89 * t240);
+  real t359 = S[9] - (t22 * t242 + t101 * t240);
+  real t365 = S[13] - (t35 * t242 + t114 * t240);
+  real t367 = Rc[0] * t354 + Rc[1] * t359 + Rc[2] * t365;
+  real t373 = S[5] - (t10 * t248 + t89 * t246);
+  real t378 = S[10] - (t22 * t248 + t101 * t246);
+  real t384 = S[14] - (t35 * t248 + t114 * t246);
+  real t386 = Rc[0] * t373 + Rc[1] * t378 + Rc[2] * t384;
+  real t388 = Rc[0] * t349 + Rc[1] * t367 + Rc[2] * t386;
+  real t389 = r[1] * t332;
+  real t390 = r[2] * t327;
+  S_I[3] += t388 + (t389 - t390);
+  real t397 = Rc[3] * t349 + Rc[4] * t367 + Rc[5] * t386;
+  real t401 = t397 + (r[2] * t322 - r[0] * t332);
+  S_I[4] += t401;
+  real t406 = Rc[6] * t349 + Rc[7] * t367 + Rc[8] * t386;
+  real t410 = t406 + (r[0] * t327 - r[1] * t322);
+  S_I[5] += t410;
+  real t415 = Rc[3] * t282 + Rc[4] * t287 + Rc[5] * t293;
+  real t421 = Rc[3] * t287 + Rc[4] * t301 + Rc[5] * t307;
+  real t428 = Rc[3] * t293 + Rc[4] * t307 + Rc[5] * t318;
+  real t430 = Rc[3] * t415 + Rc[4] * t421 + Rc[5] * t428;
+  S_I[6] += t430;
+  real t435 = Rc[6] * t415 + Rc[7] * t421 + Rc[8] * t428;
+  S_I[7] += t435;
+  real t440 = Rc[3] * t336 + Rc[4] * t341 + Rc[5] * t347;
+  real t446 = Rc[3] * t354 + Rc[4] * t359 + Rc[5] * t365;
+  real t453 = Rc[3] * t373 + Rc[4] * t378 + Rc[5] * t384;
+  real t455 = Rc[0] * t440 + Rc[1] * t446 + Rc[2] * t453;
+  real t459 = t455 + (r[1] * t435 - r[2] * t430);
+  S_I[8] += t459;
+  real t464 = Rc[3] * t440 + Rc[4] * t446 + Rc[5] * t453;
+  real t465 = r[0] * t435;
+  real t467 = t464 + (t390 - t465);
+  S_I[9] += t467;
+  real t472 = Rc[6] * t440 + Rc[7] * t446 + Rc[8] * t453;
+  real t476 = t472 + (r[0] * t430 - r[1] * t327);
+  S_I[10] += t476;
+  real t496 = Rc[6] * (Rc[6] * t282 + Rc[7] * t287 + Rc[8] * t293) + Rc[7] * (Rc[6] * t287 + Rc[7] *
+    t301 + Rc[8] * t307) + Rc[8] * (Rc[6] * t293 + Rc[7] * t307 + Rc[8] * t318);
+  S_I[11] += t496;
+  real t501 = Rc[6] * t336 + Rc[7] * t341 + Rc[8] * t347;
+  real t507 = Rc[6] * t354 + Rc[7] * t359 + Rc[8] * t365;
+  real t514 = Rc[6] * t373 + Rc[7] * t378 + Rc[8] * t384;
+  real t516 = Rc[0] * t501 + Rc[1] * t507 + Rc[2] * t514;
+  real t520 = t516 + (r[1] * t496 - r[2] * t435);
+  S_I[12] += t520;
+  real t525 = Rc[3] * t501 + Rc[4] * t507 + Rc[5] * t514;
+  real t529 = t525 + (r[2] * t332 - r[0] * t496);
+  S_I[13] += t529;
+  real t536 = Rc[6] * t501 + Rc[7] * t507 + Rc[8] * t514 + (t465 - t389);
+  S_I[14] += t536;
+  real t540 = S[15] - (t48 * t236 + t127 * t234);
+  real t545 = S[16] - (t48 * t242 + t127 * t240);
+  real t551 = S[17] - (t48 * t248 + t127 * t246);
+  real t553 = Rc[0] * t540 + Rc[1] * t545 + Rc[2] * t551;
+  real t559 = S[18] - (t61 * t242 + t140 * t240);
+  real t565 = S[19] - (t61 * t248 + t140 * t246);
+  real t567 = Rc[0] * t545 + Rc[1] * t559 + Rc[2] * t565;
+  real t576 = S[20] - (t74 * t248 + t153 * t246);
+  real t578 = Rc[0] * t551 + Rc[1] * t565 + Rc[2] * t576;
+  S_I[15] += Rc[0] * t553 + Rc[1] * t567 + Rc[2] * t578 + (r[1] * t520 - r[2] * t459 + (r[1] * t516
+    - r[2] * t455));
+  S_I[16] += Rc[3] * t553 + Rc[4] * t567 + Rc[5] * t578 + (r[1] * t529 - r[2] * t467 + (r[2] * t388
+    - r[0] * t516));
+  S_I[17] += Rc[6] * t553 + Rc[7] * t567 + Rc[8] * t578 + (r[1] * t536 - r[2] * t476 + (r[0] * t455
+    - r[1] * t388));
+  real t619 = Rc[3] * t540 + Rc[4] * t545 + Rc[5] * t551;
+  real t625 = Rc[3] * t545 + Rc[4] * t559 + Rc[5] * t565;
+  real t632 = Rc[3] * t551 + Rc[4] * t565 + Rc[5] * t576;
+  S_I[18] += Rc[3] * t619 + Rc[4] * t625 + Rc[5] * t632 + (r[2] * t401 - r[0] * t529 + (r[2] * t397
+    - r[0] * t525));
+  S_I[19] += Rc[6] * t619 + Rc[7] * t625 + Rc[8] * t632 + (r[2] * t410 - r[0] * t536 + (r[0] * t464
+    - r[1] * t397));
+  S_I[20] += Rc[6] * (Rc[6] * t540 + Rc[7] * t545 + Rc[8] * t551) + Rc[7] * (Rc[6] * t545 + Rc[7] *
+    t559 + Rc[8] * t565) + Rc[8] * (Rc[6] * t551 + Rc[7] * t565 + Rc[8] * t576) + (r[0] * t476 -
+    r[1] * t410 + (r[0] * t472 - r[1] * t406));
+  real t687 = e[0] + (t10 * t278 + t89 * t276);
+  real t692 = e[1] + (t22 * t278 + t101 * t276);
+  real t698 = e[2] + (t35 * t278 + t114 * t276);
+  e_I[0] += Rc[0] * t687 + Rc[1] * t692 + Rc[2] * t698;
+  e_I[1] += Rc[3] * t687 + Rc[4] * t692 + Rc[5] * t698;
+  e_I[2] += Rc[6] * t687 + Rc[7] * t692 + Rc[8] * t698;
+  real t714 = e[3] + (t48 * t278 + t127 * t276);
+  real t719 = e[4] + (t61 * t278 + t140 * t276);
+  real t725 = e[5] + (t74 * t278 + t153 * t276);
+  e_I[3] += Rc[0] * t714 + Rc[1] * t719 + Rc[2] * t725 + (t687 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t692 * (Rc[7] * r[1] - Rc[4] * r[2]) + t698 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t714 + Rc[4] * t719 + Rc[5] * t725 + (t687 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t692 * (Rc[1] * r[2] - Rc[7] * r[0]) + t698 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t714 + Rc[7] * t719 + Rc[8] * t725 + (t687 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t692 * (Rc[4] * r[0] - Rc[1] * r[1]) + t698 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_condense_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic2_condense_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic2_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 2 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the free coordinates
@@ -1300,179 +317,46 @@ static const mstmm_guard mstmm_sweep_generic2_condense_guards[] = {
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic2_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic2_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = H[0] * t53;
-    const real t67 = H[1] * t65;
-    const real t68 = t66 + t67;
-    const real t69 = t16 + t68;
-    delta[0] = t69;
-    const real t70 = H[2] * t53;
-    const real t71 = H[3] * t65;
-    const real t72 = t70 + t71;
-    const real t73 = t22 + t72;
-    delta[1] = t73;
-    const real t74 = H[4] * t53;
-    const real t75 = H[5] * t65;
-    const real t76 = t74 + t75;
-    const real t77 = t29 + t76;
-    delta[2] = t77;
-    const real t78 = H[6] * t53;
-    const real t79 = H[7] * t65;
-    const real t80 = t78 + t79;
-    const real t81 = t36 + t80;
-    delta[3] = t81;
-    const real t82 = H[8] * t53;
-    const real t83 = H[9] * t65;
-    const real t84 = t82 + t83;
-    const real t85 = t43 + t84;
-    delta[4] = t85;
-    const real t86 = H[10] * t53;
-    const real t87 = H[11] * t65;
-    const real t88 = t86 + t87;
-    const real t89 = t50 + t88;
-    delta[5] = t89;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  delta[0] = t16 + (H[0] * t53 + H[1] * t65);
+  delta[1] = t22 + (H[2] * t53 + H[3] * t65);
+  delta[2] = t29 + (H[4] * t53 + H[5] * t65);
+  delta[3] = t36 + (H[6] * t53 + H[7] * t65);
+  delta[4] = t43 + (H[8] * t53 + H[9] * t65);
+  delta[5] = t50 + (H[10] * t53 + H[11] * t65);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_recover_outputs[] = {
-    {"udot", 2, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 2 speeds
  * in  H[6][2] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[2] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic2_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic2_effort(in_t H, in_t f, out_t tau)
 {
-    const real t0 = H[0] * f[0];
-    const real t1 = H[2] * f[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * f[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * f[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * f[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * f[5];
-    const real t10 = t8 + t9;
-    tau[0] = t10;
-    const real t11 = H[1] * f[0];
-    const real t12 = H[3] * f[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[5] * f[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[7] * f[3];
-    const real t17 = t15 + t16;
-    const real t18 = H[9] * f[4];
-    const real t19 = t17 + t18;
-    const real t20 = H[11] * f[5];
-    const real t21 = t19 + t20;
-    tau[1] = t21;
-    return 0;
+  tau[0] = H[0] * f[0] + H[2] * f[1] + H[4] * f[2] + H[6] * f[3] + H[8] * f[4] + H[10] * f[5];
+  tau[1] = H[1] * f[0] + H[3] * f[1] + H[5] * f[2] + H[7] * f[3] + H[9] * f[4] + H[11] * f[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_effort_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_effort_outputs[] = {
-    {"tau", 2, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 2 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1482,160 +366,36 @@ static const mstmm_port mstmm_sweep_generic2_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[2] accelerations of the coordinates
  */
-int mstmm_sweep_generic2_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic2_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    const real t0 = H[0] * H[0];
-    const real t1 = H[2] * H[2];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * H[4];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * H[6];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * H[8];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * H[10];
-    const real t10 = t8 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[3] * H[3];
-    const real t14 = t12 + t13;
-    const real t15 = H[5] * H[5];
-    const real t16 = t14 + t15;
-    const real t17 = H[7] * H[7];
-    const real t18 = t16 + t17;
-    const real t19 = H[9] * H[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[11] * H[11];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[0] * H[1];
-    const real t25 = H[2] * H[3];
-    const real t26 = t24 + t25;
-    const real t27 = H[4] * H[5];
-    const real t28 = t26 + t27;
-    const real t29 = H[6] * H[7];
-    const real t30 = t28 + t29;
-    const real t31 = H[8] * H[9];
-    const real t32 = t30 + t31;
-    const real t33 = H[10] * H[11];
-    const real t34 = t32 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t40 = r[2] * delta_I[4];
-    const real t41 = r[1] * delta_I[5];
-    const real t42 = t40 - t41;
-    const real t43 = delta_I[0] + t42;
-    const real t44 = Rc[0] * t43;
-    const real t45 = r[0] * delta_I[5];
-    const real t46 = r[2] * delta_I[3];
-    const real t47 = t45 - t46;
-    const real t48 = delta_I[1] + t47;
-    const real t49 = Rc[3] * t48;
-    const real t50 = t44 + t49;
-    const real t51 = r[1] * delta_I[3];
-    const real t52 = r[0] * delta_I[4];
-    const real t53 = t51 - t52;
-    const real t54 = delta_I[2] + t53;
-    const real t55 = Rc[6] * t54;
-    const real t56 = t50 + t55;
-    const real t57 = delta[0] - t56;
-    const real t58 = H[0] * t57;
-    const real t59 = Rc[1] * t43;
-    const real t60 = Rc[4] * t48;
-    const real t61 = t59 + t60;
-    const real t62 = Rc[7] * t54;
-    const real t63 = t61 + t62;
-    const real t64 = delta[1] - t63;
-    const real t65 = H[2] * t64;
-    const real t66 = t58 + t65;
-    const real t67 = Rc[2] * t43;
-    const real t68 = Rc[5] * t48;
-    const real t69 = t67 + t68;
-    const real t70 = Rc[8] * t54;
-    const real t71 = t69 + t70;
-    const real t72 = delta[2] - t71;
-    const real t73 = H[4] * t72;
-    const real t74 = t66 + t73;
-    const real t75 = Rc[0] * delta_I[3];
-    const real t76 = Rc[3] * delta_I[4];
-    const real t77 = t75 + t76;
-    const real t78 = Rc[6] * delta_I[5];
-    const real t79 = t77 + t78;
-    const real t80 = delta[3] - t79;
-    const real t81 = H[6] * t80;
-    const real t82 = t74 + t81;
-    const real t83 = Rc[1] * delta_I[3];
-    const real t84 = Rc[4] * delta_I[4];
-    const real t85 = t83 + t84;
-    const real t86 = Rc[7] * delta_I[5];
-    const real t87 = t85 + t86;
-    const real t88 = delta[4] - t87;
-    const real t89 = H[8] * t88;
-    const real t90 = t82 + t89;
-    const real t91 = Rc[2] * delta_I[3];
-    const real t92 = Rc[5] * delta_I[4];
-    const real t93 = t91 + t92;
-    const real t94 = Rc[8] * delta_I[5];
-    const real t95 = t93 + t94;
-    const real t96 = delta[5] - t95;
-    const real t97 = H[10] * t96;
-    const real t98 = t90 + t97;
-    const real t99 = t98 * t35;
-    const real t100 = 1.0 / t38;
-    const real t101 = H[1] * t57;
-    const real t102 = H[3] * t64;
-    const real t103 = t101 + t102;
-    const real t104 = H[5] * t72;
-    const real t105 = t103 + t104;
-    const real t106 = H[7] * t80;
-    const real t107 = t105 + t106;
-    const real t108 = H[9] * t88;
-    const real t109 = t107 + t108;
-    const real t110 = H[11] * t96;
-    const real t111 = t109 + t110;
-    const real t112 = t98 * t36;
-    const real t113 = t111 - t112;
-    const real t114 = t100 * t113;
-    const real t115 = t36 * t114;
-    const real t116 = t99 - t115;
-    udot[0] = t116;
-    udot[1] = t114;
-    return 0;
+  real t10 = H[0] * H[0] + H[2] * H[2] + H[4] * H[4] + H[6] * H[6] + H[8] * H[8] + H[10] * H[10];
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[3] * H[3] + H[5] * H[5] + H[7] * H[7] + H[9] * H[9] + H[11] * H[11];
+  real t34 = H[0] * H[1] + H[2] * H[3] + H[4] * H[5] + H[6] * H[7] + H[8] * H[9] + H[10] * H[11];
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t43 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t48 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t54 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t57 = delta[0] - (Rc[0] * t43 + Rc[3] * t48 + Rc[6] * t54);
+  real t64 = delta[1] - (Rc[1] * t43 + Rc[4] * t48 + Rc[7] * t54);
+  real t72 = delta[2] - (Rc[2] * t43 + Rc[5] * t48 + Rc[8] * t54);
+  real t80 = delta[3] - (Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5]);
+  real t88 = delta[4] - (Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5]);
+  real t96 = delta[5] - (Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5]);
+  real t98 = H[0] * t57 + H[2] * t64 + H[4] * t72 + H[6] * t80 + H[8] * t88 + H[10] * t96;
+  real t114 = 1.0 / t38 * (H[1] * t57 + H[3] * t64 + H[5] * t72 + H[7] * t80 + H[9] * t88 + H[11] *
+    t96 - t98 * t36);
+  udot[0] = t98 * t35 - t36 * t114;
+  udot[1] = t114;
+  return 0;
 }
 
-static int mstmm_sweep_generic2_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_project_outputs[] = {
-    {"udot", 2, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic2_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 2 free speeds, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the free coordinates
@@ -1647,746 +407,181 @@ static const mstmm_guard mstmm_sweep_generic2_project_guards[] = {
  * out G[2][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic2_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic2_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[2] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[2] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[4] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[6] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[8] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[10] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[2] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[2] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[4] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[6] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[8] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[10] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[4] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[2] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[4] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[6] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[8] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[10] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[6] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[2] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[4] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[6] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[8] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[10] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[8] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[2] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[4] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[6] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[8] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[10] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[10] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] - W[0];
-    const real t78 = t76 + t77;
-    const real t79 = 0.0 < t78;
-    if (!(t79 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t80 = H[1] * S[0];
-    const real t81 = H[3] * S[1];
-    const real t82 = t80 + t81;
-    const real t83 = H[5] * S[2];
-    const real t84 = t82 + t83;
-    const real t85 = H[7] * S[3];
-    const real t86 = t84 + t85;
-    const real t87 = H[9] * S[4];
-    const real t88 = t86 + t87;
-    const real t89 = H[11] * S[5];
-    const real t90 = t88 + t89;
-    const real t91 = H[1] * t90;
-    const real t92 = H[1] * S[1];
-    const real t93 = H[3] * S[6];
-    const real t94 = t92 + t93;
-    const real t95 = H[5] * S[7];
-    const real t96 = t94 + t95;
-    const real t97 = H[7] * S[8];
-    const real t98 = t96 + t97;
-    const real t99 = H[9] * S[9];
-    const real t100 = t98 + t99;
-    const real t101 = H[11] * S[10];
-    const real t102 = t100 + t101;
-    const real t103 = H[3] * t102;
-    const real t104 = t91 + t103;
-    const real t105 = H[1] * S[2];
-    const real t106 = H[3] * S[7];
-    const real t107 = t105 + t106;
-    const real t108 = H[5] * S[11];
-    const real t109 = t107 + t108;
-    const real t110 = H[7] * S[12];
-    const real t111 = t109 + t110;
-    const real t112 = H[9] * S[13];
-    const real t113 = t111 + t112;
-    const real t114 = H[11] * S[14];
-    const real t115 = t113 + t114;
-    const real t116 = H[5] * t115;
-    const real t117 = t104 + t116;
-    const real t118 = H[1] * S[3];
-    const real t119 = H[3] * S[8];
-    const real t120 = t118 + t119;
-    const real t121 = H[5] * S[12];
-    const real t122 = t120 + t121;
-    const real t123 = H[7] * S[15];
-    const real t124 = t122 + t123;
-    const real t125 = H[9] * S[16];
-    const real t126 = t124 + t125;
-    const real t127 = H[11] * S[17];
-    const real t128 = t126 + t127;
-    const real t129 = H[7] * t128;
-    const real t130 = t117 + t129;
-    const real t131 = H[1] * S[4];
-    const real t132 = H[3] * S[9];
-    const real t133 = t131 + t132;
-    const real t134 = H[5] * S[13];
-    const real t135 = t133 + t134;
-    const real t136 = H[7] * S[16];
-    const real t137 = t135 + t136;
-    const real t138 = H[9] * S[18];
-    const real t139 = t137 + t138;
-    const real t140 = H[11] * S[19];
-    const real t141 = t139 + t140;
-    const real t142 = H[9] * t141;
-    const real t143 = t130 + t142;
-    const real t144 = H[1] * S[5];
-    const real t145 = H[3] * S[10];
-    const real t146 = t144 + t145;
-    const real t147 = H[5] * S[14];
-    const real t148 = t146 + t147;
-    const real t149 = H[7] * S[17];
-    const real t150 = t148 + t149;
-    const real t151 = H[9] * S[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[11] * S[20];
-    const real t154 = t152 + t153;
-    const real t155 = H[11] * t154;
-    const real t156 = t143 + t155;
-    const real t157 = J[1] - W[3];
-    const real t158 = t156 + t157;
-    const real t159 = t158 * ((real)1 / (real)10000000000000);
-    const real t160 = H[0] * t90;
-    const real t161 = H[2] * t102;
-    const real t162 = t160 + t161;
-    const real t163 = H[4] * t115;
-    const real t164 = t162 + t163;
-    const real t165 = H[6] * t128;
-    const real t166 = t164 + t165;
-    const real t167 = H[8] * t141;
-    const real t168 = t166 + t167;
-    const real t169 = H[10] * t154;
-    const real t170 = t168 + t169;
-    const real t171 = W[1] + W[2];
-    const real t172 = 0.5 * t171;
-    const real t173 = t170 - t172;
-    const real t174 = 1.0 / t78;
-    const real t175 = t173 * t174;
-    const real t176 = t173 * t175;
-    const real t177 = t158 - t176;
-    const real t178 = t159 < t177;
-    if (!(t178 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t179 = H[4] * H[4];
-    const real t180 = H[0] * H[0];
-    const real t181 = H[2] * H[2];
-    const real t182 = t180 + t181;
-    const real t183 = t179 + t182;
-    const real t184 = 0.0 < floor_[0];
-    const real t185 = S[0] + S[6];
-    const real t186 = S[11] + t185;
-    const real t187 = ((real)1 / (real)300000000000000) * t186;
-    const real t188 = t184 != 0 ? floor_[0] : t187;
-    const real t189 = t183 * t188;
-    const real t190 = H[10] * H[10];
-    const real t191 = H[6] * H[6];
-    const real t192 = H[8] * H[8];
-    const real t193 = t191 + t192;
-    const real t194 = t190 + t193;
-    const real t195 = 0.0 < floor_[1];
-    const real t196 = S[15] + S[18];
-    const real t197 = S[20] + t196;
-    const real t198 = ((real)1 / (real)300000000000000) * t197;
-    const real t199 = t195 != 0 ? floor_[1] : t198;
-    const real t200 = t194 * t199;
-    const real t201 = t189 + t200;
-    const real t202 = t201 < t78;
-    if (!(t202 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
-    const real t203 = H[5] * H[5];
-    const real t204 = H[1] * H[1];
-    const real t205 = H[3] * H[3];
-    const real t206 = t204 + t205;
-    const real t207 = t203 + t206;
-    const real t208 = t188 * t207;
-    const real t209 = H[11] * H[11];
-    const real t210 = H[7] * H[7];
-    const real t211 = H[9] * H[9];
-    const real t212 = t210 + t211;
-    const real t213 = t209 + t212;
-    const real t214 = t199 * t213;
-    const real t215 = t208 + t214;
-    const real t216 = t215 < t158;
-    if (!(t216 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
-    F[0] = t174;
-    F[1] = 0.0;
-    F[2] = t175;
-    const real t217 = 1.0 / t177;
-    F[3] = t217;
-    const real t218 = t10 * t174;
-    const real t219 = t10 * t175;
-    const real t220 = t90 - t219;
-    const real t221 = t217 * t220;
-    const real t222 = t175 * t221;
-    const real t223 = t218 - t222;
-    G[0] = t223;
-    const real t224 = t22 * t174;
-    const real t225 = t22 * t175;
-    const real t226 = t102 - t225;
-    const real t227 = t217 * t226;
-    const real t228 = t175 * t227;
-    const real t229 = t224 - t228;
-    G[1] = t229;
-    const real t230 = t35 * t174;
-    const real t231 = t35 * t175;
-    const real t232 = t115 - t231;
-    const real t233 = t217 * t232;
-    const real t234 = t175 * t233;
-    const real t235 = t230 - t234;
-    G[2] = t235;
-    const real t236 = t48 * t174;
-    const real t237 = t48 * t175;
-    const real t238 = t128 - t237;
-    const real t239 = t217 * t238;
-    const real t240 = t175 * t239;
-    const real t241 = t236 - t240;
-    G[3] = t241;
-    const real t242 = t61 * t174;
-    const real t243 = t61 * t175;
-    const real t244 = t141 - t243;
-    const real t245 = t217 * t244;
-    const real t246 = t175 * t245;
-    const real t247 = t242 - t246;
-    G[4] = t247;
-    const real t248 = t74 * t174;
-    const real t249 = t74 * t175;
-    const real t250 = t154 - t249;
-    const real t251 = t217 * t250;
-    const real t252 = t175 * t251;
-    const real t253 = t248 - t252;
-    G[5] = t253;
-    G[6] = t221;
-    G[7] = t227;
-    G[8] = t233;
-    G[9] = t239;
-    G[10] = t245;
-    G[11] = t251;
-    const real t254 = t10 * t218;
-    const real t255 = t220 * t221;
-    const real t256 = t254 + t255;
-    const real t257 = S[0] - t256;
-    const real t258 = Rc[0] * t257;
-    const real t259 = t10 * t224;
-    const real t260 = t220 * t227;
-    const real t261 = t259 + t260;
-    const real t262 = S[1] - t261;
-    const real t263 = Rc[1] * t262;
-    const real t264 = t258 + t263;
-    const real t265 = t10 * t230;
-    const real t266 = t220 * t233;
-    const real t267 = t265 + t266;
-    const real t268 = S[2] - t267;
-    const real t269 = Rc[2] * t268;
-    const real t270 = t264 + t269;
-    const real t271 = Rc[0] * t270;
-    const real t272 = Rc[0] * t262;
-    const real t273 = t22 * t224;
-    const real t274 = t226 * t227;
-    const real t275 = t273 + t274;
-    const real t276 = S[6] - t275;
-    const real t277 = Rc[1] * t276;
-    const real t278 = t272 + t277;
-    const real t279 = t22 * t230;
-    const real t280 = t226 * t233;
-    const real t281 = t279 + t280;
-    const real t282 = S[7] - t281;
-    const real t283 = Rc[2] * t282;
-    const real t284 = t278 + t283;
-    const real t285 = Rc[1] * t284;
-    const real t286 = t271 + t285;
-    const real t287 = Rc[0] * t268;
-    const real t288 = Rc[1] * t282;
-    const real t289 = t287 + t288;
-    const real t290 = t35 * t230;
-    const real t291 = t232 * t233;
-    const real t292 = t290 + t291;
-    const real t293 = S[11] - t292;
-    const real t294 = Rc[2] * t293;
-    const real t295 = t289 + t294;
-    const real t296 = Rc[2] * t295;
-    const real t297 = t286 + t296;
-    S_I[0] += t297;
-    const real t298 = Rc[3] * t270;
-    const real t299 = Rc[4] * t284;
-    const real t300 = t298 + t299;
-    const real t301 = Rc[5] * t295;
-    const real t302 = t300 + t301;
-    S_I[1] += t302;
-    const real t303 = Rc[6] * t270;
-    const real t304 = Rc[7] * t284;
-    const real t305 = t303 + t304;
-    const real t306 = Rc[8] * t295;
-    const real t307 = t305 + t306;
-    S_I[2] += t307;
-    const real t308 = t10 * t236;
-    const real t309 = t220 * t239;
-    const real t310 = t308 + t309;
-    const real t311 = S[3] - t310;
-    const real t312 = Rc[0] * t311;
-    const real t313 = t22 * t236;
-    const real t314 = t226 * t239;
-    const real t315 = t313 + t314;
-    const real t316 = S[8] - t315;
-    const real t317 = Rc[1] * t316;
-    const real t318 = t312 + t317;
-    const real t319 = t35 * t236;
-    const real t320 = t232 * t239;
-    const real t321 = t319 + t320;
-    const real t322 = S[12] - t321;
-    const real t323 = Rc[2] * t322;
-    const real t324 = t318 + t323;
-    const real t325 = Rc[0] * t324;
-    const real t326 = t10 * t242;
-    const real t327 = t220 * t245;
-    const real t328 = t326 + t327;
-    const real t329 = S[4] - t328;
-    const real t330 = Rc[0] * t329;
-    const real t331 = t22 * t242;
-    const real t332 = t226 * t245;
-    const real t333 = t331 + t332;
-    const real t334 = S[9] - t333;
-    const real t335 = Rc[1] * t334;
-    const real t336 = t330 + t335;
-    const real t337 = t35 * t242;
-    const real t338 = t232 * t245;
-    const real t339 = t337 + t338;
-    const real t340 = S[13] - t339;
-    const real t341 = Rc[2] * t340;
-    const real t342 = t336 + t341;
-    const real t343 = Rc[1] * t342;
-    const real t344 = t325 + t343;
-    const real t345 = t10 * t248;
-    const real t346 = t220 * t251;
-    const real t347 = t345 + t346;
-    const real t348 = S[5] - t347;
-    const real t349 = Rc[0] * t348;
-    const real t350 = t22 * t248;
-    const real t351 = t226 * t251;
-    const real t352 = t350 + t351;
-    const real t353 = S[10] - t352;
-    const real t354 = Rc[1] * t353;
-    const real t355 = t349 + t354;
-    const real t356 = t35 * t248;
-    const real t357 = t232 * t251;
-    const real t358 = t356 + t357;
-    const real t359 = S[14] - t358;
-    const real t360 = Rc[2] * t359;
-    const real t361 = t355 + t360;
-    const real t362 = Rc[2] * t361;
-    const real t363 = t344 + t362;
-    const real t364 = r[1] * t307;
-    const real t365 = r[2] * t302;
-    const real t366 = t364 - t365;
-    const real t367 = t363 + t366;
-    S_I[3] += t367;
-    const real t368 = Rc[3] * t324;
-    const real t369 = Rc[4] * t342;
-    const real t370 = t368 + t369;
-    const real t371 = Rc[5] * t361;
-    const real t372 = t370 + t371;
-    const real t373 = r[2] * t297;
-    const real t374 = r[0] * t307;
-    const real t375 = t373 - t374;
-    const real t376 = t372 + t375;
-    S_I[4] += t376;
-    const real t377 = Rc[6] * t324;
-    const real t378 = Rc[7] * t342;
-    const real t379 = t377 + t378;
-    const real t380 = Rc[8] * t361;
-    const real t381 = t379 + t380;
-    const real t382 = r[0] * t302;
-    const real t383 = r[1] * t297;
-    const real t384 = t382 - t383;
-    const real t385 = t381 + t384;
-    S_I[5] += t385;
-    const real t386 = Rc[3] * t257;
-    const real t387 = Rc[4] * t262;
-    const real t388 = t386 + t387;
-    const real t389 = Rc[5] * t268;
-    const real t390 = t388 + t389;
-    const real t391 = Rc[3] * t390;
-    const real t392 = Rc[3] * t262;
-    const real t393 = Rc[4] * t276;
-    const real t394 = t392 + t393;
-    const real t395 = Rc[5] * t282;
-    const real t396 = t394 + t395;
-    const real t397 = Rc[4] * t396;
-    const real t398 = t391 + t397;
-    const real t399 = Rc[3] * t268;
-    const real t400 = Rc[4] * t282;
-    const real t401 = t399 + t400;
-    const real t402 = Rc[5] * t293;
-    const real t403 = t401 + t402;
-    const real t404 = Rc[5] * t403;
-    const real t405 = t398 + t404;
-    S_I[6] += t405;
-    const real t406 = Rc[6] * t390;
-    const real t407 = Rc[7] * t396;
-    const real t408 = t406 + t407;
-    const real t409 = Rc[8] * t403;
-    const real t410 = t408 + t409;
-    S_I[7] += t410;
-    const real t411 = Rc[3] * t311;
-    const real t412 = Rc[4] * t316;
-    const real t413 = t411 + t412;
-    const real t414 = Rc[5] * t322;
-    const real t415 = t413 + t414;
-    const real t416 = Rc[0] * t415;
-    const real t417 = Rc[3] * t329;
-    const real t418 = Rc[4] * t334;
-    const real t419 = t417 + t418;
-    const real t420 = Rc[5] * t340;
-    const real t421 = t419 + t420;
-    const real t422 = Rc[1] * t421;
-    const real t423 = t416 + t422;
-    const real t424 = Rc[3] * t348;
-    const real t425 = Rc[4] * t353;
-    const real t426 = t424 + t425;
-    const real t427 = Rc[5] * t359;
-    const real t428 = t426 + t427;
-    const real t429 = Rc[2] * t428;
-    const real t430 = t423 + t429;
-    const real t431 = r[1] * t410;
-    const real t432 = r[2] * t405;
-    const real t433 = t431 - t432;
-    const real t434 = t430 + t433;
-    S_I[8] += t434;
-    const real t435 = Rc[3] * t415;
-    const real t436 = Rc[4] * t421;
-    const real t437 = t435 + t436;
-    const real t438 = Rc[5] * t428;
-    const real t439 = t437 + t438;
-    const real t440 = r[0] * t410;
-    const real t441 = t365 - t440;
-    const real t442 = t439 + t441;
-    S_I[9] += t442;
-    const real t443 = Rc[6] * t415;
-    const real t444 = Rc[7] * t421;
-    const real t445 = t443 + t444;
-    const real t446 = Rc[8] * t428;
-    const real t447 = t445 + t446;
-    const real t448 = r[0] * t405;
-    const real t449 = r[1] * t302;
-    const real t450 = t448 - t449;
-    const real t451 = t447 + t450;
-    S_I[10] += t451;
-    const real t452 = Rc[6] * t257;
-    const real t453 = Rc[7] * t262;
-    const real t454 = t452 + t453;
-    const real t455 = Rc[8] * t268;
-    const real t456 = t454 + t455;
-    const real t457 = Rc[6] * t456;
-    const real t458 = Rc[6] * t262;
-    const real t459 = Rc[7] * t276;
-    const real t460 = t458 + t459;
-    const real t461 = Rc[8] * t282;
-    const real t462 = t460 + t461;
-    const real t463 = Rc[7] * t462;
-    const real t464 = t457 + t463;
-    const real t465 = Rc[6] * t268;
-    const real t466 = Rc[7] * t282;
-    const real t467 = t465 + t466;
-    const real t468 = Rc[8] * t293;
-    const real t469 = t467 + t468;
-    const real t470 = Rc[8] * t469;
-    const real t471 = t464 + t470;
-    S_I[11] += t471;
-    const real t472 = Rc[6] * t311;
-    const real t473 = Rc[7] * t316;
-    const real t474 = t472 + t473;
-    const real t475 = Rc[8] * t322;
-    const real t476 = t474 + t475;
-    const real t477 = Rc[0] * t476;
-    const real t478 = Rc[6] * t329;
-    const real t479 = Rc[7] * t334;
-    const real t480 = t478 + t479;
-    const real t481 = Rc[8] * t340;
-    const real t482 = t480 + t481;
-    const real t483 = Rc[1] * t482;
-    const real t484 = t477 + t483;
-    const real t485 = Rc[6] * t348;
-    const real t486 = Rc[7] * t353;
-    const real t487 = t485 + t486;
-    const real t488 = Rc[8] * t359;
-    const real t489 = t487 + t488;
-    const real t490 = Rc[2] * t489;
-    const real t491 = t484 + t490;
-    const real t492 = r[1] * t471;
-    const real t493 = r[2] * t410;
-    const real t494 = t492 - t493;
-    const real t495 = t491 + t494;
-    S_I[12] += t495;
-    const real t496 = Rc[3] * t476;
-    const real t497 = Rc[4] * t482;
-    const real t498 = t496 + t497;
-    const real t499 = Rc[5] * t489;
-    const real t500 = t498 + t499;
-    const real t501 = r[2] * t307;
-    const real t502 = r[0] * t471;
-    const real t503 = t501 - t502;
-    const real t504 = t500 + t503;
-    S_I[13] += t504;
-    const real t505 = Rc[6] * t476;
-    const real t506 = Rc[7] * t482;
-    const real t507 = t505 + t506;
-    const real t508 = Rc[8] * t489;
-    const real t509 = t507 + t508;
-    const real t510 = t440 - t364;
-    const real t511 = t509 + t510;
-    S_I[14] += t511;
-    const real t512 = t48 * t236;
-    const real t513 = t238 * t239;
-    const real t514 = t512 + t513;
-    const real t515 = S[15] - t514;
-    const real t516 = Rc[0] * t515;
-    const real t517 = t48 * t242;
-    const real t518 = t238 * t245;
-    const real t519 = t517 + t518;
-    const real t520 = S[16] - t519;
-    const real t521 = Rc[1] * t520;
-    const real t522 = t516 + t521;
-    const real t523 = t48 * t248;
-    const real t524 = t238 * t251;
-    const real t525 = t523 + t524;
-    const real t526 = S[17] - t525;
-    const real t527 = Rc[2] * t526;
-    const real t528 = t522 + t527;
-    const real t529 = Rc[0] * t528;
-    const real t530 = Rc[0] * t520;
-    const real t531 = t61 * t242;
-    const real t532 = t244 * t245;
-    const real t533 = t531 + t532;
-    const real t534 = S[18] - t533;
-    const real t535 = Rc[1] * t534;
-    const real t536 = t530 + t535;
-    const real t537 = t61 * t248;
-    const real t538 = t244 * t251;
-    const real t539 = t537 + t538;
-    const real t540 = S[19] - t539;
-    const real t541 = Rc[2] * t540;
-    const real t542 = t536 + t541;
-    const real t543 = Rc[1] * t542;
-    const real t544 = t529 + t543;
-    const real t545 = Rc[0] * t526;
-    const real t546 = Rc[1] * t540;
-    const real t547 = t545 + t546;
-    const real t548 = t74 * t248;
-    const real t549 = t250 * t251;
-    const real t550 = t548 + t549;
-    const real t551 = S[20] - t550;
-    const real t552 = Rc[2] * t551;
-    const real t553 = t547 + t552;
-    const real t554 = Rc[2] * t553;
-    const real t555 = t544 + t554;
-    const real t556 = r[1] * t495;
-    const real t557 = r[2] * t434;
-    const real t558 = t556 - t557;
-    const real t559 = r[1] * t491;
-    const real t560 = r[2] * t430;
-    const real t561 = t559 - t560;
-    const real t562 = t558 + t561;
-    const real t563 = t555 + t562;
-    S_I[15] += t563;
-    const real t564 = Rc[3] * t528;
-    const real t565 = Rc[4] * t542;
-    const real t566 = t564 + t565;
-    const real t567 = Rc[5] * t553;
-    const real t568 = t566 + t567;
-    const real t569 = r[1] * t504;
-    const real t570 = r[2] * t442;
-    const real t571 = t569 - t570;
-    const real t572 = r[2] * t363;
-    const real t573 = r[0] * t491;
-    const real t574 = t572 - t573;
-    const real t575 = t571 + t574;
-    const real t576 = t568 + t575;
-    S_I[16] += t576;
-    const real t577 = Rc[6] * t528;
-    const real t578 = Rc[7] * t542;
-    const real t579 = t577 + t578;
-    const real t580 = Rc[8] * t553;
-    const real t581 = t579 + t580;
-    const real t582 = r[1] * t511;
-    const real t583 = r[2] * t451;
-    const real t584 = t582 - t583;
-    const real t585 = r[0] * t430;
-    const real t586 = r[1] * t363;
-    const real t587 = t585 - t586;
-    const real t588 = t584 + t587;
-    const real t589 = t581 + t588;
-    S_I[17] += t589;
-    const real t590 = Rc[3] * t515;
-    const real t591 = Rc[4] * t520;
-    const real t592 = t590 + t591;
-    const real t593 = Rc[5] * t526;
-    const real t594 = t592 + t593;
-    const real t595 = Rc[3] * t594;
-    const real t596 = Rc[3] * t520;
-    const real t597 = Rc[4] * t534;
-    const real t598 = t596 + t597;
-    const real t599 = Rc[5] * t540;
-    const real t600 = t598 + t599;
-    const real t601 = Rc[4] * t600;
-    const real t602 = t595 + t601;
-    const real t603 = Rc[3] * t526;
-    const real t604 = Rc[4] * t540;
-    const real t605 = t603 + t604;
-    const real t606 = Rc[5] * t551;
-    const real t607 = t605 + t606;
-    const real t608 = Rc[5] * t607;
-    const real t609 = t602 + t608;
-    const real t610 = r[2] * t376;
-    const real t611 = r[0] * t504;
-    const real t612 = t610 - t611;
-    const real t613 = r[2] * t372;
-    const real t614 = r[0] * t500;
-    const real t615 = t613 - t614;
-    const real t616 = t612 + t615;
-    const real t617 = t609 + t616;
-    S_I[18] += t617;
-    const real t618 = Rc[6] * t594;
-    const real t619 = Rc[7] * t600;
-    const real t620 = t618 + t619;
-    const real t621 = Rc[8] * t607;
-    const real t622 = t620 + t621;
-    const real t623 = r[2] * t385;
-    const real t624 = r[0] * t511;
-    const real t625 = t623 - t624;
-    const real t626 = r[0] * t439;
-    const real t627 = r[1] * t372;
-    const real t628 = t626 - t627;
-    const real t629 = t625 + t628;
-    const real t630 = t622 + t629;
-    S_I[19] += t630;
-    const real t631 = Rc[6] * t515;
-    const real t632 = Rc[7] * t520;
-    const real t633 = t631 + t632;
-    const real t634 = Rc[8] * t526;
-    const real t635 = t633 + t634;
-    const real t636 = Rc[6] * t635;
-    const real t637 = Rc[6] * t520;
-    const real t638 = Rc[7] * t534;
-    const real t639 = t637 + t638;
-    const real t640 = Rc[8] * t540;
-    const real t641 = t639 + t640;
-    const real t642 = Rc[7] * t641;
-    const real t643 = t636 + t642;
-    const real t644 = Rc[6] * t526;
-    const real t645 = Rc[7] * t540;
-    const real t646 = t644 + t645;
-    const real t647 = Rc[8] * t551;
-    const real t648 = t646 + t647;
-    const real t649 = Rc[8] * t648;
-    const real t650 = t643 + t649;
-    const real t651 = r[0] * t451;
-    const real t652 = r[1] * t385;
-    const real t653 = t651 - t652;
-    const real t654 = r[0] * t447;
-    const real t655 = r[1] * t381;
-    const real t656 = t654 - t655;
-    const real t657 = t653 + t656;
-    const real t658 = t650 + t657;
-    S_I[20] += t658;
-    return 0;
+  real t10 = H[0] * S[0] + H[2] * S[1] + H[4] * S[2] + H[6] * S[3] + H[8] * S[4] + H[10] * S[5];
+  real t22 = H[0] * S[1] + H[2] * S[6] + H[4] * S[7] + H[6] * S[8] + H[8] * S[9] + H[10] * S[10];
+  real t35 = H[0] * S[2] + H[2] * S[7] + H[4] * S[11] + H[6] * S[12] + H[8] * S[13] + H[10] * S[14];
+  real t48 = H[0] * S[3] + H[2] * S[8] + H[4] * S[12] + H[6] * S[15] + H[8] * S[16] + H[10] * S[17];
+  real t61 = H[0] * S[4] + H[2] * S[9] + H[4] * S[13] + H[6] * S[16] + H[8] * S[18] + H[10] * S[19];
+  real t74 = H[0] * S[5] + H[2] * S[10] + H[4] * S[14] + H[6] * S[17] + H[8] * S[19] + H[10] *
+    S[20];
+  real t78 = H[0] * t10 + H[2] * t22 + H[4] * t35 + H[6] * t48 + H[8] * t61 + H[10] * t74 + (J[0] -
+    W[0]);
+  if (!((0.0 < t78))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t90 = H[1] * S[0] + H[3] * S[1] + H[5] * S[2] + H[7] * S[3] + H[9] * S[4] + H[11] * S[5];
+  real t102 = H[1] * S[1] + H[3] * S[6] + H[5] * S[7] + H[7] * S[8] + H[9] * S[9] + H[11] * S[10];
+  real t115 = H[1] * S[2] + H[3] * S[7] + H[5] * S[11] + H[7] * S[12] + H[9] * S[13] + H[11] *
+    S[14];
+  real t128 = H[1] * S[3] + H[3] * S[8] + H[5] * S[12] + H[7] * S[15] + H[9] * S[16] + H[11] *
+    S[17];
+  real t141 = H[1] * S[4] + H[3] * S[9] + H[5] * S[13] + H[7] * S[16] + H[9] * S[18] + H[11] *
+    S[19];
+  real t154 = H[1] * S[5] + H[3] * S[10] + H[5] * S[14] + H[7] * S[17] + H[9] * S[19] + H[11] *
+    S[20];
+  real t158 = H[1] * t90 + H[3] * t102 + H[5] * t115 + H[7] * t128 + H[9] * t141 + H[11] * t154 +
+    (J[1] - W[3]);
+  real t173 = H[0] * t90 + H[2] * t102 + H[4] * t115 + H[6] * t128 + H[8] * t141 + H[10] * t154 -
+    0.5 * (W[1] + W[2]);
+  real t174 = 1.0 / t78;
+  real t175 = t173 * t174;
+  real t177 = t158 - t173 * t175;
+  if (!((t158 * ((real)1 / (real)10000000000000) < t177))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t187 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t188 = (0.0 < floor_[0]) ? floor_[0] : t187;
+  real t198 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t199 = (0.0 < floor_[1]) ? floor_[1] : t198;
+  if (!(((H[4] * H[4] + (H[0] * H[0] + H[2] * H[2])) * t188 + (H[10] * H[10] + (H[6] * H[6] + H[8] * H[8])) * t199 < t78))) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+  if (!((t188 * (H[5] * H[5] + (H[1] * H[1] + H[3] * H[3])) + t199 * (H[11] * H[11] + (H[7] * H[7] + H[9] * H[9])) < t158))) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+  F[0] = t174;
+  F[1] = 0.0;
+  F[2] = t175;
+  real t217 = 1.0 / t177;
+  F[3] = t217;
+  real t218 = t10 * t174;
+  real t220 = t90 - t10 * t175;
+  real t221 = t217 * t220;
+  G[0] = t218 - t175 * t221;
+  real t224 = t22 * t174;
+  real t226 = t102 - t22 * t175;
+  real t227 = t217 * t226;
+  G[1] = t224 - t175 * t227;
+  real t230 = t35 * t174;
+  real t232 = t115 - t35 * t175;
+  real t233 = t217 * t232;
+  G[2] = t230 - t175 * t233;
+  real t236 = t48 * t174;
+  real t238 = t128 - t48 * t175;
+  real t239 = t217 * t238;
+  G[3] = t236 - t175 * t239;
+  real t242 = t61 * t174;
+  real t244 = t141 - t61 * t175;
+  real t245 = t217 * t244;
+  G[4] = t242 - t175 * t245;
+  real t248 = t74 * t174;
+  real t250 = t154 - t74 * t175;
+  real t251 = t217 * t250;
+  G[5] = t248 - t175 * t251;
+  G[6] = t221;
+  G[7] = t227;
+  G[8] = t233;
+  G[9] = t239;
+  G[10] = t245;
+  G[11] = t251;
+  real t257 = S[0] - (t10 * t218 + t220 * t221);
+  real t262 = S[1] - (t10 * t224 + t220 * t227);
+  real t268 = S[2] - (t10 * t230 + t220 * t233);
+  real t270 = Rc[0] * t257 + Rc[1] * t262 + Rc[2] * t268;
+  real t276 = S[6] - (t22 * t224 + t226 * t227);
+  real t282 = S[7] - (t22 * t230 + t226 * t233);
+  real t284 = Rc[0] * t262 + Rc[1] * t276 + Rc[2] * t282;
+  real t293 = S[11] - (t35 * t230 + t232 * t233);
+  real t295 = Rc[0] * t268 + Rc[1] * t282 + Rc[2] * t293;
+  real t297 = Rc[0] * t270 + Rc[1] * t284 + Rc[2] * t295;
+  S_I[0] += t297;
+  real t302 = Rc[3] * t270 + Rc[4] * t284 + Rc[5] * t295;
+  S_I[1] += t302;
+  real t307 = Rc[6] * t270 + Rc[7] * t284 + Rc[8] * t295;
+  S_I[2] += t307;
+  real t311 = S[3] - (t10 * t236 + t220 * t239);
+  real t316 = S[8] - (t22 * t236 + t226 * t239);
+  real t322 = S[12] - (t35 * t236 + t232 * t239);
+  real t324 = Rc[0] * t311 + Rc[1] * t316 + Rc[2] * t322;
+  real t329 = S[4] - (t10 * t242 + t220 * t245);
+  real t334 = S[9] - (t22 * t242 + t226 * t245);
+  real t340 = S[13] - (t35 * t242 + t232 * t245);
+  real t342 = Rc[0] * t329 + Rc[1] * t334 + Rc[2] * t340;
+  real t348 = S[5] - (t10 * t248 + t220 * t251);
+  real t353 = S[10] - (t22 * t248 + t226 * t251);
+  real t359 = S[14] - (t35 * t248 + t232 * t251);
+  real t361 = Rc[0] * t348 + Rc[1] * t353 + Rc[2] * t359;
+  real t363 = Rc[0] * t324 + Rc[1] * t342 + Rc[2] * t361;
+  real t364 = r[1] * t307;
+  real t365 = r[2] * t302;
+  S_I[3] += t363 + (t364 - t365);
+  real t372 = Rc[3] * t324 + Rc[4] * t342 + Rc[5] * t361;
+  real t376 = t372 + (r[2] * t297 - r[0] * t307);
+  S_I[4] += t376;
+  real t381 = Rc[6] * t324 + Rc[7] * t342 + Rc[8] * t361;
+  real t385 = t381 + (r[0] * t302 - r[1] * t297);
+  S_I[5] += t385;
+  real t390 = Rc[3] * t257 + Rc[4] * t262 + Rc[5] * t268;
+  real t396 = Rc[3] * t262 + Rc[4] * t276 + Rc[5] * t282;
+  real t403 = Rc[3] * t268 + Rc[4] * t282 + Rc[5] * t293;
+  real t405 = Rc[3] * t390 + Rc[4] * t396 + Rc[5] * t403;
+  S_I[6] += t405;
+  real t410 = Rc[6] * t390 + Rc[7] * t396 + Rc[8] * t403;
+  S_I[7] += t410;
+  real t415 = Rc[3] * t311 + Rc[4] * t316 + Rc[5] * t322;
+  real t421 = Rc[3] * t329 + Rc[4] * t334 + Rc[5] * t340;
+  real t428 = Rc[3] * t348 + Rc[4] * t353 + Rc[5] * t359;
+  real t430 = Rc[0] * t415 + Rc[1] * t421 + Rc[2] * t428;
+  real t434 = t430 + (r[1] * t410 - r[2] * t405);
+  S_I[8] += t434;
+  real t439 = Rc[3] * t415 + Rc[4] * t421 + Rc[5] * t428;
+  real t440 = r[0] * t410;
+  real t442 = t439 + (t365 - t440);
+  S_I[9] += t442;
+  real t447 = Rc[6] * t415 + Rc[7] * t421 + Rc[8] * t428;
+  real t451 = t447 + (r[0] * t405 - r[1] * t302);
+  S_I[10] += t451;
+  real t471 = Rc[6] * (Rc[6] * t257 + Rc[7] * t262 + Rc[8] * t268) + Rc[7] * (Rc[6] * t262 + Rc[7] *
+    t276 + Rc[8] * t282) + Rc[8] * (Rc[6] * t268 + Rc[7] * t282 + Rc[8] * t293);
+  S_I[11] += t471;
+  real t476 = Rc[6] * t311 + Rc[7] * t316 + Rc[8] * t322;
+  real t482 = Rc[6] * t329 + Rc[7] * t334 + Rc[8] * t340;
+  real t489 = Rc[6] * t348 + Rc[7] * t353 + Rc[8] * t359;
+  real t491 = Rc[0] * t476 + Rc[1] * t482 + Rc[2] * t489;
+  real t495 = t491 + (r[1] * t471 - r[2] * t410);
+  S_I[12] += t495;
+  real t500 = Rc[3] * t476 + Rc[4] * t482 + Rc[5] * t489;
+  real t504 = t500 + (r[2] * t307 - r[0] * t471);
+  S_I[13] += t504;
+  real t511 = Rc[6] * t476 + Rc[7] * t482 + Rc[8] * t489 + (t440 - t364);
+  S_I[14] += t511;
+  real t515 = S[15] - (t48 * t236 + t238 * t239);
+  real t520 = S[16] - (t48 * t242 + t238 * t245);
+  real t526 = S[17] - (t48 * t248 + t238 * t251);
+  real t528 = Rc[0] * t515 + Rc[1] * t520 + Rc[2] * t526;
+  real t534 = S[18] - (t61 * t242 + t244 * t245);
+  real t540 = S[19] - (t61 * t248 + t244 * t251);
+  real t542 = Rc[0] * t520 + Rc[1] * t534 + Rc[2] * t540;
+  real t551 = S[20] - (t74 * t248 + t250 * t251);
+  real t553 = Rc[0] * t526 + Rc[1] * t540 + Rc[2] * t551;
+  S_I[15] += Rc[0] * t528 + Rc[1] * t542 + Rc[2] * t553 + (r[1] * t495 - r[2] * t434 + (r[1] * t491
+    - r[2] * t430));
+  S_I[16] += Rc[3] * t528 + Rc[4] * t542 + Rc[5] * t553 + (r[1] * t504 - r[2] * t442 + (r[2] * t363
+    - r[0] * t491));
+  S_I[17] += Rc[6] * t528 + Rc[7] * t542 + Rc[8] * t553 + (r[1] * t511 - r[2] * t451 + (r[0] * t430
+    - r[1] * t363));
+  real t594 = Rc[3] * t515 + Rc[4] * t520 + Rc[5] * t526;
+  real t600 = Rc[3] * t520 + Rc[4] * t534 + Rc[5] * t540;
+  real t607 = Rc[3] * t526 + Rc[4] * t540 + Rc[5] * t551;
+  S_I[18] += Rc[3] * t594 + Rc[4] * t600 + Rc[5] * t607 + (r[2] * t376 - r[0] * t504 + (r[2] * t372
+    - r[0] * t500));
+  S_I[19] += Rc[6] * t594 + Rc[7] * t600 + Rc[8] * t607 + (r[2] * t385 - r[0] * t511 + (r[0] * t439
+    - r[1] * t372));
+  S_I[20] += Rc[6] * (Rc[6] * t515 + Rc[7] * t520 + Rc[8] * t526) + Rc[7] * (Rc[6] * t520 + Rc[7] *
+    t534 + Rc[8] * t540) + Rc[8] * (Rc[6] * t526 + Rc[7] * t540 + Rc[8] * t551) + (r[0] * t451 -
+    r[1] * t385 + (r[0] * t447 - r[1] * t381));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"W", 4, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_factor_outputs[] = {
-    {"F", 4, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic2_factor_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic2_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with 2 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the free coordinates
@@ -2396,167 +591,37 @@ static const mstmm_guard mstmm_sweep_generic2_factor_guards[] = {
  * out y[2] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic2_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[2] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[3] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[5] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[7] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[9] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[11] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = G[0] * t11;
-    const real t25 = G[6] * t23;
-    const real t26 = t24 + t25;
-    const real t27 = e[0] + t26;
-    const real t28 = Rc[0] * t27;
-    const real t29 = G[1] * t11;
-    const real t30 = G[7] * t23;
-    const real t31 = t29 + t30;
-    const real t32 = e[1] + t31;
-    const real t33 = Rc[1] * t32;
-    const real t34 = t28 + t33;
-    const real t35 = G[2] * t11;
-    const real t36 = G[8] * t23;
-    const real t37 = t35 + t36;
-    const real t38 = e[2] + t37;
-    const real t39 = Rc[2] * t38;
-    const real t40 = t34 + t39;
-    e_I[0] += t40;
-    const real t41 = Rc[3] * t27;
-    const real t42 = Rc[4] * t32;
-    const real t43 = t41 + t42;
-    const real t44 = Rc[5] * t38;
-    const real t45 = t43 + t44;
-    e_I[1] += t45;
-    const real t46 = Rc[6] * t27;
-    const real t47 = Rc[7] * t32;
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * t38;
-    const real t50 = t48 + t49;
-    e_I[2] += t50;
-    const real t51 = G[3] * t11;
-    const real t52 = G[9] * t23;
-    const real t53 = t51 + t52;
-    const real t54 = e[3] + t53;
-    const real t55 = Rc[0] * t54;
-    const real t56 = G[4] * t11;
-    const real t57 = G[10] * t23;
-    const real t58 = t56 + t57;
-    const real t59 = e[4] + t58;
-    const real t60 = Rc[1] * t59;
-    const real t61 = t55 + t60;
-    const real t62 = G[5] * t11;
-    const real t63 = G[11] * t23;
-    const real t64 = t62 + t63;
-    const real t65 = e[5] + t64;
-    const real t66 = Rc[2] * t65;
-    const real t67 = t61 + t66;
-    const real t68 = Rc[6] * r[1];
-    const real t69 = Rc[3] * r[2];
-    const real t70 = t68 - t69;
-    const real t71 = t27 * t70;
-    const real t72 = Rc[7] * r[1];
-    const real t73 = Rc[4] * r[2];
-    const real t74 = t72 - t73;
-    const real t75 = t32 * t74;
-    const real t76 = t71 + t75;
-    const real t77 = Rc[8] * r[1];
-    const real t78 = Rc[5] * r[2];
-    const real t79 = t77 - t78;
-    const real t80 = t38 * t79;
-    const real t81 = t76 + t80;
-    const real t82 = t67 + t81;
-    e_I[3] += t82;
-    const real t83 = Rc[3] * t54;
-    const real t84 = Rc[4] * t59;
-    const real t85 = t83 + t84;
-    const real t86 = Rc[5] * t65;
-    const real t87 = t85 + t86;
-    const real t88 = Rc[0] * r[2];
-    const real t89 = Rc[6] * r[0];
-    const real t90 = t88 - t89;
-    const real t91 = t27 * t90;
-    const real t92 = Rc[1] * r[2];
-    const real t93 = Rc[7] * r[0];
-    const real t94 = t92 - t93;
-    const real t95 = t32 * t94;
-    const real t96 = t91 + t95;
-    const real t97 = Rc[2] * r[2];
-    const real t98 = Rc[8] * r[0];
-    const real t99 = t97 - t98;
-    const real t100 = t38 * t99;
-    const real t101 = t96 + t100;
-    const real t102 = t87 + t101;
-    e_I[4] += t102;
-    const real t103 = Rc[6] * t54;
-    const real t104 = Rc[7] * t59;
-    const real t105 = t103 + t104;
-    const real t106 = Rc[8] * t65;
-    const real t107 = t105 + t106;
-    const real t108 = Rc[3] * r[0];
-    const real t109 = Rc[0] * r[1];
-    const real t110 = t108 - t109;
-    const real t111 = t27 * t110;
-    const real t112 = Rc[4] * r[0];
-    const real t113 = Rc[1] * r[1];
-    const real t114 = t112 - t113;
-    const real t115 = t32 * t114;
-    const real t116 = t111 + t115;
-    const real t117 = Rc[5] * r[0];
-    const real t118 = Rc[2] * r[1];
-    const real t119 = t117 - t118;
-    const real t120 = t38 * t119;
-    const real t121 = t116 + t120;
-    const real t122 = t107 + t121;
-    e_I[5] += t122;
-    return 0;
+  real t11 = tau[0] - (H[0] * e[0] + H[2] * e[1] + H[4] * e[2] + H[6] * e[3] + H[8] * e[4] + H[10] *
+    e[5]);
+  y[0] = t11;
+  real t23 = tau[1] - (H[1] * e[0] + H[3] * e[1] + H[5] * e[2] + H[7] * e[3] + H[9] * e[4] + H[11] *
+    e[5]);
+  y[1] = t23;
+  real t27 = e[0] + (G[0] * t11 + G[6] * t23);
+  real t32 = e[1] + (G[1] * t11 + G[7] * t23);
+  real t38 = e[2] + (G[2] * t11 + G[8] * t23);
+  e_I[0] += Rc[0] * t27 + Rc[1] * t32 + Rc[2] * t38;
+  e_I[1] += Rc[3] * t27 + Rc[4] * t32 + Rc[5] * t38;
+  e_I[2] += Rc[6] * t27 + Rc[7] * t32 + Rc[8] * t38;
+  real t54 = e[3] + (G[3] * t11 + G[9] * t23);
+  real t59 = e[4] + (G[4] * t11 + G[10] * t23);
+  real t65 = e[5] + (G[5] * t11 + G[11] * t23);
+  e_I[3] += Rc[0] * t54 + Rc[1] * t59 + Rc[2] * t65 + (t27 * (Rc[6] * r[1] - Rc[3] * r[2]) + t32 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t38 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t54 + Rc[4] * t59 + Rc[5] * t65 + (t27 * (Rc[0] * r[2] - Rc[6] * r[0]) + t32 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t38 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t54 + Rc[7] * t59 + Rc[8] * t65 + (t27 * (Rc[3] * r[0] - Rc[0] * r[1]) + t32 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t38 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_column_load_outputs[] = {
-    {"y", 2, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 2 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][2] motion subspace of the free coordinates
@@ -2567,141 +632,37 @@ static const mstmm_port mstmm_sweep_generic2_column_load_outputs[] = {
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic2_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic2_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[2] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[3] * t2;
-    const real t4 = F[2] * t3;
-    const real t5 = t0 - t4;
-    const real t6 = r[2] * delta_I[4];
-    const real t7 = r[1] * delta_I[5];
-    const real t8 = t6 - t7;
-    const real t9 = delta_I[0] + t8;
-    const real t10 = Rc[0] * t9;
-    const real t11 = r[0] * delta_I[5];
-    const real t12 = r[2] * delta_I[3];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[1] + t13;
-    const real t15 = Rc[3] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = r[1] * delta_I[3];
-    const real t18 = r[0] * delta_I[4];
-    const real t19 = t17 - t18;
-    const real t20 = delta_I[2] + t19;
-    const real t21 = Rc[6] * t20;
-    const real t22 = t16 + t21;
-    const real t23 = G[0] * t22;
-    const real t24 = Rc[1] * t9;
-    const real t25 = Rc[4] * t14;
-    const real t26 = t24 + t25;
-    const real t27 = Rc[7] * t20;
-    const real t28 = t26 + t27;
-    const real t29 = G[1] * t28;
-    const real t30 = t23 + t29;
-    const real t31 = Rc[2] * t9;
-    const real t32 = Rc[5] * t14;
-    const real t33 = t31 + t32;
-    const real t34 = Rc[8] * t20;
-    const real t35 = t33 + t34;
-    const real t36 = G[2] * t35;
-    const real t37 = t30 + t36;
-    const real t38 = Rc[0] * delta_I[3];
-    const real t39 = Rc[3] * delta_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[6] * delta_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = G[3] * t42;
-    const real t44 = t37 + t43;
-    const real t45 = Rc[1] * delta_I[3];
-    const real t46 = Rc[4] * delta_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[7] * delta_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = G[4] * t49;
-    const real t51 = t44 + t50;
-    const real t52 = Rc[2] * delta_I[3];
-    const real t53 = Rc[5] * delta_I[4];
-    const real t54 = t52 + t53;
-    const real t55 = Rc[8] * delta_I[5];
-    const real t56 = t54 + t55;
-    const real t57 = G[5] * t56;
-    const real t58 = t51 + t57;
-    const real t59 = t5 - t58;
-    udot[0] = t59;
-    const real t60 = G[6] * t22;
-    const real t61 = G[7] * t28;
-    const real t62 = t60 + t61;
-    const real t63 = G[8] * t35;
-    const real t64 = t62 + t63;
-    const real t65 = G[9] * t42;
-    const real t66 = t64 + t65;
-    const real t67 = G[10] * t49;
-    const real t68 = t66 + t67;
-    const real t69 = G[11] * t56;
-    const real t70 = t68 + t69;
-    const real t71 = t3 - t70;
-    udot[1] = t71;
-    const real t72 = H[0] * t59;
-    const real t73 = H[1] * t71;
-    const real t74 = t72 + t73;
-    const real t75 = t22 + t74;
-    delta[0] = t75;
-    const real t76 = H[2] * t59;
-    const real t77 = H[3] * t71;
-    const real t78 = t76 + t77;
-    const real t79 = t28 + t78;
-    delta[1] = t79;
-    const real t80 = H[4] * t59;
-    const real t81 = H[5] * t71;
-    const real t82 = t80 + t81;
-    const real t83 = t35 + t82;
-    delta[2] = t83;
-    const real t84 = H[6] * t59;
-    const real t85 = H[7] * t71;
-    const real t86 = t84 + t85;
-    const real t87 = t42 + t86;
-    delta[3] = t87;
-    const real t88 = H[8] * t59;
-    const real t89 = H[9] * t71;
-    const real t90 = t88 + t89;
-    const real t91 = t49 + t90;
-    delta[4] = t91;
-    const real t92 = H[10] * t59;
-    const real t93 = H[11] * t71;
-    const real t94 = t92 + t93;
-    const real t95 = t56 + t94;
-    delta[5] = t95;
-    return 0;
+  real t3 = F[3] * (y[1] - F[2] * y[0]);
+  real t9 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t14 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t20 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t22 = Rc[0] * t9 + Rc[3] * t14 + Rc[6] * t20;
+  real t28 = Rc[1] * t9 + Rc[4] * t14 + Rc[7] * t20;
+  real t35 = Rc[2] * t9 + Rc[5] * t14 + Rc[8] * t20;
+  real t42 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t49 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t56 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t59 = F[0] * y[0] - F[2] * t3 - (G[0] * t22 + G[1] * t28 + G[2] * t35 + G[3] * t42 + G[4] *
+    t49 + G[5] * t56);
+  udot[0] = t59;
+  real t71 = t3 - (G[6] * t22 + G[7] * t28 + G[8] * t35 + G[9] * t42 + G[10] * t49 + G[11] * t56);
+  udot[1] = t71;
+  delta[0] = t22 + (H[0] * t59 + H[1] * t71);
+  delta[1] = t28 + (H[2] * t59 + H[3] * t71);
+  delta[2] = t35 + (H[4] * t59 + H[5] * t71);
+  delta[3] = t42 + (H[6] * t59 + H[7] * t71);
+  delta[4] = t49 + (H[8] * t59 + H[9] * t71);
+  delta[5] = t56 + (H[10] * t59 + H[11] * t71);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"F", 4, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"y", 2, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_column_acceleration_outputs[] = {
-    {"udot", 2, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with 2 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6][2] motion subspace of the free coordinates
@@ -2717,906 +678,331 @@ static const mstmm_port mstmm_sweep_generic2_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic2_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic2_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    const real t0 = H[4] * H[4];
-    const real t1 = H[0] * H[0];
-    const real t2 = H[2] * H[2];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 0.0 < floor_[0];
-    const real t6 = U[11] * U[11];
-    const real t7 = U[7] * U[7];
-    const real t8 = U[6] * U[6];
-    const real t9 = U[2] * U[2];
-    const real t10 = U[0] * U[0];
-    const real t11 = U[1] * U[1];
-    const real t12 = t10 + t11;
-    const real t13 = t9 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = t7 + t14;
-    const real t16 = t6 + t15;
-    const real t17 = ((real)1 / (real)300000000000000) * t16;
-    const real t18 = t5 != 0 ? floor_[0] : t17;
-    const real t19 = t4 * t18;
-    const real t20 = H[10] * H[10];
-    const real t21 = H[6] * H[6];
-    const real t22 = H[8] * H[8];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    const real t25 = 0.0 < floor_[1];
-    const real t26 = U[20] * U[20];
-    const real t27 = U[19] * U[19];
-    const real t28 = U[18] * U[18];
-    const real t29 = U[17] * U[17];
-    const real t30 = U[16] * U[16];
-    const real t31 = U[15] * U[15];
-    const real t32 = U[14] * U[14];
-    const real t33 = U[13] * U[13];
-    const real t34 = U[12] * U[12];
-    const real t35 = U[10] * U[10];
-    const real t36 = U[9] * U[9];
-    const real t37 = U[8] * U[8];
-    const real t38 = U[5] * U[5];
-    const real t39 = U[3] * U[3];
-    const real t40 = U[4] * U[4];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = t36 + t43;
-    const real t45 = t35 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = t33 + t46;
-    const real t48 = t32 + t47;
-    const real t49 = t31 + t48;
-    const real t50 = t30 + t49;
-    const real t51 = t29 + t50;
-    const real t52 = t28 + t51;
-    const real t53 = t27 + t52;
-    const real t54 = t26 + t53;
-    const real t55 = ((real)1 / (real)300000000000000) * t54;
-    const real t56 = t25 != 0 ? floor_[1] : t55;
-    const real t57 = t24 * t56;
-    const real t58 = t19 + t57;
-    const real t59 = H[10] * U[20];
-    const real t60 = t59 * t59;
-    const real t61 = H[8] * U[18];
-    const real t62 = H[10] * U[19];
-    const real t63 = t61 + t62;
-    const real t64 = t63 * t63;
-    const real t65 = H[6] * U[15];
-    const real t66 = H[8] * U[16];
-    const real t67 = t65 + t66;
-    const real t68 = H[10] * U[17];
-    const real t69 = t67 + t68;
-    const real t70 = t69 * t69;
-    const real t71 = H[4] * U[11];
-    const real t72 = H[6] * U[12];
-    const real t73 = t71 + t72;
-    const real t74 = H[8] * U[13];
-    const real t75 = t73 + t74;
-    const real t76 = H[10] * U[14];
-    const real t77 = t75 + t76;
-    const real t78 = t77 * t77;
-    const real t79 = H[2] * U[6];
-    const real t80 = H[4] * U[7];
-    const real t81 = t79 + t80;
-    const real t82 = H[6] * U[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[8] * U[9];
-    const real t85 = t83 + t84;
-    const real t86 = H[10] * U[10];
-    const real t87 = t85 + t86;
-    const real t88 = t87 * t87;
-    const real t89 = H[0] * U[0];
-    const real t90 = H[2] * U[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[4] * U[2];
-    const real t93 = t91 + t92;
-    const real t94 = H[6] * U[3];
-    const real t95 = t93 + t94;
-    const real t96 = H[8] * U[4];
-    const real t97 = t95 + t96;
-    const real t98 = H[10] * U[5];
-    const real t99 = t97 + t98;
-    const real t100 = t99 * t99;
-    const real t101 = J[0] + t100;
-    const real t102 = t88 + t101;
-    const real t103 = t78 + t102;
-    const real t104 = t70 + t103;
-    const real t105 = t64 + t104;
-    const real t106 = t60 + t105;
-    const real t107 = t58 < t106;
-    if (!(t107 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
-    const real t108 = H[5] * H[5];
-    const real t109 = H[1] * H[1];
-    const real t110 = H[3] * H[3];
-    const real t111 = t109 + t110;
-    const real t112 = t108 + t111;
-    const real t113 = t18 * t112;
-    const real t114 = H[11] * H[11];
-    const real t115 = H[7] * H[7];
-    const real t116 = H[9] * H[9];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    const real t119 = t56 * t118;
-    const real t120 = t113 + t119;
-    const real t121 = H[11] * U[20];
-    const real t122 = t121 * t121;
-    const real t123 = H[9] * U[18];
-    const real t124 = H[11] * U[19];
-    const real t125 = t123 + t124;
-    const real t126 = t125 * t125;
-    const real t127 = H[7] * U[15];
-    const real t128 = H[9] * U[16];
-    const real t129 = t127 + t128;
-    const real t130 = H[11] * U[17];
-    const real t131 = t129 + t130;
-    const real t132 = t131 * t131;
-    const real t133 = H[5] * U[11];
-    const real t134 = H[7] * U[12];
-    const real t135 = t133 + t134;
-    const real t136 = H[9] * U[13];
-    const real t137 = t135 + t136;
-    const real t138 = H[11] * U[14];
-    const real t139 = t137 + t138;
-    const real t140 = t139 * t139;
-    const real t141 = H[3] * U[6];
-    const real t142 = H[5] * U[7];
-    const real t143 = t141 + t142;
-    const real t144 = H[7] * U[8];
-    const real t145 = t143 + t144;
-    const real t146 = H[9] * U[9];
-    const real t147 = t145 + t146;
-    const real t148 = H[11] * U[10];
-    const real t149 = t147 + t148;
-    const real t150 = t149 * t149;
-    const real t151 = H[1] * U[0];
-    const real t152 = H[3] * U[1];
-    const real t153 = t151 + t152;
-    const real t154 = H[5] * U[2];
-    const real t155 = t153 + t154;
-    const real t156 = H[7] * U[3];
-    const real t157 = t155 + t156;
-    const real t158 = H[9] * U[4];
-    const real t159 = t157 + t158;
-    const real t160 = H[11] * U[5];
-    const real t161 = t159 + t160;
-    const real t162 = t161 * t161;
-    const real t163 = J[1] + t162;
-    const real t164 = t150 + t163;
-    const real t165 = t140 + t164;
-    const real t166 = t132 + t165;
-    const real t167 = t126 + t166;
-    const real t168 = t122 + t167;
-    const real t169 = t120 < t168;
-    if (!(t169 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
-    const real t170 = 1e-26 * t106;
-    const real t171 = sqrt(J[0]);
-    const real t172 = t171 * t171;
-    const real t173 = t60 + t172;
-    const real t174 = sqrt(t173);
-    const real t175 = t174 * t174;
-    const real t176 = t64 + t175;
-    const real t177 = sqrt(t176);
-    const real t178 = t177 * t177;
-    const real t179 = t70 + t178;
-    const real t180 = sqrt(t179);
-    const real t181 = t180 * t180;
-    const real t182 = t78 + t181;
-    const real t183 = sqrt(t182);
-    const real t184 = t183 * t183;
-    const real t185 = t88 + t184;
-    const real t186 = sqrt(t185);
-    const real t187 = t186 * t186;
-    const real t188 = t100 + t187;
-    const real t189 = sqrt(t188);
-    const real t190 = t189 * t189;
-    const real t191 = t170 < t190;
-    if (!(t191 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t192 = 1e-26 * t168;
-    const real t193 = 0.0 < t186;
-    const real t194 = t193 != 0 ? t186 : 1.0;
-    const real t195 = 1.0 / t194;
-    const real t196 = t87 * t195;
-    const real t197 = t193 != 0 ? t196 : 1.0;
-    const real t198 = t149 * t197;
-    const real t199 = 0.0 < t183;
-    const real t200 = t199 != 0 ? t183 : 1.0;
-    const real t201 = 1.0 / t200;
-    const real t202 = t77 * t201;
-    const real t203 = t199 != 0 ? t202 : 1.0;
-    const real t204 = t139 * t203;
-    const real t205 = 0.0 < t180;
-    const real t206 = t205 != 0 ? t180 : 1.0;
-    const real t207 = 1.0 / t206;
-    const real t208 = t69 * t207;
-    const real t209 = t205 != 0 ? t208 : 1.0;
-    const real t210 = t131 * t209;
-    const real t211 = 0.0 < t177;
-    const real t212 = t211 != 0 ? t177 : 1.0;
-    const real t213 = 1.0 / t212;
-    const real t214 = t63 * t213;
-    const real t215 = t211 != 0 ? t214 : 1.0;
-    const real t216 = t125 * t215;
-    const real t217 = 0.0 < t174;
-    const real t218 = t217 != 0 ? t174 : 1.0;
-    const real t219 = 1.0 / t218;
-    const real t220 = t59 * t219;
-    const real t221 = t217 != 0 ? t220 : 1.0;
-    const real t222 = t121 * t221;
-    const real t223 = t174 * t213;
-    const real t224 = t222 * t223;
-    const real t225 = t216 + t224;
-    const real t226 = t177 * t207;
-    const real t227 = t225 * t226;
-    const real t228 = t210 + t227;
-    const real t229 = t180 * t201;
-    const real t230 = t228 * t229;
-    const real t231 = t204 + t230;
-    const real t232 = t183 * t195;
-    const real t233 = t231 * t232;
-    const real t234 = t198 + t233;
-    const real t235 = 0.0 < t189;
-    const real t236 = t235 != 0 ? t189 : 1.0;
-    const real t237 = 1.0 / t236;
-    const real t238 = t99 * t237;
-    const real t239 = t235 != 0 ? t238 : 1.0;
-    const real t240 = t234 * t239;
-    const real t241 = t186 * t237;
-    const real t242 = t161 * t241;
-    const real t243 = t240 - t242;
-    const real t244 = t243 * t243;
-    const real t245 = t231 * t197;
-    const real t246 = t149 * t232;
-    const real t247 = t245 - t246;
-    const real t248 = t247 * t247;
-    const real t249 = t228 * t203;
-    const real t250 = t139 * t229;
-    const real t251 = t249 - t250;
-    const real t252 = t251 * t251;
-    const real t253 = t225 * t209;
-    const real t254 = t131 * t226;
-    const real t255 = t253 - t254;
-    const real t256 = t255 * t255;
-    const real t257 = t222 * t215;
-    const real t258 = t125 * t223;
-    const real t259 = t257 - t258;
-    const real t260 = t259 * t259;
-    const real t261 = t171 * t219;
-    const real t262 = t121 * t261;
-    const real t263 = t262 * t262;
-    const real t264 = sqrt(J[1]);
-    const real t265 = t264 * t264;
-    const real t266 = t263 + t265;
-    const real t267 = sqrt(t266);
-    const real t268 = t267 * t267;
-    const real t269 = t260 + t268;
-    const real t270 = sqrt(t269);
-    const real t271 = t270 * t270;
-    const real t272 = t256 + t271;
-    const real t273 = sqrt(t272);
-    const real t274 = t273 * t273;
-    const real t275 = t252 + t274;
-    const real t276 = sqrt(t275);
-    const real t277 = t276 * t276;
-    const real t278 = t248 + t277;
-    const real t279 = sqrt(t278);
-    const real t280 = t279 * t279;
-    const real t281 = t244 + t280;
-    const real t282 = sqrt(t281);
-    const real t283 = t282 * t282;
-    const real t284 = t192 < t283;
-    if (!(t284 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t285 = U[0] * t239;
-    const real t286 = 1.0 / t189;
-    const real t287 = t285 * t286;
-    const real t288 = t161 * t239;
-    const real t289 = t234 * t241;
-    const real t290 = t288 + t289;
-    const real t291 = t290 * t286;
-    const real t292 = U[0] * t241;
-    const real t293 = 0.0 < t282;
-    const real t294 = t293 != 0 ? t282 : 1.0;
-    const real t295 = 1.0 / t294;
-    const real t296 = t243 * t295;
-    const real t297 = t293 != 0 ? t296 : 1.0;
-    const real t298 = t292 * t297;
-    const real t299 = 1.0 / t282;
-    const real t300 = t298 * t299;
-    const real t301 = t291 * t300;
-    const real t302 = t287 + t301;
-    G[0] = t302;
-    const real t303 = U[1] * t239;
-    const real t304 = U[6] * t197;
-    const real t305 = t304 * t241;
-    const real t306 = t303 + t305;
-    const real t307 = t306 * t286;
-    const real t308 = t304 * t239;
-    const real t309 = U[1] * t241;
-    const real t310 = t308 - t309;
-    const real t311 = t310 * t297;
-    const real t312 = U[6] * t232;
-    const real t313 = 0.0 < t279;
-    const real t314 = t313 != 0 ? t279 : 1.0;
-    const real t315 = 1.0 / t314;
-    const real t316 = t247 * t315;
-    const real t317 = t313 != 0 ? t316 : 1.0;
-    const real t318 = t312 * t317;
-    const real t319 = t279 * t295;
-    const real t320 = t318 * t319;
-    const real t321 = t311 - t320;
-    const real t322 = t321 * t299;
-    const real t323 = t291 * t322;
-    const real t324 = t307 - t323;
-    G[1] = t324;
-    const real t325 = U[2] * t239;
-    const real t326 = U[7] * t197;
-    const real t327 = U[11] * t203;
-    const real t328 = t327 * t232;
-    const real t329 = t326 + t328;
-    const real t330 = t329 * t241;
-    const real t331 = t325 + t330;
-    const real t332 = t331 * t286;
-    const real t333 = t329 * t239;
-    const real t334 = U[2] * t241;
-    const real t335 = t333 - t334;
-    const real t336 = t335 * t297;
-    const real t337 = t327 * t197;
-    const real t338 = U[7] * t232;
-    const real t339 = t337 - t338;
-    const real t340 = t339 * t317;
-    const real t341 = U[11] * t229;
-    const real t342 = 0.0 < t276;
-    const real t343 = t342 != 0 ? t276 : 1.0;
-    const real t344 = 1.0 / t343;
-    const real t345 = t251 * t344;
-    const real t346 = t342 != 0 ? t345 : 1.0;
-    const real t347 = t341 * t346;
-    const real t348 = t276 * t315;
-    const real t349 = t347 * t348;
-    const real t350 = t340 - t349;
-    const real t351 = t350 * t319;
-    const real t352 = t336 + t351;
-    const real t353 = t352 * t299;
-    const real t354 = t291 * t353;
-    const real t355 = t332 - t354;
-    G[2] = t355;
-    const real t356 = U[3] * t239;
-    const real t357 = U[8] * t197;
-    const real t358 = U[12] * t203;
-    const real t359 = U[15] * t209;
-    const real t360 = t359 * t229;
-    const real t361 = t358 + t360;
-    const real t362 = t361 * t232;
-    const real t363 = t357 + t362;
-    const real t364 = t363 * t241;
-    const real t365 = t356 + t364;
-    const real t366 = t365 * t286;
-    const real t367 = t363 * t239;
-    const real t368 = U[3] * t241;
-    const real t369 = t367 - t368;
-    const real t370 = t369 * t297;
-    const real t371 = t361 * t197;
-    const real t372 = U[8] * t232;
-    const real t373 = t371 - t372;
-    const real t374 = t373 * t317;
-    const real t375 = t359 * t203;
-    const real t376 = U[12] * t229;
-    const real t377 = t375 - t376;
-    const real t378 = t377 * t346;
-    const real t379 = U[15] * t226;
-    const real t380 = 0.0 < t273;
-    const real t381 = t380 != 0 ? t273 : 1.0;
-    const real t382 = 1.0 / t381;
-    const real t383 = t255 * t382;
-    const real t384 = t380 != 0 ? t383 : 1.0;
-    const real t385 = t379 * t384;
-    const real t386 = t273 * t344;
-    const real t387 = t385 * t386;
-    const real t388 = t378 - t387;
-    const real t389 = t388 * t348;
-    const real t390 = t374 + t389;
-    const real t391 = t390 * t319;
-    const real t392 = t370 + t391;
-    const real t393 = t392 * t299;
-    const real t394 = t291 * t393;
-    const real t395 = t366 - t394;
-    G[3] = t395;
-    const real t396 = U[4] * t239;
-    const real t397 = U[9] * t197;
-    const real t398 = U[13] * t203;
-    const real t399 = U[16] * t209;
-    const real t400 = U[18] * t215;
-    const real t401 = t400 * t226;
-    const real t402 = t399 + t401;
-    const real t403 = t402 * t229;
-    const real t404 = t398 + t403;
-    const real t405 = t404 * t232;
-    const real t406 = t397 + t405;
-    const real t407 = t406 * t241;
-    const real t408 = t396 + t407;
-    const real t409 = t408 * t286;
-    const real t410 = t406 * t239;
-    const real t411 = U[4] * t241;
-    const real t412 = t410 - t411;
-    const real t413 = t412 * t297;
-    const real t414 = t404 * t197;
-    const real t415 = U[9] * t232;
-    const real t416 = t414 - t415;
-    const real t417 = t416 * t317;
-    const real t418 = t402 * t203;
-    const real t419 = U[13] * t229;
-    const real t420 = t418 - t419;
-    const real t421 = t420 * t346;
-    const real t422 = t400 * t209;
-    const real t423 = U[16] * t226;
-    const real t424 = t422 - t423;
-    const real t425 = t424 * t384;
-    const real t426 = U[18] * t223;
-    const real t427 = 0.0 < t270;
-    const real t428 = t427 != 0 ? t270 : 1.0;
-    const real t429 = 1.0 / t428;
-    const real t430 = t259 * t429;
-    const real t431 = t427 != 0 ? t430 : 1.0;
-    const real t432 = t426 * t431;
-    const real t433 = t270 * t382;
-    const real t434 = t432 * t433;
-    const real t435 = t425 - t434;
-    const real t436 = t435 * t386;
-    const real t437 = t421 + t436;
-    const real t438 = t437 * t348;
-    const real t439 = t417 + t438;
-    const real t440 = t439 * t319;
-    const real t441 = t413 + t440;
-    const real t442 = t441 * t299;
-    const real t443 = t291 * t442;
-    const real t444 = t409 - t443;
-    G[4] = t444;
-    const real t445 = U[5] * t239;
-    const real t446 = U[10] * t197;
-    const real t447 = U[14] * t203;
-    const real t448 = U[17] * t209;
-    const real t449 = U[19] * t215;
-    const real t450 = U[20] * t221;
-    const real t451 = t450 * t223;
-    const real t452 = t449 + t451;
-    const real t453 = t452 * t226;
-    const real t454 = t448 + t453;
-    const real t455 = t454 * t229;
-    const real t456 = t447 + t455;
-    const real t457 = t456 * t232;
-    const real t458 = t446 + t457;
-    const real t459 = t458 * t241;
-    const real t460 = t445 + t459;
-    const real t461 = t460 * t286;
-    const real t462 = t458 * t239;
-    const real t463 = U[5] * t241;
-    const real t464 = t462 - t463;
-    const real t465 = t464 * t297;
-    const real t466 = t456 * t197;
-    const real t467 = U[10] * t232;
-    const real t468 = t466 - t467;
-    const real t469 = t468 * t317;
-    const real t470 = t454 * t203;
-    const real t471 = U[14] * t229;
-    const real t472 = t470 - t471;
-    const real t473 = t472 * t346;
-    const real t474 = t452 * t209;
-    const real t475 = U[17] * t226;
-    const real t476 = t474 - t475;
-    const real t477 = t476 * t384;
-    const real t478 = t450 * t215;
-    const real t479 = U[19] * t223;
-    const real t480 = t478 - t479;
-    const real t481 = t480 * t431;
-    const real t482 = U[20] * t261;
-    const real t483 = 0.0 < t267;
-    const real t484 = t483 != 0 ? t267 : 1.0;
-    const real t485 = 1.0 / t484;
-    const real t486 = t262 * t485;
-    const real t487 = -t486;
-    const real t488 = t483 != 0 ? t487 : 1.0;
-    const real t489 = t482 * t488;
-    const real t490 = t267 * t429;
-    const real t491 = t489 * t490;
-    const real t492 = t481 - t491;
-    const real t493 = t492 * t433;
-    const real t494 = t477 + t493;
-    const real t495 = t494 * t386;
-    const real t496 = t473 + t495;
-    const real t497 = t496 * t348;
-    const real t498 = t469 + t497;
-    const real t499 = t498 * t319;
-    const real t500 = t465 + t499;
-    const real t501 = t500 * t299;
-    const real t502 = t291 * t501;
-    const real t503 = t461 - t502;
-    G[5] = t503;
-    const real t504 = -t300;
-    G[6] = t504;
-    G[7] = t322;
-    G[8] = t353;
-    G[9] = t393;
-    G[10] = t442;
-    G[11] = t501;
-    const real t505 = t10 * 1e-26;
-    const real t506 = t505 < t10;
-    const real t507 = t506 != 0 ? 0.0 : e[0];
-    const real t508 = H[0] * t507;
-    const real t509 = t8 + t11;
-    const real t510 = 1e-26 * t509;
-    const real t511 = t510 < t8;
-    const real t512 = 1.0 / U[0];
-    const real t513 = e[0] * t512;
-    const real t514 = t506 != 0 ? t513 : 0.0;
-    const real t515 = U[1] * t514;
-    const real t516 = e[1] - t515;
-    const real t517 = t511 != 0 ? 0.0 : t516;
-    const real t518 = H[2] * t517;
-    const real t519 = t508 + t518;
-    const real t520 = t9 + t7;
-    const real t521 = t6 + t520;
-    const real t522 = 1e-26 * t521;
-    const real t523 = t522 < t6;
-    const real t524 = U[2] * t514;
-    const real t525 = 1.0 / U[6];
-    const real t526 = t516 * t525;
-    const real t527 = t511 != 0 ? t526 : 0.0;
-    const real t528 = U[7] * t527;
-    const real t529 = t524 + t528;
-    const real t530 = e[2] - t529;
-    const real t531 = t523 != 0 ? 0.0 : t530;
-    const real t532 = H[4] * t531;
-    const real t533 = t519 + t532;
-    const real t534 = t39 + t37;
-    const real t535 = t34 + t534;
-    const real t536 = t31 + t535;
-    const real t537 = 1e-26 * t536;
-    const real t538 = t537 < t31;
-    const real t539 = 1.0 / U[11];
-    const real t540 = t530 * t539;
-    const real t541 = t523 != 0 ? t540 : 0.0;
-    const real t542 = U[12] * t541;
-    const real t543 = U[3] * t514;
-    const real t544 = U[8] * t527;
-    const real t545 = t543 + t544;
-    const real t546 = t542 + t545;
-    const real t547 = e[3] - t546;
-    const real t548 = t538 != 0 ? 0.0 : t547;
-    const real t549 = H[6] * t548;
-    const real t550 = t533 + t549;
-    const real t551 = t40 + t36;
-    const real t552 = t33 + t551;
-    const real t553 = t30 + t552;
-    const real t554 = t28 + t553;
-    const real t555 = 1e-26 * t554;
-    const real t556 = t555 < t28;
-    const real t557 = 1.0 / U[15];
-    const real t558 = t547 * t557;
-    const real t559 = t538 != 0 ? t558 : 0.0;
-    const real t560 = U[16] * t559;
-    const real t561 = U[13] * t541;
-    const real t562 = U[4] * t514;
-    const real t563 = U[9] * t527;
-    const real t564 = t562 + t563;
-    const real t565 = t561 + t564;
-    const real t566 = t560 + t565;
-    const real t567 = e[4] - t566;
-    const real t568 = t556 != 0 ? 0.0 : t567;
-    const real t569 = H[8] * t568;
-    const real t570 = t550 + t569;
-    const real t571 = t38 + t35;
-    const real t572 = t32 + t571;
-    const real t573 = t29 + t572;
-    const real t574 = t27 + t573;
-    const real t575 = t26 + t574;
-    const real t576 = 1e-26 * t575;
-    const real t577 = t576 < t26;
-    const real t578 = 1.0 / U[18];
-    const real t579 = t567 * t578;
-    const real t580 = t556 != 0 ? t579 : 0.0;
-    const real t581 = U[19] * t580;
-    const real t582 = U[17] * t559;
-    const real t583 = U[14] * t541;
-    const real t584 = U[5] * t514;
-    const real t585 = U[10] * t527;
-    const real t586 = t584 + t585;
-    const real t587 = t583 + t586;
-    const real t588 = t582 + t587;
-    const real t589 = t581 + t588;
-    const real t590 = e[5] - t589;
-    const real t591 = t577 != 0 ? 0.0 : t590;
-    const real t592 = H[10] * t591;
-    const real t593 = t570 + t592;
-    const real t594 = tau[0] - t593;
-    const real t595 = t594 * t286;
-    const real t596 = d[0] + t514;
-    const real t597 = t596 * t239;
-    const real t598 = d[1] + t527;
-    const real t599 = t598 * t197;
-    const real t600 = d[2] + t541;
-    const real t601 = t600 * t203;
-    const real t602 = d[3] + t559;
-    const real t603 = t602 * t209;
-    const real t604 = d[4] + t580;
-    const real t605 = t604 * t215;
-    const real t606 = 1.0 / U[20];
-    const real t607 = t590 * t606;
-    const real t608 = t577 != 0 ? t607 : 0.0;
-    const real t609 = d[5] + t608;
-    const real t610 = t609 * t221;
-    const real t611 = t610 * t223;
-    const real t612 = t605 + t611;
-    const real t613 = t612 * t226;
-    const real t614 = t603 + t613;
-    const real t615 = t614 * t229;
-    const real t616 = t601 + t615;
-    const real t617 = t616 * t232;
-    const real t618 = t599 + t617;
-    const real t619 = t618 * t241;
-    const real t620 = t597 + t619;
-    const real t621 = t595 - t620;
-    const real t622 = t286 * t621;
-    const real t623 = H[1] * t507;
-    const real t624 = H[3] * t517;
-    const real t625 = t623 + t624;
-    const real t626 = H[5] * t531;
-    const real t627 = t625 + t626;
-    const real t628 = H[7] * t548;
-    const real t629 = t627 + t628;
-    const real t630 = H[9] * t568;
-    const real t631 = t629 + t630;
-    const real t632 = H[11] * t591;
-    const real t633 = t631 + t632;
-    const real t634 = tau[1] - t633;
-    const real t635 = t594 * t291;
-    const real t636 = t634 - t635;
-    const real t637 = t299 * t636;
-    const real t638 = t618 * t239;
-    const real t639 = t596 * t241;
-    const real t640 = t638 - t639;
-    const real t641 = t640 * t297;
-    const real t642 = t616 * t197;
-    const real t643 = t598 * t232;
-    const real t644 = t642 - t643;
-    const real t645 = t644 * t317;
-    const real t646 = t614 * t203;
-    const real t647 = t600 * t229;
-    const real t648 = t646 - t647;
-    const real t649 = t648 * t346;
-    const real t650 = t612 * t209;
-    const real t651 = t602 * t226;
-    const real t652 = t650 - t651;
-    const real t653 = t652 * t384;
-    const real t654 = t610 * t215;
-    const real t655 = t604 * t223;
-    const real t656 = t654 - t655;
-    const real t657 = t656 * t431;
-    const real t658 = t609 * t261;
-    const real t659 = t658 * t488;
-    const real t660 = t659 * t490;
-    const real t661 = t657 - t660;
-    const real t662 = t661 * t433;
-    const real t663 = t653 + t662;
-    const real t664 = t663 * t386;
-    const real t665 = t649 + t664;
-    const real t666 = t665 * t348;
-    const real t667 = t645 + t666;
-    const real t668 = t667 * t319;
-    const real t669 = t641 + t668;
-    const real t670 = t637 - t669;
-    const real t671 = t299 * t670;
-    const real t672 = t291 * t671;
-    const real t673 = t622 - t672;
-    g[0] = t673;
-    g[1] = t671;
-    const real t674 = t292 * t319;
-    const real t675 = t674 < 0.0;
-    const real t676 = t675 != 0 ? (-1.0) : 1.0;
-    const real t677 = t674 * t676;
-    V[0] = t677;
-    const real t678 = t318 * t297;
-    const real t679 = t310 * t319;
-    const real t680 = t678 + t679;
-    const real t681 = t680 * t676;
-    const real t682 = -t681;
-    V[1] = t682;
-    const real t683 = t350 * t297;
-    const real t684 = t335 * t319;
-    const real t685 = t683 - t684;
-    const real t686 = t685 * t676;
-    V[2] = t686;
-    const real t687 = t390 * t297;
-    const real t688 = t369 * t319;
-    const real t689 = t687 - t688;
-    const real t690 = t689 * t676;
-    V[3] = t690;
-    const real t691 = t439 * t297;
-    const real t692 = t412 * t319;
-    const real t693 = t691 - t692;
-    const real t694 = t693 * t676;
-    V[4] = t694;
-    const real t695 = t498 * t297;
-    const real t696 = t464 * t319;
-    const real t697 = t695 - t696;
-    const real t698 = t697 * t676;
-    V[5] = t698;
-    const real t699 = t312 * t348;
-    const real t700 = t699 < 0.0;
-    const real t701 = t700 != 0 ? (-1.0) : 1.0;
-    const real t702 = t699 * t701;
-    V[6] = t702;
-    const real t703 = t347 * t317;
-    const real t704 = t339 * t348;
-    const real t705 = t703 + t704;
-    const real t706 = t705 * t701;
-    const real t707 = -t706;
-    V[7] = t707;
-    const real t708 = t388 * t317;
-    const real t709 = t373 * t348;
-    const real t710 = t708 - t709;
-    const real t711 = t710 * t701;
-    V[8] = t711;
-    const real t712 = t437 * t317;
-    const real t713 = t416 * t348;
-    const real t714 = t712 - t713;
-    const real t715 = t714 * t701;
-    V[9] = t715;
-    const real t716 = t496 * t317;
-    const real t717 = t468 * t348;
-    const real t718 = t716 - t717;
-    const real t719 = t718 * t701;
-    V[10] = t719;
-    const real t720 = t341 * t386;
-    const real t721 = t720 < 0.0;
-    const real t722 = t721 != 0 ? (-1.0) : 1.0;
-    const real t723 = t720 * t722;
-    V[11] = t723;
-    const real t724 = t385 * t346;
-    const real t725 = t377 * t386;
-    const real t726 = t724 + t725;
-    const real t727 = t726 * t722;
-    const real t728 = -t727;
-    V[12] = t728;
-    const real t729 = t435 * t346;
-    const real t730 = t420 * t386;
-    const real t731 = t729 - t730;
-    const real t732 = t731 * t722;
-    V[13] = t732;
-    const real t733 = t494 * t346;
-    const real t734 = t472 * t386;
-    const real t735 = t733 - t734;
-    const real t736 = t735 * t722;
-    V[14] = t736;
-    const real t737 = t379 * t433;
-    const real t738 = t737 < 0.0;
-    const real t739 = t738 != 0 ? (-1.0) : 1.0;
-    const real t740 = t737 * t739;
-    V[15] = t740;
-    const real t741 = t432 * t384;
-    const real t742 = t424 * t433;
-    const real t743 = t741 + t742;
-    const real t744 = t743 * t739;
-    const real t745 = -t744;
-    V[16] = t745;
-    const real t746 = t492 * t384;
-    const real t747 = t476 * t433;
-    const real t748 = t746 - t747;
-    const real t749 = t748 * t739;
-    V[17] = t749;
-    const real t750 = t426 * t490;
-    const real t751 = t750 < 0.0;
-    const real t752 = t751 != 0 ? (-1.0) : 1.0;
-    const real t753 = t750 * t752;
-    V[18] = t753;
-    const real t754 = t489 * t431;
-    const real t755 = t480 * t490;
-    const real t756 = t754 + t755;
-    const real t757 = t756 * t752;
-    const real t758 = -t757;
-    V[19] = t758;
-    const real t759 = t264 * t485;
-    const real t760 = t482 * t759;
-    const real t761 = t760 < 0.0;
-    const real t762 = t761 != 0 ? (-1.0) : 1.0;
-    const real t763 = t760 * t762;
-    V[20] = t763;
-    const real t764 = t667 * t297;
-    const real t765 = t640 * t319;
-    const real t766 = t764 - t765;
-    const real t767 = t766 * t676;
-    d_V[0] = t767;
-    const real t768 = t665 * t317;
-    const real t769 = t644 * t348;
-    const real t770 = t768 - t769;
-    const real t771 = t770 * t701;
-    d_V[1] = t771;
-    const real t772 = t663 * t346;
-    const real t773 = t648 * t386;
-    const real t774 = t772 - t773;
-    const real t775 = t774 * t722;
-    d_V[2] = t775;
-    const real t776 = t661 * t384;
-    const real t777 = t652 * t433;
-    const real t778 = t776 - t777;
-    const real t779 = t778 * t739;
-    d_V[3] = t779;
-    const real t780 = t659 * t431;
-    const real t781 = t656 * t490;
-    const real t782 = t780 + t781;
-    const real t783 = t782 * t752;
-    const real t784 = -t783;
-    d_V[4] = t784;
-    const real t785 = t658 * t759;
-    const real t786 = t785 * t762;
-    d_V[5] = t786;
-    const real t787 = t594 * t302;
-    const real t788 = t634 * t300;
-    const real t789 = t787 - t788;
-    const real t790 = t507 + t789;
-    e_Q[0] = t790;
-    const real t791 = t594 * t324;
-    const real t792 = t634 * t322;
-    const real t793 = t791 + t792;
-    const real t794 = t517 + t793;
-    e_Q[1] = t794;
-    const real t795 = t594 * t355;
-    const real t796 = t634 * t353;
-    const real t797 = t795 + t796;
-    const real t798 = t531 + t797;
-    e_Q[2] = t798;
-    const real t799 = t594 * t395;
-    const real t800 = t634 * t393;
-    const real t801 = t799 + t800;
-    const real t802 = t548 + t801;
-    e_Q[3] = t802;
-    const real t803 = t594 * t444;
-    const real t804 = t634 * t442;
-    const real t805 = t803 + t804;
-    const real t806 = t568 + t805;
-    e_Q[4] = t806;
-    const real t807 = t594 * t503;
-    const real t808 = t634 * t501;
-    const real t809 = t807 + t808;
-    const real t810 = t591 + t809;
-    e_Q[5] = t810;
-    return 0;
+  real t6 = U[11] * U[11];
+  real t7 = U[7] * U[7];
+  real t8 = U[6] * U[6];
+  real t9 = U[2] * U[2];
+  real t10 = U[0] * U[0];
+  real t11 = U[1] * U[1];
+  real t17 = ((real)1 / (real)300000000000000) * (t6 + (t7 + (t8 + (t9 + (t10 + t11)))));
+  real t18 = (0.0 < floor_[0]) ? floor_[0] : t17;
+  real t26 = U[20] * U[20];
+  real t27 = U[19] * U[19];
+  real t28 = U[18] * U[18];
+  real t29 = U[17] * U[17];
+  real t30 = U[16] * U[16];
+  real t31 = U[15] * U[15];
+  real t32 = U[14] * U[14];
+  real t33 = U[13] * U[13];
+  real t34 = U[12] * U[12];
+  real t35 = U[10] * U[10];
+  real t36 = U[9] * U[9];
+  real t37 = U[8] * U[8];
+  real t38 = U[5] * U[5];
+  real t39 = U[3] * U[3];
+  real t40 = U[4] * U[4];
+  real t55 = ((real)1 / (real)300000000000000) * (t26 + (t27 + (t28 + (t29 + (t30 + (t31 + (t32 +
+    (t33 + (t34 + (t35 + (t36 + (t37 + (t38 + (t39 + t40))))))))))))));
+  real t56 = (0.0 < floor_[1]) ? floor_[1] : t55;
+  real t59 = H[10] * U[20];
+  real t60 = t59 * t59;
+  real t63 = H[8] * U[18] + H[10] * U[19];
+  real t64 = t63 * t63;
+  real t69 = H[6] * U[15] + H[8] * U[16] + H[10] * U[17];
+  real t70 = t69 * t69;
+  real t77 = H[4] * U[11] + H[6] * U[12] + H[8] * U[13] + H[10] * U[14];
+  real t78 = t77 * t77;
+  real t87 = H[2] * U[6] + H[4] * U[7] + H[6] * U[8] + H[8] * U[9] + H[10] * U[10];
+  real t88 = t87 * t87;
+  real t99 = H[0] * U[0] + H[2] * U[1] + H[4] * U[2] + H[6] * U[3] + H[8] * U[4] + H[10] * U[5];
+  real t100 = t99 * t99;
+  real t106 = t60 + (t64 + (t70 + (t78 + (t88 + (J[0] + t100)))));
+  if (!(((H[4] * H[4] + (H[0] * H[0] + H[2] * H[2])) * t18 + (H[10] * H[10] + (H[6] * H[6] + H[8] * H[8])) * t56 < t106))) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+  real t121 = H[11] * U[20];
+  real t125 = H[9] * U[18] + H[11] * U[19];
+  real t131 = H[7] * U[15] + H[9] * U[16] + H[11] * U[17];
+  real t139 = H[5] * U[11] + H[7] * U[12] + H[9] * U[13] + H[11] * U[14];
+  real t149 = H[3] * U[6] + H[5] * U[7] + H[7] * U[8] + H[9] * U[9] + H[11] * U[10];
+  real t161 = H[1] * U[0] + H[3] * U[1] + H[5] * U[2] + H[7] * U[3] + H[9] * U[4] + H[11] * U[5];
+  real t168 = t121 * t121 + (t125 * t125 + (t131 * t131 + (t139 * t139 + (t149 * t149 + (J[1] + t161
+    * t161)))));
+  if (!((t18 * (H[5] * H[5] + (H[1] * H[1] + H[3] * H[3])) + t56 * (H[11] * H[11] + (H[7] * H[7] + H[9] * H[9])) < t168))) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+  real t171 = sqrt(J[0]);
+  real t174 = sqrt(t60 + t171 * t171);
+  real t177 = sqrt(t64 + t174 * t174);
+  real t180 = sqrt(t70 + t177 * t177);
+  real t183 = sqrt(t78 + t180 * t180);
+  real t186 = sqrt(t88 + t183 * t183);
+  real t189 = sqrt(t100 + t186 * t186);
+  if (!((1e-26 * t106 < t189 * t189))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t193 = 0.0 < t186;
+  real t195 = 1.0 / (t193 != 0 ? t186 : 1.0);
+  real t196 = t87 * t195;
+  real t197 = t193 != 0 ? t196 : 1.0;
+  real t199 = 0.0 < t183;
+  real t201 = 1.0 / (t199 != 0 ? t183 : 1.0);
+  real t202 = t77 * t201;
+  real t203 = t199 != 0 ? t202 : 1.0;
+  real t205 = 0.0 < t180;
+  real t207 = 1.0 / (t205 != 0 ? t180 : 1.0);
+  real t208 = t69 * t207;
+  real t209 = t205 != 0 ? t208 : 1.0;
+  real t211 = 0.0 < t177;
+  real t213 = 1.0 / (t211 != 0 ? t177 : 1.0);
+  real t214 = t63 * t213;
+  real t215 = t211 != 0 ? t214 : 1.0;
+  real t217 = 0.0 < t174;
+  real t219 = 1.0 / (t217 != 0 ? t174 : 1.0);
+  real t220 = t59 * t219;
+  real t221 = t217 != 0 ? t220 : 1.0;
+  real t222 = t121 * t221;
+  real t223 = t174 * t213;
+  real t225 = t125 * t215 + t222 * t223;
+  real t226 = t177 * t207;
+  real t228 = t131 * t209 + t225 * t226;
+  real t229 = t180 * t201;
+  real t231 = t139 * t203 + t228 * t229;
+  real t232 = t183 * t195;
+  real t234 = t149 * t197 + t231 * t232;
+  real t235 = 0.0 < t189;
+  real t237 = 1.0 / (t235 != 0 ? t189 : 1.0);
+  real t238 = t99 * t237;
+  real t239 = t235 != 0 ? t238 : 1.0;
+  real t241 = t186 * t237;
+  real t243 = t234 * t239 - t161 * t241;
+  real t247 = t231 * t197 - t149 * t232;
+  real t251 = t228 * t203 - t139 * t229;
+  real t255 = t225 * t209 - t131 * t226;
+  real t259 = t222 * t215 - t125 * t223;
+  real t261 = t171 * t219;
+  real t262 = t121 * t261;
+  real t264 = sqrt(J[1]);
+  real t267 = sqrt(t262 * t262 + t264 * t264);
+  real t270 = sqrt(t259 * t259 + t267 * t267);
+  real t273 = sqrt(t255 * t255 + t270 * t270);
+  real t276 = sqrt(t251 * t251 + t273 * t273);
+  real t279 = sqrt(t247 * t247 + t276 * t276);
+  real t282 = sqrt(t243 * t243 + t279 * t279);
+  if (!((1e-26 * t168 < t282 * t282))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t286 = 1.0 / t189;
+  real t291 = (t161 * t239 + t234 * t241) * t286;
+  real t292 = U[0] * t241;
+  real t293 = 0.0 < t282;
+  real t295 = 1.0 / (t293 != 0 ? t282 : 1.0);
+  real t296 = t243 * t295;
+  real t297 = t293 != 0 ? t296 : 1.0;
+  real t299 = 1.0 / t282;
+  real t300 = t292 * t297 * t299;
+  real t302 = U[0] * t239 * t286 + t291 * t300;
+  G[0] = t302;
+  real t304 = U[6] * t197;
+  real t310 = t304 * t239 - U[1] * t241;
+  real t312 = U[6] * t232;
+  real t313 = 0.0 < t279;
+  real t315 = 1.0 / (t313 != 0 ? t279 : 1.0);
+  real t316 = t247 * t315;
+  real t317 = t313 != 0 ? t316 : 1.0;
+  real t318 = t312 * t317;
+  real t319 = t279 * t295;
+  real t322 = (t310 * t297 - t318 * t319) * t299;
+  real t324 = (U[1] * t239 + t304 * t241) * t286 - t291 * t322;
+  G[1] = t324;
+  real t327 = U[11] * t203;
+  real t329 = U[7] * t197 + t327 * t232;
+  real t335 = t329 * t239 - U[2] * t241;
+  real t339 = t327 * t197 - U[7] * t232;
+  real t341 = U[11] * t229;
+  real t342 = 0.0 < t276;
+  real t344 = 1.0 / (t342 != 0 ? t276 : 1.0);
+  real t345 = t251 * t344;
+  real t346 = t342 != 0 ? t345 : 1.0;
+  real t347 = t341 * t346;
+  real t348 = t276 * t315;
+  real t350 = t339 * t317 - t347 * t348;
+  real t353 = (t335 * t297 + t350 * t319) * t299;
+  real t355 = (U[2] * t239 + t329 * t241) * t286 - t291 * t353;
+  G[2] = t355;
+  real t359 = U[15] * t209;
+  real t361 = U[12] * t203 + t359 * t229;
+  real t363 = U[8] * t197 + t361 * t232;
+  real t369 = t363 * t239 - U[3] * t241;
+  real t373 = t361 * t197 - U[8] * t232;
+  real t377 = t359 * t203 - U[12] * t229;
+  real t379 = U[15] * t226;
+  real t380 = 0.0 < t273;
+  real t382 = 1.0 / (t380 != 0 ? t273 : 1.0);
+  real t383 = t255 * t382;
+  real t384 = t380 != 0 ? t383 : 1.0;
+  real t385 = t379 * t384;
+  real t386 = t273 * t344;
+  real t388 = t377 * t346 - t385 * t386;
+  real t390 = t373 * t317 + t388 * t348;
+  real t393 = (t369 * t297 + t390 * t319) * t299;
+  real t395 = (U[3] * t239 + t363 * t241) * t286 - t291 * t393;
+  G[3] = t395;
+  real t400 = U[18] * t215;
+  real t402 = U[16] * t209 + t400 * t226;
+  real t404 = U[13] * t203 + t402 * t229;
+  real t406 = U[9] * t197 + t404 * t232;
+  real t412 = t406 * t239 - U[4] * t241;
+  real t416 = t404 * t197 - U[9] * t232;
+  real t420 = t402 * t203 - U[13] * t229;
+  real t424 = t400 * t209 - U[16] * t226;
+  real t426 = U[18] * t223;
+  real t427 = 0.0 < t270;
+  real t429 = 1.0 / (t427 != 0 ? t270 : 1.0);
+  real t430 = t259 * t429;
+  real t431 = t427 != 0 ? t430 : 1.0;
+  real t432 = t426 * t431;
+  real t433 = t270 * t382;
+  real t435 = t424 * t384 - t432 * t433;
+  real t437 = t420 * t346 + t435 * t386;
+  real t439 = t416 * t317 + t437 * t348;
+  real t442 = (t412 * t297 + t439 * t319) * t299;
+  real t444 = (U[4] * t239 + t406 * t241) * t286 - t291 * t442;
+  G[4] = t444;
+  real t450 = U[20] * t221;
+  real t452 = U[19] * t215 + t450 * t223;
+  real t454 = U[17] * t209 + t452 * t226;
+  real t456 = U[14] * t203 + t454 * t229;
+  real t458 = U[10] * t197 + t456 * t232;
+  real t464 = t458 * t239 - U[5] * t241;
+  real t468 = t456 * t197 - U[10] * t232;
+  real t472 = t454 * t203 - U[14] * t229;
+  real t476 = t452 * t209 - U[17] * t226;
+  real t480 = t450 * t215 - U[19] * t223;
+  real t482 = U[20] * t261;
+  real t483 = 0.0 < t267;
+  real t485 = 1.0 / (t483 != 0 ? t267 : 1.0);
+  real t487 = -(t262 * t485);
+  real t488 = t483 != 0 ? t487 : 1.0;
+  real t489 = t482 * t488;
+  real t490 = t267 * t429;
+  real t492 = t480 * t431 - t489 * t490;
+  real t494 = t476 * t384 + t492 * t433;
+  real t496 = t472 * t346 + t494 * t386;
+  real t498 = t468 * t317 + t496 * t348;
+  real t501 = (t464 * t297 + t498 * t319) * t299;
+  real t503 = (U[5] * t239 + t458 * t241) * t286 - t291 * t501;
+  G[5] = t503;
+  G[6] = -t300;
+  G[7] = t322;
+  G[8] = t353;
+  G[9] = t393;
+  G[10] = t442;
+  G[11] = t501;
+  real t506 = t10 * 1e-26 < t10;
+  real t507 = t506 != 0 ? 0.0 : e[0];
+  real t511 = 1e-26 * (t8 + t11) < t8;
+  real t513 = e[0] * (1.0 / U[0]);
+  real t514 = t506 != 0 ? t513 : 0.0;
+  real t516 = e[1] - U[1] * t514;
+  real t517 = t511 != 0 ? 0.0 : t516;
+  real t523 = 1e-26 * (t6 + (t9 + t7)) < t6;
+  real t526 = t516 * (1.0 / U[6]);
+  real t527 = t511 != 0 ? t526 : 0.0;
+  real t530 = e[2] - (U[2] * t514 + U[7] * t527);
+  real t531 = t523 != 0 ? 0.0 : t530;
+  real t538 = 1e-26 * (t31 + (t34 + (t39 + t37))) < t31;
+  real t540 = t530 * (1.0 / U[11]);
+  real t541 = t523 != 0 ? t540 : 0.0;
+  real t547 = e[3] - (U[12] * t541 + (U[3] * t514 + U[8] * t527));
+  real t548 = t538 != 0 ? 0.0 : t547;
+  real t556 = 1e-26 * (t28 + (t30 + (t33 + (t40 + t36)))) < t28;
+  real t558 = t547 * (1.0 / U[15]);
+  real t559 = t538 != 0 ? t558 : 0.0;
+  real t567 = e[4] - (U[16] * t559 + (U[13] * t541 + (U[4] * t514 + U[9] * t527)));
+  real t568 = t556 != 0 ? 0.0 : t567;
+  real t577 = 1e-26 * (t26 + (t27 + (t29 + (t32 + (t38 + t35))))) < t26;
+  real t579 = t567 * (1.0 / U[18]);
+  real t580 = t556 != 0 ? t579 : 0.0;
+  real t590 = e[5] - (U[19] * t580 + (U[17] * t559 + (U[14] * t541 + (U[5] * t514 + U[10] *
+    t527))));
+  real t591 = t577 != 0 ? 0.0 : t590;
+  real t594 = tau[0] - (H[0] * t507 + H[2] * t517 + H[4] * t531 + H[6] * t548 + H[8] * t568 + H[10]
+    * t591);
+  real t596 = d[0] + t514;
+  real t598 = d[1] + t527;
+  real t600 = d[2] + t541;
+  real t602 = d[3] + t559;
+  real t604 = d[4] + t580;
+  real t607 = t590 * (1.0 / U[20]);
+  real t609 = d[5] + (t577 != 0 ? t607 : 0.0);
+  real t610 = t609 * t221;
+  real t612 = t604 * t215 + t610 * t223;
+  real t614 = t602 * t209 + t612 * t226;
+  real t616 = t600 * t203 + t614 * t229;
+  real t618 = t598 * t197 + t616 * t232;
+  real t634 = tau[1] - (H[1] * t507 + H[3] * t517 + H[5] * t531 + H[7] * t548 + H[9] * t568 + H[11]
+    * t591);
+  real t640 = t618 * t239 - t596 * t241;
+  real t644 = t616 * t197 - t598 * t232;
+  real t648 = t614 * t203 - t600 * t229;
+  real t652 = t612 * t209 - t602 * t226;
+  real t656 = t610 * t215 - t604 * t223;
+  real t658 = t609 * t261;
+  real t659 = t658 * t488;
+  real t661 = t656 * t431 - t659 * t490;
+  real t663 = t652 * t384 + t661 * t433;
+  real t665 = t648 * t346 + t663 * t386;
+  real t667 = t644 * t317 + t665 * t348;
+  real t671 = t299 * (t299 * (t634 - t594 * t291) - (t640 * t297 + t667 * t319));
+  g[0] = t286 * (t594 * t286 - (t596 * t239 + t618 * t241)) - t291 * t671;
+  g[1] = t671;
+  real t674 = t292 * t319;
+  real t676 = (t674 < 0.0) ? (-1.0) : 1.0;
+  V[0] = t674 * t676;
+  V[1] = -((t318 * t297 + t310 * t319) * t676);
+  V[2] = (t350 * t297 - t335 * t319) * t676;
+  V[3] = (t390 * t297 - t369 * t319) * t676;
+  V[4] = (t439 * t297 - t412 * t319) * t676;
+  V[5] = (t498 * t297 - t464 * t319) * t676;
+  real t699 = t312 * t348;
+  real t701 = (t699 < 0.0) ? (-1.0) : 1.0;
+  V[6] = t699 * t701;
+  V[7] = -((t347 * t317 + t339 * t348) * t701);
+  V[8] = (t388 * t317 - t373 * t348) * t701;
+  V[9] = (t437 * t317 - t416 * t348) * t701;
+  V[10] = (t496 * t317 - t468 * t348) * t701;
+  real t720 = t341 * t386;
+  real t722 = (t720 < 0.0) ? (-1.0) : 1.0;
+  V[11] = t720 * t722;
+  V[12] = -((t385 * t346 + t377 * t386) * t722);
+  V[13] = (t435 * t346 - t420 * t386) * t722;
+  V[14] = (t494 * t346 - t472 * t386) * t722;
+  real t737 = t379 * t433;
+  real t739 = (t737 < 0.0) ? (-1.0) : 1.0;
+  V[15] = t737 * t739;
+  V[16] = -((t432 * t384 + t424 * t433) * t739);
+  V[17] = (t492 * t384 - t476 * t433) * t739;
+  real t750 = t426 * t490;
+  real t752 = (t750 < 0.0) ? (-1.0) : 1.0;
+  V[18] = t750 * t752;
+  V[19] = -((t489 * t431 + t480 * t490) * t752);
+  real t759 = t264 * t485;
+  real t760 = t482 * t759;
+  real t762 = (t760 < 0.0) ? (-1.0) : 1.0;
+  V[20] = t760 * t762;
+  d_V[0] = (t667 * t297 - t640 * t319) * t676;
+  d_V[1] = (t665 * t317 - t644 * t348) * t701;
+  d_V[2] = (t663 * t346 - t648 * t386) * t722;
+  d_V[3] = (t661 * t384 - t652 * t433) * t739;
+  d_V[4] = -((t659 * t431 + t656 * t490) * t752);
+  d_V[5] = t658 * t759 * t762;
+  e_Q[0] = t507 + (t594 * t302 - t634 * t300);
+  e_Q[1] = t517 + (t594 * t324 + t634 * t322);
+  e_Q[2] = t531 + (t594 * t355 + t634 * t353);
+  e_Q[3] = t548 + (t594 * t395 + t634 * t393);
+  e_Q[4] = t568 + (t594 * t444 + t634 * t442);
+  e_Q[5] = t591 + (t594 * t503 + t634 * t501);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_qr_eliminate_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_qr_eliminate_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic2_qr_eliminate_guards[] = {
-    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic2_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 2 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3629,103 +1015,25 @@ static const mstmm_guard mstmm_sweep_generic2_qr_eliminate_guards[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic2_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic2_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = H[6] * s[0];
-    const real t7 = H[7] * s[1];
-    const real t8 = t6 + t7;
-    const real t9 = c[3] + t8;
-    const real t10 = t5 - t9;
-    const real t11 = motion[3] + t10;
-    Q[3] = t11;
-    const real t12 = w[2] * t0;
-    const real t13 = w[0] * t2;
-    const real t14 = t12 - t13;
-    const real t15 = H[8] * s[0];
-    const real t16 = H[9] * s[1];
-    const real t17 = t15 + t16;
-    const real t18 = c[4] + t17;
-    const real t19 = t14 - t18;
-    const real t20 = motion[4] + t19;
-    Q[4] = t20;
-    const real t21 = w[0] * t1;
-    const real t22 = w[1] * t0;
-    const real t23 = t21 - t22;
-    const real t24 = H[10] * s[0];
-    const real t25 = H[11] * s[1];
-    const real t26 = t24 + t25;
-    const real t27 = c[5] + t26;
-    const real t28 = t23 - t27;
-    const real t29 = motion[5] + t28;
-    Q[5] = t29;
-    const real t30 = v[1] * t2;
-    const real t31 = t30 * 2.0;
-    const real t32 = v[2] * t1;
-    const real t33 = 2.0 * t32;
-    const real t34 = t31 - t33;
-    const real t35 = H[0] * s[0];
-    const real t36 = H[1] * s[1];
-    const real t37 = t35 + t36;
-    const real t38 = c[0] + t37;
-    const real t39 = t34 - t38;
-    const real t40 = motion[6] + t39;
-    Q[6] = t40;
-    const real t41 = v[2] * t0;
-    const real t42 = 2.0 * t41;
-    const real t43 = v[0] * t2;
-    const real t44 = 2.0 * t43;
-    const real t45 = t42 - t44;
-    const real t46 = H[2] * s[0];
-    const real t47 = H[3] * s[1];
-    const real t48 = t46 + t47;
-    const real t49 = c[1] + t48;
-    const real t50 = t45 - t49;
-    const real t51 = motion[7] + t50;
-    Q[7] = t51;
-    const real t52 = v[0] * t1;
-    const real t53 = 2.0 * t52;
-    const real t54 = v[1] * t0;
-    const real t55 = 2.0 * t54;
-    const real t56 = t53 - t55;
-    const real t57 = H[4] * s[0];
-    const real t58 = H[5] * s[1];
-    const real t59 = t57 + t58;
-    const real t60 = c[2] + t59;
-    const real t61 = t56 - t60;
-    const real t62 = motion[8] + t61;
-    Q[8] = t62;
-    return 0;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - (c[3] + (H[6] * s[0] + H[7] * s[1])));
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - (c[4] + (H[8] * s[0] + H[9] * s[1])));
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - (c[5] + (H[10] * s[0] + H[11] * s[1])));
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - (c[0] + (H[0] * s[0] + H[1] * s[1])));
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - (c[1] + (H[2] * s[0] + H[3] * s[1])));
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - (c[2] + (H[4] * s[0] + H[5] * s[1])));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_carrier_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 2 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3749,294 +1057,52 @@ static const mstmm_port mstmm_sweep_generic2_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic2_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic2_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = H[6] * d_s[0];
-    const real t16 = H[7] * d_s[1];
-    const real t17 = t15 + t16;
-    const real t18 = s[0] * d_H[6];
-    const real t19 = s[1] * d_H[7];
-    const real t20 = t18 + t19;
-    const real t21 = t17 + t20;
-    const real t22 = d_c[3] + t21;
-    const real t23 = theta[2] * Q[4];
-    const real t24 = Q[1] * d_w[2];
-    const real t25 = Q[2] * d_w[1];
-    const real t26 = t24 - t25;
-    const real t27 = t23 + t26;
-    const real t28 = theta[1] * Q[5];
-    const real t29 = t27 - t28;
-    const real t30 = t22 + t29;
-    const real t31 = t14 + t30;
-    B[3] = t31;
-    const real t32 = w[0] * t10;
-    const real t33 = w[2] * t2;
-    const real t34 = t32 - t33;
-    const real t35 = H[8] * d_s[0];
-    const real t36 = H[9] * d_s[1];
-    const real t37 = t35 + t36;
-    const real t38 = s[0] * d_H[8];
-    const real t39 = s[1] * d_H[9];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = d_c[4] + t41;
-    const real t43 = theta[0] * Q[5];
-    const real t44 = Q[2] * d_w[0];
-    const real t45 = Q[0] * d_w[2];
-    const real t46 = t44 - t45;
-    const real t47 = theta[2] * Q[3];
-    const real t48 = t46 - t47;
-    const real t49 = t43 + t48;
-    const real t50 = t42 + t49;
-    const real t51 = t34 + t50;
-    B[4] = t51;
-    const real t52 = w[1] * t2;
-    const real t53 = w[0] * t6;
-    const real t54 = t52 - t53;
-    const real t55 = H[10] * d_s[0];
-    const real t56 = H[11] * d_s[1];
-    const real t57 = t55 + t56;
-    const real t58 = s[0] * d_H[10];
-    const real t59 = s[1] * d_H[11];
-    const real t60 = t58 + t59;
-    const real t61 = t57 + t60;
-    const real t62 = d_c[5] + t61;
-    const real t63 = theta[1] * Q[3];
-    const real t64 = Q[0] * d_w[1];
-    const real t65 = Q[1] * d_w[0];
-    const real t66 = t64 - t65;
-    const real t67 = t63 + t66;
-    const real t68 = theta[0] * Q[4];
-    const real t69 = t67 - t68;
-    const real t70 = t62 + t69;
-    const real t71 = t54 + t70;
-    B[5] = t71;
-    const real t72 = v[2] * 2.0;
-    const real t73 = t6 * t72;
-    const real t74 = v[1] * 2.0;
-    const real t75 = t10 * t74;
-    const real t76 = t73 - t75;
-    const real t77 = H[0] * d_s[0];
-    const real t78 = H[1] * d_s[1];
-    const real t79 = t77 + t78;
-    const real t80 = s[0] * d_H[0];
-    const real t81 = s[1] * d_H[1];
-    const real t82 = t80 + t81;
-    const real t83 = t79 + t82;
-    const real t84 = d_c[0] + t83;
-    const real t85 = theta[2] * Q[7];
-    const real t86 = x[2] * Q[4];
-    const real t87 = Q[1] * d_v[2];
-    const real t88 = 2.0 * t87;
-    const real t89 = x[1] * Q[0];
-    const real t90 = x[0] * Q[1];
-    const real t91 = t89 - t90;
-    const real t92 = Q[1] * t91;
-    const real t93 = x[0] * Q[2];
-    const real t94 = x[2] * Q[0];
-    const real t95 = t93 - t94;
-    const real t96 = Q[2] * t95;
-    const real t97 = t92 - t96;
-    const real t98 = t88 + t97;
-    const real t99 = Q[2] * d_v[1];
-    const real t100 = 2.0 * t99;
-    const real t101 = t98 - t100;
-    const real t102 = t86 + t101;
-    const real t103 = x[1] * Q[5];
-    const real t104 = t102 - t103;
-    const real t105 = t85 + t104;
-    const real t106 = theta[1] * Q[8];
-    const real t107 = t105 - t106;
-    const real t108 = t84 + t107;
-    const real t109 = t76 + t108;
-    B[6] = t109;
-    const real t110 = v[0] * 2.0;
-    const real t111 = t10 * t110;
-    const real t112 = t2 * t72;
-    const real t113 = t111 - t112;
-    const real t114 = H[2] * d_s[0];
-    const real t115 = H[3] * d_s[1];
-    const real t116 = t114 + t115;
-    const real t117 = s[0] * d_H[2];
-    const real t118 = s[1] * d_H[3];
-    const real t119 = t117 + t118;
-    const real t120 = t116 + t119;
-    const real t121 = d_c[1] + t120;
-    const real t122 = theta[0] * Q[8];
-    const real t123 = x[0] * Q[5];
-    const real t124 = Q[2] * d_v[0];
-    const real t125 = 2.0 * t124;
-    const real t126 = x[2] * Q[1];
-    const real t127 = x[1] * Q[2];
-    const real t128 = t126 - t127;
-    const real t129 = Q[2] * t128;
-    const real t130 = Q[0] * t91;
-    const real t131 = t129 - t130;
-    const real t132 = Q[0] * d_v[2];
-    const real t133 = 2.0 * t132;
-    const real t134 = t131 - t133;
-    const real t135 = t125 + t134;
-    const real t136 = x[2] * Q[3];
-    const real t137 = t135 - t136;
-    const real t138 = t123 + t137;
-    const real t139 = theta[2] * Q[6];
-    const real t140 = t138 - t139;
-    const real t141 = t122 + t140;
-    const real t142 = t121 + t141;
-    const real t143 = t113 + t142;
-    B[7] = t143;
-    const real t144 = t2 * t74;
-    const real t145 = t6 * t110;
-    const real t146 = t144 - t145;
-    const real t147 = H[4] * d_s[0];
-    const real t148 = H[5] * d_s[1];
-    const real t149 = t147 + t148;
-    const real t150 = s[0] * d_H[4];
-    const real t151 = s[1] * d_H[5];
-    const real t152 = t150 + t151;
-    const real t153 = t149 + t152;
-    const real t154 = d_c[2] + t153;
-    const real t155 = theta[1] * Q[6];
-    const real t156 = x[1] * Q[3];
-    const real t157 = Q[0] * d_v[1];
-    const real t158 = 2.0 * t157;
-    const real t159 = Q[0] * t95;
-    const real t160 = Q[1] * t128;
-    const real t161 = t159 - t160;
-    const real t162 = t158 + t161;
-    const real t163 = Q[1] * d_v[0];
-    const real t164 = 2.0 * t163;
-    const real t165 = t162 - t164;
-    const real t166 = t156 + t165;
-    const real t167 = x[0] * Q[4];
-    const real t168 = t166 - t167;
-    const real t169 = t155 + t168;
-    const real t170 = theta[0] * Q[7];
-    const real t171 = t169 - t170;
-    const real t172 = t154 + t171;
-    const real t173 = t146 + t172;
-    B[8] = t173;
-    const real t174 = theta[1] * f[2];
-    const real t175 = theta[2] * f[1];
-    const real t176 = t174 - t175;
-    G[0] = t176;
-    const real t177 = theta[2] * f[0];
-    const real t178 = theta[0] * f[2];
-    const real t179 = t177 - t178;
-    G[1] = t179;
-    const real t180 = theta[0] * f[1];
-    const real t181 = theta[1] * f[0];
-    const real t182 = t180 - t181;
-    G[2] = t182;
-    const real t183 = theta[1] * f[5];
-    const real t184 = x[1] * f[2];
-    const real t185 = x[2] * f[1];
-    const real t186 = t184 - t185;
-    const real t187 = theta[2] * f[4];
-    const real t188 = t186 - t187;
-    const real t189 = t183 + t188;
-    G[3] = t189;
-    const real t190 = theta[2] * f[3];
-    const real t191 = x[2] * f[0];
-    const real t192 = x[0] * f[2];
-    const real t193 = t191 - t192;
-    const real t194 = t190 + t193;
-    const real t195 = theta[0] * f[5];
-    const real t196 = t194 - t195;
-    G[4] = t196;
-    const real t197 = theta[0] * f[4];
-    const real t198 = x[0] * f[1];
-    const real t199 = x[1] * f[0];
-    const real t200 = t198 - t199;
-    const real t201 = theta[1] * f[3];
-    const real t202 = t200 - t201;
-    const real t203 = t197 + t202;
-    G[5] = t203;
-    const real t204 = d_s[0] * J[0];
-    const real t205 = f[0] * d_H[0];
-    const real t206 = f[1] * d_H[2];
-    const real t207 = t205 + t206;
-    const real t208 = f[2] * d_H[4];
-    const real t209 = t207 + t208;
-    const real t210 = f[3] * d_H[6];
-    const real t211 = t209 + t210;
-    const real t212 = f[4] * d_H[8];
-    const real t213 = t211 + t212;
-    const real t214 = f[5] * d_H[10];
-    const real t215 = t213 + t214;
-    const real t216 = t215 - laws[0];
-    const real t217 = t204 + t216;
-    row[0] = t217;
-    const real t218 = d_s[1] * J[1];
-    const real t219 = f[0] * d_H[1];
-    const real t220 = f[1] * d_H[3];
-    const real t221 = t219 + t220;
-    const real t222 = f[2] * d_H[5];
-    const real t223 = t221 + t222;
-    const real t224 = f[3] * d_H[7];
-    const real t225 = t223 + t224;
-    const real t226 = f[4] * d_H[9];
-    const real t227 = t225 + t226;
-    const real t228 = f[5] * d_H[11];
-    const real t229 = t227 + t228;
-    const real t230 = t229 - laws[1];
-    const real t231 = t218 + t230;
-    row[1] = t231;
-    return 0;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (H[6] * d_s[0] + H[7] * d_s[1] + (s[0] * d_H[6] + s[1] *
+    d_H[7])) + (theta[2] * Q[4] + (Q[1] * d_w[2] - Q[2] * d_w[1]) - theta[1] * Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (H[8] * d_s[0] + H[9] * d_s[1] + (s[0] * d_H[8] + s[1] *
+    d_H[9])) + (theta[0] * Q[5] + (Q[2] * d_w[0] - Q[0] * d_w[2] - theta[2] * Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (H[10] * d_s[0] + H[11] * d_s[1] + (s[0] * d_H[10] + s[1]
+    * d_H[11])) + (theta[1] * Q[3] + (Q[0] * d_w[1] - Q[1] * d_w[0]) - theta[0] * Q[4]));
+  real t72 = v[2] * 2.0;
+  real t74 = v[1] * 2.0;
+  real t91 = x[1] * Q[0] - x[0] * Q[1];
+  real t95 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t72 - t10 * t74 + (d_c[0] + (H[0] * d_s[0] + H[1] * d_s[1] + (s[0] * d_H[0] + s[1] *
+    d_H[1])) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * d_v[2]) + (Q[1] * t91 - Q[2] * t95)
+    - 2.0 * (Q[2] * d_v[1])) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t110 = v[0] * 2.0;
+  real t128 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t110 - t2 * t72 + (d_c[1] + (H[2] * d_s[0] + H[3] * d_s[1] + (s[0] * d_H[2] + s[1] *
+    d_H[3])) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * d_v[0]) + (Q[2] * t128 - Q[0] * t91
+    - 2.0 * (Q[0] * d_v[2])) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t2 * t74 - t6 * t110 + (d_c[2] + (H[4] * d_s[0] + H[5] * d_s[1] + (s[0] * d_H[4] + s[1] *
+    d_H[5])) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * d_v[1]) + (Q[0] * t95 - Q[1] * t128)
+    - 2.0 * (Q[1] * d_v[0])) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] + (f[0] * d_H[0] + f[1] * d_H[2] + f[2] * d_H[4] + f[3] * d_H[6] + f[4] *
+    d_H[8] + f[5] * d_H[10] - laws[0]);
+  row[1] = d_s[1] * J[1] + (f[0] * d_H[1] + f[1] * d_H[3] + f[2] * d_H[5] + f[3] * d_H[7] + f[4] *
+    d_H[9] + f[5] * d_H[11] - laws[1]);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 12, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 2, "", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"laws", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* rotation and displacement along coordinates of a hinge with 2 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4046,51 +1112,18 @@ static const mstmm_port mstmm_sweep_generic2_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic2_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x)
+int mstmm_sweep_generic2_tangent_coordinate_change(in_t H, in_t d_q, out_t theta, out_t x)
 {
-    const real t0 = H[6] * d_q[0];
-    const real t1 = H[7] * d_q[1];
-    const real t2 = t0 + t1;
-    theta[0] = t2;
-    const real t3 = H[8] * d_q[0];
-    const real t4 = H[9] * d_q[1];
-    const real t5 = t3 + t4;
-    theta[1] = t5;
-    const real t6 = H[10] * d_q[0];
-    const real t7 = H[11] * d_q[1];
-    const real t8 = t6 + t7;
-    theta[2] = t8;
-    const real t9 = H[0] * d_q[0];
-    const real t10 = H[1] * d_q[1];
-    const real t11 = t9 + t10;
-    x[0] = t11;
-    const real t12 = H[2] * d_q[0];
-    const real t13 = H[3] * d_q[1];
-    const real t14 = t12 + t13;
-    x[1] = t14;
-    const real t15 = H[4] * d_q[0];
-    const real t16 = H[5] * d_q[1];
-    const real t17 = t15 + t16;
-    x[2] = t17;
-    return 0;
+  theta[0] = H[6] * d_q[0] + H[7] * d_q[1];
+  theta[1] = H[8] * d_q[0] + H[9] * d_q[1];
+  theta[2] = H[10] * d_q[0] + H[11] * d_q[1];
+  x[0] = H[0] * d_q[0] + H[1] * d_q[1];
+  x[1] = H[2] * d_q[0] + H[3] * d_q[1];
+  x[2] = H[4] * d_q[0] + H[5] * d_q[1];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_coordinate_change_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"d_q", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_coordinate_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_coordinate_change, (in[0], in[1], out[0], out[1]))
 
 /* a direction of a hinge with 2 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4110,277 +1143,55 @@ static const mstmm_port mstmm_sweep_generic2_tangent_coordinate_change_outputs[]
  * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic2_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row)
+int mstmm_sweep_generic2_tangent_steady(in_t theta, in_t x, in_t H, in_t v, in_t w, in_t Q, in_t f,
+    in_t d_u, in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[6] * d_u[0];
-    const real t1 = H[7] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = theta[2] * Q[1];
-    const real t4 = theta[1] * Q[2];
-    const real t5 = t3 - t4;
-    const real t6 = t2 + t5;
-    B[0] = t6;
-    const real t7 = H[8] * d_u[0];
-    const real t8 = H[9] * d_u[1];
-    const real t9 = t7 + t8;
-    const real t10 = theta[0] * Q[2];
-    const real t11 = theta[2] * Q[0];
-    const real t12 = t10 - t11;
-    const real t13 = t9 + t12;
-    B[1] = t13;
-    const real t14 = H[10] * d_u[0];
-    const real t15 = H[11] * d_u[1];
-    const real t16 = t14 + t15;
-    const real t17 = theta[1] * Q[0];
-    const real t18 = theta[0] * Q[1];
-    const real t19 = t17 - t18;
-    const real t20 = t16 + t19;
-    B[2] = t20;
-    const real t21 = w[2] * t12;
-    const real t22 = w[1] * t19;
-    const real t23 = t21 - t22;
-    const real t24 = H[6] * d_s[0];
-    const real t25 = H[7] * d_s[1];
-    const real t26 = t24 + t25;
-    const real t27 = theta[2] * Q[4];
-    const real t28 = Q[1] * t16;
-    const real t29 = Q[2] * t9;
-    const real t30 = t28 - t29;
-    const real t31 = t27 + t30;
-    const real t32 = theta[1] * Q[5];
-    const real t33 = t31 - t32;
-    const real t34 = t26 + t33;
-    const real t35 = t23 + t34;
-    B[3] = t35;
-    const real t36 = w[0] * t19;
-    const real t37 = w[2] * t5;
-    const real t38 = t36 - t37;
-    const real t39 = H[8] * d_s[0];
-    const real t40 = H[9] * d_s[1];
-    const real t41 = t39 + t40;
-    const real t42 = theta[0] * Q[5];
-    const real t43 = Q[2] * t2;
-    const real t44 = Q[0] * t16;
-    const real t45 = t43 - t44;
-    const real t46 = theta[2] * Q[3];
-    const real t47 = t45 - t46;
-    const real t48 = t42 + t47;
-    const real t49 = t41 + t48;
-    const real t50 = t38 + t49;
-    B[4] = t50;
-    const real t51 = w[1] * t5;
-    const real t52 = w[0] * t12;
-    const real t53 = t51 - t52;
-    const real t54 = H[10] * d_s[0];
-    const real t55 = H[11] * d_s[1];
-    const real t56 = t54 + t55;
-    const real t57 = theta[1] * Q[3];
-    const real t58 = Q[0] * t9;
-    const real t59 = Q[1] * t2;
-    const real t60 = t58 - t59;
-    const real t61 = t57 + t60;
-    const real t62 = theta[0] * Q[4];
-    const real t63 = t61 - t62;
-    const real t64 = t56 + t63;
-    const real t65 = t53 + t64;
-    B[5] = t65;
-    const real t66 = v[2] * 2.0;
-    const real t67 = t12 * t66;
-    const real t68 = v[1] * 2.0;
-    const real t69 = t19 * t68;
-    const real t70 = t67 - t69;
-    const real t71 = H[0] * d_s[0];
-    const real t72 = H[1] * d_s[1];
-    const real t73 = t71 + t72;
-    const real t74 = v[2] * t9;
-    const real t75 = H[4] * d_u[0];
-    const real t76 = H[5] * d_u[1];
-    const real t77 = t75 + t76;
-    const real t78 = w[1] * t77;
-    const real t79 = H[2] * d_u[0];
-    const real t80 = H[3] * d_u[1];
-    const real t81 = t79 + t80;
-    const real t82 = w[2] * t81;
-    const real t83 = t78 - t82;
-    const real t84 = t74 + t83;
-    const real t85 = v[1] * t16;
-    const real t86 = t84 - t85;
-    const real t87 = t73 + t86;
-    const real t88 = theta[2] * Q[7];
-    const real t89 = x[2] * Q[4];
-    const real t90 = Q[1] * t77;
-    const real t91 = 2.0 * t90;
-    const real t92 = x[1] * Q[0];
-    const real t93 = x[0] * Q[1];
-    const real t94 = t92 - t93;
-    const real t95 = Q[1] * t94;
-    const real t96 = x[0] * Q[2];
-    const real t97 = x[2] * Q[0];
-    const real t98 = t96 - t97;
-    const real t99 = Q[2] * t98;
-    const real t100 = t95 - t99;
-    const real t101 = t91 + t100;
-    const real t102 = Q[2] * t81;
-    const real t103 = 2.0 * t102;
-    const real t104 = t101 - t103;
-    const real t105 = t89 + t104;
-    const real t106 = x[1] * Q[5];
-    const real t107 = t105 - t106;
-    const real t108 = t88 + t107;
-    const real t109 = theta[1] * Q[8];
-    const real t110 = t108 - t109;
-    const real t111 = t87 + t110;
-    const real t112 = t70 + t111;
-    B[6] = t112;
-    const real t113 = v[0] * 2.0;
-    const real t114 = t19 * t113;
-    const real t115 = t5 * t66;
-    const real t116 = t114 - t115;
-    const real t117 = H[2] * d_s[0];
-    const real t118 = H[3] * d_s[1];
-    const real t119 = t117 + t118;
-    const real t120 = v[0] * t16;
-    const real t121 = H[0] * d_u[0];
-    const real t122 = H[1] * d_u[1];
-    const real t123 = t121 + t122;
-    const real t124 = w[2] * t123;
-    const real t125 = w[0] * t77;
-    const real t126 = t124 - t125;
-    const real t127 = v[2] * t2;
-    const real t128 = t126 - t127;
-    const real t129 = t120 + t128;
-    const real t130 = t119 + t129;
-    const real t131 = theta[0] * Q[8];
-    const real t132 = x[0] * Q[5];
-    const real t133 = Q[2] * t123;
-    const real t134 = 2.0 * t133;
-    const real t135 = x[2] * Q[1];
-    const real t136 = x[1] * Q[2];
-    const real t137 = t135 - t136;
-    const real t138 = Q[2] * t137;
-    const real t139 = Q[0] * t94;
-    const real t140 = t138 - t139;
-    const real t141 = Q[0] * t77;
-    const real t142 = 2.0 * t141;
-    const real t143 = t140 - t142;
-    const real t144 = t134 + t143;
-    const real t145 = x[2] * Q[3];
-    const real t146 = t144 - t145;
-    const real t147 = t132 + t146;
-    const real t148 = theta[2] * Q[6];
-    const real t149 = t147 - t148;
-    const real t150 = t131 + t149;
-    const real t151 = t130 + t150;
-    const real t152 = t116 + t151;
-    B[7] = t152;
-    const real t153 = t5 * t68;
-    const real t154 = t12 * t113;
-    const real t155 = t153 - t154;
-    const real t156 = H[4] * d_s[0];
-    const real t157 = H[5] * d_s[1];
-    const real t158 = t156 + t157;
-    const real t159 = v[1] * t2;
-    const real t160 = w[0] * t81;
-    const real t161 = w[1] * t123;
-    const real t162 = t160 - t161;
-    const real t163 = t159 + t162;
-    const real t164 = v[0] * t9;
-    const real t165 = t163 - t164;
-    const real t166 = t158 + t165;
-    const real t167 = theta[1] * Q[6];
-    const real t168 = x[1] * Q[3];
-    const real t169 = Q[0] * t81;
-    const real t170 = 2.0 * t169;
-    const real t171 = Q[0] * t98;
-    const real t172 = Q[1] * t137;
-    const real t173 = t171 - t172;
-    const real t174 = t170 + t173;
-    const real t175 = Q[1] * t123;
-    const real t176 = 2.0 * t175;
-    const real t177 = t174 - t176;
-    const real t178 = t168 + t177;
-    const real t179 = x[0] * Q[4];
-    const real t180 = t178 - t179;
-    const real t181 = t167 + t180;
-    const real t182 = theta[0] * Q[7];
-    const real t183 = t181 - t182;
-    const real t184 = t166 + t183;
-    const real t185 = t155 + t184;
-    B[8] = t185;
-    const real t186 = theta[1] * f[2];
-    const real t187 = theta[2] * f[1];
-    const real t188 = t186 - t187;
-    G[0] = t188;
-    const real t189 = theta[2] * f[0];
-    const real t190 = theta[0] * f[2];
-    const real t191 = t189 - t190;
-    G[1] = t191;
-    const real t192 = theta[0] * f[1];
-    const real t193 = theta[1] * f[0];
-    const real t194 = t192 - t193;
-    G[2] = t194;
-    const real t195 = theta[1] * f[5];
-    const real t196 = x[1] * f[2];
-    const real t197 = x[2] * f[1];
-    const real t198 = t196 - t197;
-    const real t199 = theta[2] * f[4];
-    const real t200 = t198 - t199;
-    const real t201 = t195 + t200;
-    G[3] = t201;
-    const real t202 = theta[2] * f[3];
-    const real t203 = x[2] * f[0];
-    const real t204 = x[0] * f[2];
-    const real t205 = t203 - t204;
-    const real t206 = t202 + t205;
-    const real t207 = theta[0] * f[5];
-    const real t208 = t206 - t207;
-    G[4] = t208;
-    const real t209 = theta[0] * f[4];
-    const real t210 = x[0] * f[1];
-    const real t211 = x[1] * f[0];
-    const real t212 = t210 - t211;
-    const real t213 = theta[1] * f[3];
-    const real t214 = t212 - t213;
-    const real t215 = t209 + t214;
-    G[5] = t215;
-    const real t216 = d_s[0] * J[0];
-    const real t217 = t216 - laws[0];
-    row[0] = t217;
-    const real t218 = d_s[1] * J[1];
-    const real t219 = t218 - laws[1];
-    row[1] = t219;
-    return 0;
+  real t2 = H[6] * d_u[0] + H[7] * d_u[1];
+  real t5 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t2 + t5;
+  real t9 = H[8] * d_u[0] + H[9] * d_u[1];
+  real t12 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t9 + t12;
+  real t16 = H[10] * d_u[0] + H[11] * d_u[1];
+  real t19 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t16 + t19;
+  B[3] = w[2] * t12 - w[1] * t19 + (H[6] * d_s[0] + H[7] * d_s[1] + (theta[2] * Q[4] + (Q[1] * t16 -
+    Q[2] * t9) - theta[1] * Q[5]));
+  B[4] = w[0] * t19 - w[2] * t5 + (H[8] * d_s[0] + H[9] * d_s[1] + (theta[0] * Q[5] + (Q[2] * t2 -
+    Q[0] * t16 - theta[2] * Q[3])));
+  B[5] = w[1] * t5 - w[0] * t12 + (H[10] * d_s[0] + H[11] * d_s[1] + (theta[1] * Q[3] + (Q[0] * t9 -
+    Q[1] * t2) - theta[0] * Q[4]));
+  real t66 = v[2] * 2.0;
+  real t68 = v[1] * 2.0;
+  real t77 = H[4] * d_u[0] + H[5] * d_u[1];
+  real t81 = H[2] * d_u[0] + H[3] * d_u[1];
+  real t94 = x[1] * Q[0] - x[0] * Q[1];
+  real t98 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t12 * t66 - t19 * t68 + (H[0] * d_s[0] + H[1] * d_s[1] + (v[2] * t9 + (w[1] * t77 - w[2] *
+    t81) - v[1] * t16) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * t77) + (Q[1] * t94 - Q[2]
+    * t98) - 2.0 * (Q[2] * t81)) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t113 = v[0] * 2.0;
+  real t123 = H[0] * d_u[0] + H[1] * d_u[1];
+  real t137 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t19 * t113 - t5 * t66 + (H[2] * d_s[0] + H[3] * d_s[1] + (v[0] * t16 + (w[2] * t123 - w[0]
+    * t77 - v[2] * t2)) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * t123) + (Q[2] * t137 -
+    Q[0] * t94 - 2.0 * (Q[0] * t77)) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t5 * t68 - t12 * t113 + (H[4] * d_s[0] + H[5] * d_s[1] + (v[1] * t2 + (w[0] * t81 - w[1] *
+    t123) - v[0] * t9) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * t81) + (Q[0] * t98 - Q[1]
+    * t137) - 2.0 * (Q[1] * t123)) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_steady_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_steady_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 2, "", 0, 0},
-    {"d_s", 2, "", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"laws", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_steady_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_steady, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], out[0], out[1], out[2]))
 
 /* a direction of a hinge with 2 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4398,151 +1209,40 @@ static const mstmm_port mstmm_sweep_generic2_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[2] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic2_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+int mstmm_sweep_generic2_tangent_rotational(in_t theta, in_t H, in_t w, in_t Q, in_t f, in_t d_u,
+    in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[6] * d_u[0];
-    const real t1 = H[7] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = theta[2] * Q[1];
-    const real t4 = theta[1] * Q[2];
-    const real t5 = t3 - t4;
-    const real t6 = t2 + t5;
-    B[0] = t6;
-    const real t7 = H[8] * d_u[0];
-    const real t8 = H[9] * d_u[1];
-    const real t9 = t7 + t8;
-    const real t10 = theta[0] * Q[2];
-    const real t11 = theta[2] * Q[0];
-    const real t12 = t10 - t11;
-    const real t13 = t9 + t12;
-    B[1] = t13;
-    const real t14 = H[10] * d_u[0];
-    const real t15 = H[11] * d_u[1];
-    const real t16 = t14 + t15;
-    const real t17 = theta[1] * Q[0];
-    const real t18 = theta[0] * Q[1];
-    const real t19 = t17 - t18;
-    const real t20 = t16 + t19;
-    B[2] = t20;
-    const real t21 = w[2] * t12;
-    const real t22 = w[1] * t19;
-    const real t23 = t21 - t22;
-    const real t24 = H[6] * d_s[0];
-    const real t25 = H[7] * d_s[1];
-    const real t26 = t24 + t25;
-    const real t27 = theta[2] * Q[4];
-    const real t28 = Q[1] * t16;
-    const real t29 = Q[2] * t9;
-    const real t30 = t28 - t29;
-    const real t31 = t27 + t30;
-    const real t32 = theta[1] * Q[5];
-    const real t33 = t31 - t32;
-    const real t34 = t26 + t33;
-    const real t35 = t23 + t34;
-    B[3] = t35;
-    const real t36 = w[0] * t19;
-    const real t37 = w[2] * t5;
-    const real t38 = t36 - t37;
-    const real t39 = H[8] * d_s[0];
-    const real t40 = H[9] * d_s[1];
-    const real t41 = t39 + t40;
-    const real t42 = theta[0] * Q[5];
-    const real t43 = Q[2] * t2;
-    const real t44 = Q[0] * t16;
-    const real t45 = t43 - t44;
-    const real t46 = theta[2] * Q[3];
-    const real t47 = t45 - t46;
-    const real t48 = t42 + t47;
-    const real t49 = t41 + t48;
-    const real t50 = t38 + t49;
-    B[4] = t50;
-    const real t51 = w[1] * t5;
-    const real t52 = w[0] * t12;
-    const real t53 = t51 - t52;
-    const real t54 = H[10] * d_s[0];
-    const real t55 = H[11] * d_s[1];
-    const real t56 = t54 + t55;
-    const real t57 = theta[1] * Q[3];
-    const real t58 = Q[0] * t9;
-    const real t59 = Q[1] * t2;
-    const real t60 = t58 - t59;
-    const real t61 = t57 + t60;
-    const real t62 = theta[0] * Q[4];
-    const real t63 = t61 - t62;
-    const real t64 = t56 + t63;
-    const real t65 = t53 + t64;
-    B[5] = t65;
-    const real t66 = theta[2] * Q[7];
-    const real t67 = theta[1] * Q[8];
-    const real t68 = t66 - t67;
-    B[6] = t68;
-    const real t69 = theta[0] * Q[8];
-    const real t70 = theta[2] * Q[6];
-    const real t71 = t69 - t70;
-    B[7] = t71;
-    const real t72 = theta[1] * Q[6];
-    const real t73 = theta[0] * Q[7];
-    const real t74 = t72 - t73;
-    B[8] = t74;
-    const real t75 = theta[1] * f[2];
-    const real t76 = theta[2] * f[1];
-    const real t77 = t75 - t76;
-    G[0] = t77;
-    const real t78 = theta[2] * f[0];
-    const real t79 = theta[0] * f[2];
-    const real t80 = t78 - t79;
-    G[1] = t80;
-    const real t81 = theta[0] * f[1];
-    const real t82 = theta[1] * f[0];
-    const real t83 = t81 - t82;
-    G[2] = t83;
-    const real t84 = theta[1] * f[5];
-    const real t85 = theta[2] * f[4];
-    const real t86 = t84 - t85;
-    G[3] = t86;
-    const real t87 = theta[2] * f[3];
-    const real t88 = theta[0] * f[5];
-    const real t89 = t87 - t88;
-    G[4] = t89;
-    const real t90 = theta[0] * f[4];
-    const real t91 = theta[1] * f[3];
-    const real t92 = t90 - t91;
-    G[5] = t92;
-    const real t93 = d_s[0] * J[0];
-    const real t94 = t93 - laws[0];
-    row[0] = t94;
-    const real t95 = d_s[1] * J[1];
-    const real t96 = t95 - laws[1];
-    row[1] = t96;
-    return 0;
+  real t2 = H[6] * d_u[0] + H[7] * d_u[1];
+  real t5 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t2 + t5;
+  real t9 = H[8] * d_u[0] + H[9] * d_u[1];
+  real t12 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t9 + t12;
+  real t16 = H[10] * d_u[0] + H[11] * d_u[1];
+  real t19 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t16 + t19;
+  B[3] = w[2] * t12 - w[1] * t19 + (H[6] * d_s[0] + H[7] * d_s[1] + (theta[2] * Q[4] + (Q[1] * t16 -
+    Q[2] * t9) - theta[1] * Q[5]));
+  B[4] = w[0] * t19 - w[2] * t5 + (H[8] * d_s[0] + H[9] * d_s[1] + (theta[0] * Q[5] + (Q[2] * t2 -
+    Q[0] * t16 - theta[2] * Q[3])));
+  B[5] = w[1] * t5 - w[0] * t12 + (H[10] * d_s[0] + H[11] * d_s[1] + (theta[1] * Q[3] + (Q[0] * t9 -
+    Q[1] * t2) - theta[0] * Q[4]));
+  B[6] = theta[2] * Q[7] - theta[1] * Q[8];
+  B[7] = theta[0] * Q[8] - theta[2] * Q[6];
+  B[8] = theta[1] * Q[6] - theta[0] * Q[7];
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] - theta[2] * f[4];
+  G[4] = theta[2] * f[3] - theta[0] * f[5];
+  G[5] = theta[0] * f[4] - theta[1] * f[3];
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_rotational_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_rotational_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 2, "", 0, 0},
-    {"d_s", 2, "", 0, 0},
-    {"J", 2, "kg*m2 or kg", 0, 0},
-    {"laws", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_rotational_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_rotational, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2]))
 
 /* rows of a hinge with 2 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4556,167 +1256,109 @@ static const mstmm_port mstmm_sweep_generic2_tangent_rotational_outputs[] = {
  * out D[2][2] rows by unknowns
  * out one[2][2] unit matrix
  */
-int mstmm_sweep_generic2_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one)
+int mstmm_sweep_generic2_tangent_rows(in_t H, in_t B, in_t W, in_t S, out_t K, out_t right, out_t D,
+    out_t one)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = B[0] * v0;
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = B[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = B[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = B[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = B[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = B[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = B[6] * v17;
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = B[7] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = B[8] * v23;
-        const two_t v25 = v22 + v24;
-        const two_t v26 = B[9] * v0;
-        const two_t v27 = B[10] * v2;
-        const two_t v28 = v26 + v27;
-        const two_t v29 = B[11] * v5;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = B[12] * v8;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = B[13] * v11;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = B[14] * v14;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = B[15] * v17;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = B[16] * v20;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = B[17] * v23;
-        const two_t v42 = v40 + v41;
-        *(two_free_t *)(K + 0 + k) = v25;
-        *(two_free_t *)(K + 6 + k) = v42;
-    }
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
-        const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
-        const two_t v3 = H[2] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
-        const two_t v6 = H[4] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
-        const two_t v9 = H[6] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
-        const two_t v12 = H[8] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
-        const two_t v15 = H[10] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = H[1] * v0;
-        const two_t v18 = H[3] * v2;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = H[5] * v5;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = H[7] * v8;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = H[9] * v11;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = H[11] * v14;
-        const two_t v27 = v25 + v26;
-        *(two_free_t *)(right + 0 + k) = v16;
-        *(two_free_t *)(right + 9 + k) = v27;
-    }
-    const real t402 = H[0] * K[0];
-    const real t403 = H[2] * K[1];
-    const real t404 = t402 + t403;
-    const real t405 = H[4] * K[2];
-    const real t406 = t404 + t405;
-    const real t407 = H[6] * K[3];
-    const real t408 = t406 + t407;
-    const real t409 = H[8] * K[4];
-    const real t410 = t408 + t409;
-    const real t411 = H[10] * K[5];
-    const real t412 = t410 + t411;
-    const real t413 = W[0] + t412;
-    D[0] = t413;
-    const real t414 = H[0] * K[6];
-    const real t415 = H[2] * K[7];
-    const real t416 = t414 + t415;
-    const real t417 = H[4] * K[8];
-    const real t418 = t416 + t417;
-    const real t419 = H[6] * K[9];
-    const real t420 = t418 + t419;
-    const real t421 = H[8] * K[10];
-    const real t422 = t420 + t421;
-    const real t423 = H[10] * K[11];
-    const real t424 = t422 + t423;
-    const real t425 = W[2] + t424;
-    D[1] = t425;
-    const real t426 = H[1] * K[0];
-    const real t427 = H[3] * K[1];
-    const real t428 = t426 + t427;
-    const real t429 = H[5] * K[2];
-    const real t430 = t428 + t429;
-    const real t431 = H[7] * K[3];
-    const real t432 = t430 + t431;
-    const real t433 = H[9] * K[4];
-    const real t434 = t432 + t433;
-    const real t435 = H[11] * K[5];
-    const real t436 = t434 + t435;
-    const real t437 = W[1] + t436;
-    D[2] = t437;
-    const real t438 = H[1] * K[6];
-    const real t439 = H[3] * K[7];
-    const real t440 = t438 + t439;
-    const real t441 = H[5] * K[8];
-    const real t442 = t440 + t441;
-    const real t443 = H[7] * K[9];
-    const real t444 = t442 + t443;
-    const real t445 = H[9] * K[10];
-    const real t446 = t444 + t445;
-    const real t447 = H[11] * K[11];
-    const real t448 = t446 + t447;
-    const real t449 = W[3] + t448;
-    D[3] = t449;
-    one[0] = 1.0;
-    one[1] = 0.0;
-    one[2] = 0.0;
-    one[3] = 1.0;
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = B[0] * v0;
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = B[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = B[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = B[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = B[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = B[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = B[6] * v17;
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = B[7] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = B[8] * v23;
+    const two_t v25 = v22 + v24;
+    const two_t v26 = B[9] * v0;
+    const two_t v27 = B[10] * v2;
+    const two_t v28 = v26 + v27;
+    const two_t v29 = B[11] * v5;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = B[12] * v8;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = B[13] * v11;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = B[14] * v14;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = B[15] * v17;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = B[16] * v20;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = B[17] * v23;
+    const two_t v42 = v40 + v41;
+    *(two_free_t *)(K + 0 + k) = v25;
+    *(two_free_t *)(K + 6 + k) = v42;
+  }
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
+    const two_t v1 = H[0] * v0;
+    const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
+    const two_t v3 = H[2] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
+    const two_t v6 = H[4] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
+    const two_t v9 = H[6] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
+    const two_t v12 = H[8] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
+    const two_t v15 = H[10] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = H[1] * v0;
+    const two_t v18 = H[3] * v2;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = H[5] * v5;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = H[7] * v8;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = H[9] * v11;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = H[11] * v14;
+    const two_t v27 = v25 + v26;
+    *(two_free_t *)(right + 0 + k) = v16;
+    *(two_free_t *)(right + 9 + k) = v27;
+  }
+  real t413 = W[0] + (H[0] * K[0] + H[2] * K[1] + H[4] * K[2] + H[6] * K[3] + H[8] * K[4] + H[10] *
+    K[5]);
+  D[0] = t413;
+  real t425 = W[2] + (H[0] * K[6] + H[2] * K[7] + H[4] * K[8] + H[6] * K[9] + H[8] * K[10] + H[10] *
+    K[11]);
+  D[1] = t425;
+  real t437 = W[1] + (H[1] * K[0] + H[3] * K[1] + H[5] * K[2] + H[7] * K[3] + H[9] * K[4] + H[11] *
+    K[5]);
+  D[2] = t437;
+  real t449 = W[3] + (H[1] * K[6] + H[3] * K[7] + H[5] * K[8] + H[7] * K[9] + H[9] * K[10] + H[11] *
+    K[11]);
+  D[3] = t449;
+  one[0] = 1.0;
+  one[1] = 0.0;
+  one[2] = 0.0;
+  one[3] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_rows_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_rows_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"B", 18, "", 0, 0},
-    {"W", 4, "", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_rows_outputs[] = {
-    {"K", 12, "", 0, 0},
-    {"right", 18, "", 0, 0},
-    {"D", 4, "", 0, 0},
-    {"one", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_rows, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3]))
 
 /* S without the unknowns of a hinge with 2 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4729,93 +1371,76 @@ static const mstmm_port mstmm_sweep_generic2_tangent_rows_outputs[] = {
  * out V[2][6] K + G, one row per direction
  * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
-int mstmm_sweep_generic2_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S)
+int mstmm_sweep_generic2_tangent_reduce(in_t inverse, in_t right, in_t K, in_t G, out_t gain,
+    out_t V, out_t S)
 {
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_beside(right + 0 + k);
-        const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_beside(right + 9 + k);
-        const two_t v3 = inverse[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = inverse[2] * v0;
-        const two_t v6 = inverse[3] * v2;
-        const two_t v7 = v5 + v6;
-        *(two_free_t *)(gain + 0 + k) = v4;
-        *(two_free_t *)(gain + 9 + k) = v7;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(K + 0 + k);
-        const two_t v1 = mstmm_beside(G + 0 + k);
-        const two_t v2 = v0 + v1;
-        const two_t v3 = mstmm_beside(K + 6 + k);
-        const two_t v4 = mstmm_beside(G + 6 + k);
-        const two_t v5 = v3 + v4;
-        *(two_free_t *)(V + 0 + k) = v2;
-        *(two_free_t *)(V + 6 + k) = v5;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(V + 0 + k);
-        const two_t v1 = gain[0] * v0;
-        const two_t v2 = mstmm_beside(V + 6 + k);
-        const two_t v3 = gain[9] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v6 = gain[1] * v0;
-        const two_t v7 = gain[10] * v2;
-        const two_t v8 = v6 + v7;
-        const two_t v10 = gain[2] * v0;
-        const two_t v11 = gain[11] * v2;
-        const two_t v12 = v10 + v11;
-        const two_t v14 = gain[3] * v0;
-        const two_t v15 = gain[12] * v2;
-        const two_t v16 = v14 + v15;
-        const two_t v18 = gain[4] * v0;
-        const two_t v19 = gain[13] * v2;
-        const two_t v20 = v18 + v19;
-        const two_t v22 = gain[5] * v0;
-        const two_t v23 = gain[14] * v2;
-        const two_t v24 = v22 + v23;
-        const two_t v26 = gain[6] * v0;
-        const two_t v27 = gain[15] * v2;
-        const two_t v28 = v26 + v27;
-        const two_t v30 = gain[7] * v0;
-        const two_t v31 = gain[16] * v2;
-        const two_t v32 = v30 + v31;
-        const two_t v34 = gain[8] * v0;
-        const two_t v35 = gain[17] * v2;
-        const two_t v36 = v34 + v35;
-        *(two_free_t *)(S + 0 + k) -= v4;
-        *(two_free_t *)(S + 6 + k) -= v8;
-        *(two_free_t *)(S + 12 + k) -= v12;
-        *(two_free_t *)(S + 18 + k) -= v16;
-        *(two_free_t *)(S + 24 + k) -= v20;
-        *(two_free_t *)(S + 30 + k) -= v24;
-        *(two_free_t *)(S + 36 + k) -= v28;
-        *(two_free_t *)(S + 42 + k) -= v32;
-        *(two_free_t *)(S + 48 + k) -= v36;
-    }
-    return 0;
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_beside(right + 0 + k);
+    const two_t v1 = inverse[0] * v0;
+    const two_t v2 = mstmm_beside(right + 9 + k);
+    const two_t v3 = inverse[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = inverse[2] * v0;
+    const two_t v6 = inverse[3] * v2;
+    const two_t v7 = v5 + v6;
+    *(two_free_t *)(gain + 0 + k) = v4;
+    *(two_free_t *)(gain + 9 + k) = v7;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(K + 0 + k);
+    const two_t v1 = mstmm_beside(G + 0 + k);
+    const two_t v2 = v0 + v1;
+    const two_t v3 = mstmm_beside(K + 6 + k);
+    const two_t v4 = mstmm_beside(G + 6 + k);
+    const two_t v5 = v3 + v4;
+    *(two_free_t *)(V + 0 + k) = v2;
+    *(two_free_t *)(V + 6 + k) = v5;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(V + 0 + k);
+    const two_t v1 = gain[0] * v0;
+    const two_t v2 = mstmm_beside(V + 6 + k);
+    const two_t v3 = gain[9] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v6 = gain[1] * v0;
+    const two_t v7 = gain[10] * v2;
+    const two_t v8 = v6 + v7;
+    const two_t v10 = gain[2] * v0;
+    const two_t v11 = gain[11] * v2;
+    const two_t v12 = v10 + v11;
+    const two_t v14 = gain[3] * v0;
+    const two_t v15 = gain[12] * v2;
+    const two_t v16 = v14 + v15;
+    const two_t v18 = gain[4] * v0;
+    const two_t v19 = gain[13] * v2;
+    const two_t v20 = v18 + v19;
+    const two_t v22 = gain[5] * v0;
+    const two_t v23 = gain[14] * v2;
+    const two_t v24 = v22 + v23;
+    const two_t v26 = gain[6] * v0;
+    const two_t v27 = gain[15] * v2;
+    const two_t v28 = v26 + v27;
+    const two_t v30 = gain[7] * v0;
+    const two_t v31 = gain[16] * v2;
+    const two_t v32 = v30 + v31;
+    const two_t v34 = gain[8] * v0;
+    const two_t v35 = gain[17] * v2;
+    const two_t v36 = v34 + v35;
+    *(two_free_t *)(S + 0 + k) -= v4;
+    *(two_free_t *)(S + 6 + k) -= v8;
+    *(two_free_t *)(S + 12 + k) -= v12;
+    *(two_free_t *)(S + 18 + k) -= v16;
+    *(two_free_t *)(S + 24 + k) -= v20;
+    *(two_free_t *)(S + 30 + k) -= v24;
+    *(two_free_t *)(S + 36 + k) -= v28;
+    *(two_free_t *)(S + 42 + k) -= v32;
+    *(two_free_t *)(S + 48 + k) -= v36;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_reduce_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_reduce_inputs[] = {
-    {"inverse", 4, "", 0, 0},
-    {"right", 18, "", 0, 0},
-    {"K", 12, "", 0, 0},
-    {"G", 12, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_reduce_outputs[] = {
-    {"gain", 18, "", 0, 0},
-    {"V", 12, "", 0, 0},
-    {"S", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_reduce, (in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* a right-hand side carried across a hinge with 2 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4830,172 +1455,37 @@ static const mstmm_port mstmm_sweep_generic2_tangent_reduce_outputs[] = {
  * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic2_tangent_load(in_t Rc, in_t r, in_t H, in_t V, in_t inverse, in_t e,
+    in_t e_f, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[2] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[3] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[5] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[7] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[9] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[11] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = -t26;
-    y[0] = t27;
-    const real t28 = inverse[2] * t11;
-    const real t29 = inverse[3] * t24;
-    const real t30 = t28 + t29;
-    const real t31 = -t30;
-    y[1] = t31;
-    const real t32 = V[0] * t26;
-    const real t33 = V[6] * t30;
-    const real t34 = t32 + t33;
-    const real t35 = e[0] - t34;
-    const real t36 = Rc[0] * t35;
-    const real t37 = V[1] * t26;
-    const real t38 = V[7] * t30;
-    const real t39 = t37 + t38;
-    const real t40 = e[1] - t39;
-    const real t41 = Rc[1] * t40;
-    const real t42 = t36 + t41;
-    const real t43 = V[2] * t26;
-    const real t44 = V[8] * t30;
-    const real t45 = t43 + t44;
-    const real t46 = e[2] - t45;
-    const real t47 = Rc[2] * t46;
-    const real t48 = t42 + t47;
-    e_I[0] += t48;
-    const real t49 = Rc[3] * t35;
-    const real t50 = Rc[4] * t40;
-    const real t51 = t49 + t50;
-    const real t52 = Rc[5] * t46;
-    const real t53 = t51 + t52;
-    e_I[1] += t53;
-    const real t54 = Rc[6] * t35;
-    const real t55 = Rc[7] * t40;
-    const real t56 = t54 + t55;
-    const real t57 = Rc[8] * t46;
-    const real t58 = t56 + t57;
-    e_I[2] += t58;
-    const real t59 = V[3] * t26;
-    const real t60 = V[9] * t30;
-    const real t61 = t59 + t60;
-    const real t62 = e[3] - t61;
-    const real t63 = Rc[0] * t62;
-    const real t64 = V[4] * t26;
-    const real t65 = V[10] * t30;
-    const real t66 = t64 + t65;
-    const real t67 = e[4] - t66;
-    const real t68 = Rc[1] * t67;
-    const real t69 = t63 + t68;
-    const real t70 = V[5] * t26;
-    const real t71 = V[11] * t30;
-    const real t72 = t70 + t71;
-    const real t73 = e[5] - t72;
-    const real t74 = Rc[2] * t73;
-    const real t75 = t69 + t74;
-    const real t76 = Rc[6] * r[1];
-    const real t77 = Rc[3] * r[2];
-    const real t78 = t76 - t77;
-    const real t79 = t35 * t78;
-    const real t80 = Rc[7] * r[1];
-    const real t81 = Rc[4] * r[2];
-    const real t82 = t80 - t81;
-    const real t83 = t40 * t82;
-    const real t84 = t79 + t83;
-    const real t85 = Rc[8] * r[1];
-    const real t86 = Rc[5] * r[2];
-    const real t87 = t85 - t86;
-    const real t88 = t46 * t87;
-    const real t89 = t84 + t88;
-    const real t90 = t75 + t89;
-    e_I[3] += t90;
-    const real t91 = Rc[3] * t62;
-    const real t92 = Rc[4] * t67;
-    const real t93 = t91 + t92;
-    const real t94 = Rc[5] * t73;
-    const real t95 = t93 + t94;
-    const real t96 = Rc[0] * r[2];
-    const real t97 = Rc[6] * r[0];
-    const real t98 = t96 - t97;
-    const real t99 = t35 * t98;
-    const real t100 = Rc[1] * r[2];
-    const real t101 = Rc[7] * r[0];
-    const real t102 = t100 - t101;
-    const real t103 = t40 * t102;
-    const real t104 = t99 + t103;
-    const real t105 = Rc[2] * r[2];
-    const real t106 = Rc[8] * r[0];
-    const real t107 = t105 - t106;
-    const real t108 = t46 * t107;
-    const real t109 = t104 + t108;
-    const real t110 = t95 + t109;
-    e_I[4] += t110;
-    const real t111 = Rc[6] * t62;
-    const real t112 = Rc[7] * t67;
-    const real t113 = t111 + t112;
-    const real t114 = Rc[8] * t73;
-    const real t115 = t113 + t114;
-    const real t116 = Rc[3] * r[0];
-    const real t117 = Rc[0] * r[1];
-    const real t118 = t116 - t117;
-    const real t119 = t35 * t118;
-    const real t120 = Rc[4] * r[0];
-    const real t121 = Rc[1] * r[1];
-    const real t122 = t120 - t121;
-    const real t123 = t40 * t122;
-    const real t124 = t119 + t123;
-    const real t125 = Rc[5] * r[0];
-    const real t126 = Rc[2] * r[1];
-    const real t127 = t125 - t126;
-    const real t128 = t46 * t127;
-    const real t129 = t124 + t128;
-    const real t130 = t115 + t129;
-    e_I[5] += t130;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[2] * e[1] + H[4] * e[2] + H[6] * e[3] + H[8] * e[4] + H[10] *
+    e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[3] * e[1] + H[5] * e[2] + H[7] * e[3] + H[9] * e[4] + H[11] *
+    e[5]);
+  real t26 = inverse[0] * t11 + inverse[1] * t24;
+  y[0] = -t26;
+  real t30 = inverse[2] * t11 + inverse[3] * t24;
+  y[1] = -t30;
+  real t35 = e[0] - (V[0] * t26 + V[6] * t30);
+  real t40 = e[1] - (V[1] * t26 + V[7] * t30);
+  real t46 = e[2] - (V[2] * t26 + V[8] * t30);
+  e_I[0] += Rc[0] * t35 + Rc[1] * t40 + Rc[2] * t46;
+  e_I[1] += Rc[3] * t35 + Rc[4] * t40 + Rc[5] * t46;
+  e_I[2] += Rc[6] * t35 + Rc[7] * t40 + Rc[8] * t46;
+  real t62 = e[3] - (V[3] * t26 + V[9] * t30);
+  real t67 = e[4] - (V[4] * t26 + V[10] * t30);
+  real t73 = e[5] - (V[5] * t26 + V[11] * t30);
+  e_I[3] += Rc[0] * t62 + Rc[1] * t67 + Rc[2] * t73 + (t35 * (Rc[6] * r[1] - Rc[3] * r[2]) + t40 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t46 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t62 + Rc[4] * t67 + Rc[5] * t73 + (t35 * (Rc[0] * r[2] - Rc[6] * r[0]) + t40 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t46 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t62 + Rc[7] * t67 + Rc[8] * t73 + (t35 * (Rc[3] * r[0] - Rc[0] * r[1]) + t40 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t46 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"V", 12, "", 0, 0},
-    {"inverse", 4, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_load_outputs[] = {
-    {"y", 2, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_load, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* solution of a hinge with 2 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5012,245 +1502,56 @@ static const mstmm_port mstmm_sweep_generic2_tangent_load_outputs[] = {
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic2_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z)
+int mstmm_sweep_generic2_tangent_solution(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I,
+    in_t B, in_t gain, in_t y, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = gain[0] * t4;
-    const real t6 = Rc[1] * z_I[0];
-    const real t7 = Rc[4] * z_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[7] * z_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = gain[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[2] * z_I[0];
-    const real t14 = Rc[5] * z_I[1];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[8] * z_I[2];
-    const real t17 = t15 + t16;
-    const real t18 = gain[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = w[2] * t10;
-    const real t21 = w[1] * t17;
-    const real t22 = t20 - t21;
-    const real t23 = Rc[0] * z_I[3];
-    const real t24 = Rc[3] * z_I[4];
-    const real t25 = t23 + t24;
-    const real t26 = Rc[6] * z_I[5];
-    const real t27 = t25 + t26;
-    const real t28 = t22 + t27;
-    const real t29 = gain[3] * t28;
-    const real t30 = t19 + t29;
-    const real t31 = w[0] * t17;
-    const real t32 = w[2] * t4;
-    const real t33 = t31 - t32;
-    const real t34 = Rc[1] * z_I[3];
-    const real t35 = Rc[4] * z_I[4];
-    const real t36 = t34 + t35;
-    const real t37 = Rc[7] * z_I[5];
-    const real t38 = t36 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = gain[4] * t39;
-    const real t41 = t30 + t40;
-    const real t42 = w[1] * t4;
-    const real t43 = w[0] * t10;
-    const real t44 = t42 - t43;
-    const real t45 = Rc[2] * z_I[3];
-    const real t46 = Rc[5] * z_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[8] * z_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = t44 + t49;
-    const real t51 = gain[5] * t50;
-    const real t52 = t41 + t51;
-    const real t53 = v[2] * 2.0;
-    const real t54 = t10 * t53;
-    const real t55 = v[1] * 2.0;
-    const real t56 = t17 * t55;
-    const real t57 = t54 - t56;
-    const real t58 = r[2] * z_I[4];
-    const real t59 = r[1] * w_I[1];
-    const real t60 = r[2] * w_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = z_I[0] * t61;
-    const real t63 = r[0] * w_I[1];
-    const real t64 = 2.0 * t63;
-    const real t65 = r[1] * w_I[0];
-    const real t66 = t64 - t65;
-    const real t67 = z_I[1] * t66;
-    const real t68 = r[0] * w_I[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = r[2] * w_I[0];
-    const real t71 = t69 - t70;
-    const real t72 = z_I[2] * t71;
-    const real t73 = t67 + t72;
-    const real t74 = t62 - t73;
-    const real t75 = r[1] * z_I[5];
-    const real t76 = t74 - t75;
-    const real t77 = t58 + t76;
-    const real t78 = z_I[6] + t77;
-    const real t79 = Rc[0] * t78;
-    const real t80 = r[0] * z_I[5];
-    const real t81 = r[0] * w_I[0];
-    const real t82 = t60 + t81;
-    const real t83 = z_I[1] * t82;
-    const real t84 = 2.0 * t65;
-    const real t85 = t84 - t63;
-    const real t86 = z_I[0] * t85;
-    const real t87 = t83 - t86;
-    const real t88 = r[1] * w_I[2];
-    const real t89 = 2.0 * t88;
-    const real t90 = r[2] * w_I[1];
-    const real t91 = t89 - t90;
-    const real t92 = z_I[2] * t91;
-    const real t93 = t87 - t92;
-    const real t94 = t80 + t93;
-    const real t95 = r[2] * z_I[3];
-    const real t96 = t94 - t95;
-    const real t97 = z_I[7] + t96;
-    const real t98 = Rc[3] * t97;
-    const real t99 = t79 + t98;
-    const real t100 = r[1] * z_I[3];
-    const real t101 = t59 + t81;
-    const real t102 = z_I[2] * t101;
-    const real t103 = 2.0 * t70;
-    const real t104 = t103 - t68;
-    const real t105 = z_I[0] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = 2.0 * t90;
-    const real t108 = t107 - t88;
-    const real t109 = z_I[1] * t108;
-    const real t110 = t106 - t109;
-    const real t111 = r[0] * z_I[4];
-    const real t112 = t110 - t111;
-    const real t113 = t100 + t112;
-    const real t114 = z_I[8] + t113;
-    const real t115 = Rc[6] * t114;
-    const real t116 = t99 + t115;
-    const real t117 = t57 + t116;
-    const real t118 = gain[6] * t117;
-    const real t119 = t52 + t118;
-    const real t120 = v[0] * 2.0;
-    const real t121 = t17 * t120;
-    const real t122 = t4 * t53;
-    const real t123 = t121 - t122;
-    const real t124 = Rc[1] * t78;
-    const real t125 = Rc[4] * t97;
-    const real t126 = t124 + t125;
-    const real t127 = Rc[7] * t114;
-    const real t128 = t126 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = gain[7] * t129;
-    const real t131 = t119 + t130;
-    const real t132 = t4 * t55;
-    const real t133 = t10 * t120;
-    const real t134 = t132 - t133;
-    const real t135 = Rc[2] * t78;
-    const real t136 = Rc[5] * t97;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * t114;
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = gain[8] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = y[0] - t142;
-    x[0] = t143;
-    const real t144 = gain[9] * t4;
-    const real t145 = gain[10] * t10;
-    const real t146 = t144 + t145;
-    const real t147 = gain[11] * t17;
-    const real t148 = t146 + t147;
-    const real t149 = gain[12] * t28;
-    const real t150 = t148 + t149;
-    const real t151 = gain[13] * t39;
-    const real t152 = t150 + t151;
-    const real t153 = gain[14] * t50;
-    const real t154 = t152 + t153;
-    const real t155 = gain[15] * t117;
-    const real t156 = t154 + t155;
-    const real t157 = gain[16] * t129;
-    const real t158 = t156 + t157;
-    const real t159 = gain[17] * t140;
-    const real t160 = t158 + t159;
-    const real t161 = y[1] - t160;
-    x[1] = t161;
-    const real t162 = B[0] * t143;
-    const real t163 = B[9] * t161;
-    const real t164 = t162 + t163;
-    const real t165 = t4 + t164;
-    z[0] = t165;
-    const real t166 = B[1] * t143;
-    const real t167 = B[10] * t161;
-    const real t168 = t166 + t167;
-    const real t169 = t10 + t168;
-    z[1] = t169;
-    const real t170 = B[2] * t143;
-    const real t171 = B[11] * t161;
-    const real t172 = t170 + t171;
-    const real t173 = t17 + t172;
-    z[2] = t173;
-    const real t174 = B[3] * t143;
-    const real t175 = B[12] * t161;
-    const real t176 = t174 + t175;
-    const real t177 = t28 + t176;
-    z[3] = t177;
-    const real t178 = B[4] * t143;
-    const real t179 = B[13] * t161;
-    const real t180 = t178 + t179;
-    const real t181 = t39 + t180;
-    z[4] = t181;
-    const real t182 = B[5] * t143;
-    const real t183 = B[14] * t161;
-    const real t184 = t182 + t183;
-    const real t185 = t50 + t184;
-    z[5] = t185;
-    const real t186 = B[6] * t143;
-    const real t187 = B[15] * t161;
-    const real t188 = t186 + t187;
-    const real t189 = t117 + t188;
-    z[6] = t189;
-    const real t190 = B[7] * t143;
-    const real t191 = B[16] * t161;
-    const real t192 = t190 + t191;
-    const real t193 = t129 + t192;
-    z[7] = t193;
-    const real t194 = B[8] * t143;
-    const real t195 = B[17] * t161;
-    const real t196 = t194 + t195;
-    const real t197 = t140 + t196;
-    z[8] = t197;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t10 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t17 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t28 = w[2] * t10 - w[1] * t17 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  real t39 = w[0] * t17 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  real t50 = w[1] * t4 - w[0] * t10 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t53 = v[2] * 2.0;
+  real t55 = v[1] * 2.0;
+  real t59 = r[1] * w_I[1];
+  real t60 = r[2] * w_I[2];
+  real t63 = r[0] * w_I[1];
+  real t65 = r[1] * w_I[0];
+  real t68 = r[0] * w_I[2];
+  real t70 = r[2] * w_I[0];
+  real t78 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t59 + t60) - (z_I[1] * (2.0 * t63 - t65) + z_I[2]
+    * (2.0 * t68 - t70)) - r[1] * z_I[5]));
+  real t81 = r[0] * w_I[0];
+  real t88 = r[1] * w_I[2];
+  real t90 = r[2] * w_I[1];
+  real t97 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t60 + t81) - z_I[0] * (2.0 * t65 - t63) - z_I[2] *
+    (2.0 * t88 - t90)) - r[2] * z_I[3]);
+  real t114 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t59 + t81) - z_I[0] * (2.0 * t70 - t68) - z_I[1]
+    * (2.0 * t90 - t88) - r[0] * z_I[4]));
+  real t117 = t10 * t53 - t17 * t55 + (Rc[0] * t78 + Rc[3] * t97 + Rc[6] * t114);
+  real t120 = v[0] * 2.0;
+  real t129 = t17 * t120 - t4 * t53 + (Rc[1] * t78 + Rc[4] * t97 + Rc[7] * t114);
+  real t140 = t4 * t55 - t10 * t120 + (Rc[2] * t78 + Rc[5] * t97 + Rc[8] * t114);
+  real t143 = y[0] - (gain[0] * t4 + gain[1] * t10 + gain[2] * t17 + gain[3] * t28 + gain[4] * t39 +
+    gain[5] * t50 + gain[6] * t117 + gain[7] * t129 + gain[8] * t140);
+  x[0] = t143;
+  real t161 = y[1] - (gain[9] * t4 + gain[10] * t10 + gain[11] * t17 + gain[12] * t28 + gain[13] *
+    t39 + gain[14] * t50 + gain[15] * t117 + gain[16] * t129 + gain[17] * t140);
+  x[1] = t161;
+  z[0] = t4 + (B[0] * t143 + B[9] * t161);
+  z[1] = t10 + (B[1] * t143 + B[10] * t161);
+  z[2] = t17 + (B[2] * t143 + B[11] * t161);
+  z[3] = t28 + (B[3] * t143 + B[12] * t161);
+  z[4] = t39 + (B[4] * t143 + B[13] * t161);
+  z[5] = t50 + (B[5] * t143 + B[14] * t161);
+  z[6] = t117 + (B[6] * t143 + B[15] * t161);
+  z[7] = t129 + (B[7] * t143 + B[16] * t161);
+  z[8] = t140 + (B[8] * t143 + B[17] * t161);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_solution_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_solution_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 18, "", 0, 0},
-    {"gain", 18, "", 0, 0},
-    {"y", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_solution_outputs[] = {
-    {"x", 2, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_solution, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1]))
 
 /* a right-hand side carried across a hinge with 2 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5266,180 +1567,37 @@ static const mstmm_port mstmm_sweep_generic2_tangent_solution_outputs[] = {
  * out y[2] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic2_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic2_tangent_load_with_increments(in_t Rc, in_t r, in_t H, in_t V, in_t inverse,
+    in_t e, in_t e_f, in_t e_b, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[2] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[3] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[5] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[7] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[9] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[11] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = -t26;
-    y[0] = t27;
-    const real t28 = inverse[2] * t11;
-    const real t29 = inverse[3] * t24;
-    const real t30 = t28 + t29;
-    const real t31 = -t30;
-    y[1] = t31;
-    const real t32 = V[0] * t26;
-    const real t33 = V[6] * t30;
-    const real t34 = t32 + t33;
-    const real t35 = e[0] - t34;
-    const real t36 = e_b[0] + t35;
-    const real t37 = Rc[0] * t36;
-    const real t38 = V[1] * t26;
-    const real t39 = V[7] * t30;
-    const real t40 = t38 + t39;
-    const real t41 = e[1] - t40;
-    const real t42 = e_b[1] + t41;
-    const real t43 = Rc[1] * t42;
-    const real t44 = t37 + t43;
-    const real t45 = V[2] * t26;
-    const real t46 = V[8] * t30;
-    const real t47 = t45 + t46;
-    const real t48 = e[2] - t47;
-    const real t49 = e_b[2] + t48;
-    const real t50 = Rc[2] * t49;
-    const real t51 = t44 + t50;
-    e_I[0] += t51;
-    const real t52 = Rc[3] * t36;
-    const real t53 = Rc[4] * t42;
-    const real t54 = t52 + t53;
-    const real t55 = Rc[5] * t49;
-    const real t56 = t54 + t55;
-    e_I[1] += t56;
-    const real t57 = Rc[6] * t36;
-    const real t58 = Rc[7] * t42;
-    const real t59 = t57 + t58;
-    const real t60 = Rc[8] * t49;
-    const real t61 = t59 + t60;
-    e_I[2] += t61;
-    const real t62 = V[3] * t26;
-    const real t63 = V[9] * t30;
-    const real t64 = t62 + t63;
-    const real t65 = e[3] - t64;
-    const real t66 = e_b[3] + t65;
-    const real t67 = Rc[0] * t66;
-    const real t68 = V[4] * t26;
-    const real t69 = V[10] * t30;
-    const real t70 = t68 + t69;
-    const real t71 = e[4] - t70;
-    const real t72 = e_b[4] + t71;
-    const real t73 = Rc[1] * t72;
-    const real t74 = t67 + t73;
-    const real t75 = V[5] * t26;
-    const real t76 = V[11] * t30;
-    const real t77 = t75 + t76;
-    const real t78 = e[5] - t77;
-    const real t79 = e_b[5] + t78;
-    const real t80 = Rc[2] * t79;
-    const real t81 = t74 + t80;
-    const real t82 = Rc[6] * r[1];
-    const real t83 = Rc[3] * r[2];
-    const real t84 = t82 - t83;
-    const real t85 = t36 * t84;
-    const real t86 = Rc[7] * r[1];
-    const real t87 = Rc[4] * r[2];
-    const real t88 = t86 - t87;
-    const real t89 = t42 * t88;
-    const real t90 = t85 + t89;
-    const real t91 = Rc[8] * r[1];
-    const real t92 = Rc[5] * r[2];
-    const real t93 = t91 - t92;
-    const real t94 = t49 * t93;
-    const real t95 = t90 + t94;
-    const real t96 = t81 + t95;
-    e_I[3] += t96;
-    const real t97 = Rc[3] * t66;
-    const real t98 = Rc[4] * t72;
-    const real t99 = t97 + t98;
-    const real t100 = Rc[5] * t79;
-    const real t101 = t99 + t100;
-    const real t102 = Rc[0] * r[2];
-    const real t103 = Rc[6] * r[0];
-    const real t104 = t102 - t103;
-    const real t105 = t36 * t104;
-    const real t106 = Rc[1] * r[2];
-    const real t107 = Rc[7] * r[0];
-    const real t108 = t106 - t107;
-    const real t109 = t42 * t108;
-    const real t110 = t105 + t109;
-    const real t111 = Rc[2] * r[2];
-    const real t112 = Rc[8] * r[0];
-    const real t113 = t111 - t112;
-    const real t114 = t49 * t113;
-    const real t115 = t110 + t114;
-    const real t116 = t101 + t115;
-    e_I[4] += t116;
-    const real t117 = Rc[6] * t66;
-    const real t118 = Rc[7] * t72;
-    const real t119 = t117 + t118;
-    const real t120 = Rc[8] * t79;
-    const real t121 = t119 + t120;
-    const real t122 = Rc[3] * r[0];
-    const real t123 = Rc[0] * r[1];
-    const real t124 = t122 - t123;
-    const real t125 = t36 * t124;
-    const real t126 = Rc[4] * r[0];
-    const real t127 = Rc[1] * r[1];
-    const real t128 = t126 - t127;
-    const real t129 = t42 * t128;
-    const real t130 = t125 + t129;
-    const real t131 = Rc[5] * r[0];
-    const real t132 = Rc[2] * r[1];
-    const real t133 = t131 - t132;
-    const real t134 = t49 * t133;
-    const real t135 = t130 + t134;
-    const real t136 = t121 + t135;
-    e_I[5] += t136;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[2] * e[1] + H[4] * e[2] + H[6] * e[3] + H[8] * e[4] + H[10] *
+    e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[3] * e[1] + H[5] * e[2] + H[7] * e[3] + H[9] * e[4] + H[11] *
+    e[5]);
+  real t26 = inverse[0] * t11 + inverse[1] * t24;
+  y[0] = -t26;
+  real t30 = inverse[2] * t11 + inverse[3] * t24;
+  y[1] = -t30;
+  real t36 = e_b[0] + (e[0] - (V[0] * t26 + V[6] * t30));
+  real t42 = e_b[1] + (e[1] - (V[1] * t26 + V[7] * t30));
+  real t49 = e_b[2] + (e[2] - (V[2] * t26 + V[8] * t30));
+  e_I[0] += Rc[0] * t36 + Rc[1] * t42 + Rc[2] * t49;
+  e_I[1] += Rc[3] * t36 + Rc[4] * t42 + Rc[5] * t49;
+  e_I[2] += Rc[6] * t36 + Rc[7] * t42 + Rc[8] * t49;
+  real t66 = e_b[3] + (e[3] - (V[3] * t26 + V[9] * t30));
+  real t72 = e_b[4] + (e[4] - (V[4] * t26 + V[10] * t30));
+  real t79 = e_b[5] + (e[5] - (V[5] * t26 + V[11] * t30));
+  e_I[3] += Rc[0] * t66 + Rc[1] * t72 + Rc[2] * t79 + (t36 * (Rc[6] * r[1] - Rc[3] * r[2]) + t42 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t49 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t66 + Rc[4] * t72 + Rc[5] * t79 + (t36 * (Rc[0] * r[2] - Rc[6] * r[0]) + t42 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t49 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t66 + Rc[7] * t72 + Rc[8] * t79 + (t36 * (Rc[3] * r[0] - Rc[0] * r[1]) + t42 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t49 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_load_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"V", 12, "", 0, 0},
-    {"inverse", 4, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 2, "", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_load_with_increments_outputs[] = {
-    {"y", 2, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_load_with_increments, (in[0], in[1], in[2], in[3], in[4],
+  in[5], in[6], in[7], out[0], out[1]))
 
 /* solution of a hinge with 2 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5457,574 +1615,170 @@ static const mstmm_port mstmm_sweep_generic2_tangent_load_with_increments_output
  * out x[2] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic2_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_generic2_tangent_solution_with_increments(in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t z_I, in_t B, in_t gain, in_t y, in_t b, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = b[0] + t4;
-    const real t6 = gain[0] * t5;
-    const real t7 = Rc[1] * z_I[0];
-    const real t8 = Rc[4] * z_I[1];
-    const real t9 = t7 + t8;
-    const real t10 = Rc[7] * z_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = b[1] + t11;
-    const real t13 = gain[1] * t12;
-    const real t14 = t6 + t13;
-    const real t15 = Rc[2] * z_I[0];
-    const real t16 = Rc[5] * z_I[1];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[8] * z_I[2];
-    const real t19 = t17 + t18;
-    const real t20 = b[2] + t19;
-    const real t21 = gain[2] * t20;
-    const real t22 = t14 + t21;
-    const real t23 = w[2] * t11;
-    const real t24 = w[1] * t19;
-    const real t25 = t23 - t24;
-    const real t26 = Rc[0] * z_I[3];
-    const real t27 = Rc[3] * z_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[6] * z_I[5];
-    const real t30 = t28 + t29;
-    const real t31 = t25 + t30;
-    const real t32 = b[3] + t31;
-    const real t33 = gain[3] * t32;
-    const real t34 = t22 + t33;
-    const real t35 = w[0] * t19;
-    const real t36 = w[2] * t4;
-    const real t37 = t35 - t36;
-    const real t38 = Rc[1] * z_I[3];
-    const real t39 = Rc[4] * z_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[7] * z_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = b[4] + t43;
-    const real t45 = gain[4] * t44;
-    const real t46 = t34 + t45;
-    const real t47 = w[1] * t4;
-    const real t48 = w[0] * t11;
-    const real t49 = t47 - t48;
-    const real t50 = Rc[2] * z_I[3];
-    const real t51 = Rc[5] * z_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rc[8] * z_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = b[5] + t55;
-    const real t57 = gain[5] * t56;
-    const real t58 = t46 + t57;
-    const real t59 = v[2] * 2.0;
-    const real t60 = t11 * t59;
-    const real t61 = v[1] * 2.0;
-    const real t62 = t19 * t61;
-    const real t63 = t60 - t62;
-    const real t64 = r[2] * z_I[4];
-    const real t65 = r[1] * w_I[1];
-    const real t66 = r[2] * w_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = z_I[0] * t67;
-    const real t69 = r[0] * w_I[1];
-    const real t70 = 2.0 * t69;
-    const real t71 = r[1] * w_I[0];
-    const real t72 = t70 - t71;
-    const real t73 = z_I[1] * t72;
-    const real t74 = r[0] * w_I[2];
-    const real t75 = 2.0 * t74;
-    const real t76 = r[2] * w_I[0];
-    const real t77 = t75 - t76;
-    const real t78 = z_I[2] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = t68 - t79;
-    const real t81 = r[1] * z_I[5];
-    const real t82 = t80 - t81;
-    const real t83 = t64 + t82;
-    const real t84 = z_I[6] + t83;
-    const real t85 = Rc[0] * t84;
-    const real t86 = r[0] * z_I[5];
-    const real t87 = r[0] * w_I[0];
-    const real t88 = t66 + t87;
-    const real t89 = z_I[1] * t88;
-    const real t90 = 2.0 * t71;
-    const real t91 = t90 - t69;
-    const real t92 = z_I[0] * t91;
-    const real t93 = t89 - t92;
-    const real t94 = r[1] * w_I[2];
-    const real t95 = 2.0 * t94;
-    const real t96 = r[2] * w_I[1];
-    const real t97 = t95 - t96;
-    const real t98 = z_I[2] * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t86 + t99;
-    const real t101 = r[2] * z_I[3];
-    const real t102 = t100 - t101;
-    const real t103 = z_I[7] + t102;
-    const real t104 = Rc[3] * t103;
-    const real t105 = t85 + t104;
-    const real t106 = r[1] * z_I[3];
-    const real t107 = t65 + t87;
-    const real t108 = z_I[2] * t107;
-    const real t109 = 2.0 * t76;
-    const real t110 = t109 - t74;
-    const real t111 = z_I[0] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = 2.0 * t96;
-    const real t114 = t113 - t94;
-    const real t115 = z_I[1] * t114;
-    const real t116 = t112 - t115;
-    const real t117 = r[0] * z_I[4];
-    const real t118 = t116 - t117;
-    const real t119 = t106 + t118;
-    const real t120 = z_I[8] + t119;
-    const real t121 = Rc[6] * t120;
-    const real t122 = t105 + t121;
-    const real t123 = t63 + t122;
-    const real t124 = b[6] + t123;
-    const real t125 = gain[6] * t124;
-    const real t126 = t58 + t125;
-    const real t127 = v[0] * 2.0;
-    const real t128 = t19 * t127;
-    const real t129 = t4 * t59;
-    const real t130 = t128 - t129;
-    const real t131 = Rc[1] * t84;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[7] * t120;
-    const real t135 = t133 + t134;
-    const real t136 = t130 + t135;
-    const real t137 = b[7] + t136;
-    const real t138 = gain[7] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = t4 * t61;
-    const real t141 = t11 * t127;
-    const real t142 = t140 - t141;
-    const real t143 = Rc[2] * t84;
-    const real t144 = Rc[5] * t103;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[8] * t120;
-    const real t147 = t145 + t146;
-    const real t148 = t142 + t147;
-    const real t149 = b[8] + t148;
-    const real t150 = gain[8] * t149;
-    const real t151 = t139 + t150;
-    const real t152 = y[0] - t151;
-    x[0] = t152;
-    const real t153 = gain[9] * t5;
-    const real t154 = gain[10] * t12;
-    const real t155 = t153 + t154;
-    const real t156 = gain[11] * t20;
-    const real t157 = t155 + t156;
-    const real t158 = gain[12] * t32;
-    const real t159 = t157 + t158;
-    const real t160 = gain[13] * t44;
-    const real t161 = t159 + t160;
-    const real t162 = gain[14] * t56;
-    const real t163 = t161 + t162;
-    const real t164 = gain[15] * t124;
-    const real t165 = t163 + t164;
-    const real t166 = gain[16] * t137;
-    const real t167 = t165 + t166;
-    const real t168 = gain[17] * t149;
-    const real t169 = t167 + t168;
-    const real t170 = y[1] - t169;
-    x[1] = t170;
-    const real t171 = B[0] * t152;
-    const real t172 = B[9] * t170;
-    const real t173 = t171 + t172;
-    const real t174 = t5 + t173;
-    z[0] = t174;
-    const real t175 = B[1] * t152;
-    const real t176 = B[10] * t170;
-    const real t177 = t175 + t176;
-    const real t178 = t12 + t177;
-    z[1] = t178;
-    const real t179 = B[2] * t152;
-    const real t180 = B[11] * t170;
-    const real t181 = t179 + t180;
-    const real t182 = t20 + t181;
-    z[2] = t182;
-    const real t183 = B[3] * t152;
-    const real t184 = B[12] * t170;
-    const real t185 = t183 + t184;
-    const real t186 = t32 + t185;
-    z[3] = t186;
-    const real t187 = B[4] * t152;
-    const real t188 = B[13] * t170;
-    const real t189 = t187 + t188;
-    const real t190 = t44 + t189;
-    z[4] = t190;
-    const real t191 = B[5] * t152;
-    const real t192 = B[14] * t170;
-    const real t193 = t191 + t192;
-    const real t194 = t56 + t193;
-    z[5] = t194;
-    const real t195 = B[6] * t152;
-    const real t196 = B[15] * t170;
-    const real t197 = t195 + t196;
-    const real t198 = t124 + t197;
-    z[6] = t198;
-    const real t199 = B[7] * t152;
-    const real t200 = B[16] * t170;
-    const real t201 = t199 + t200;
-    const real t202 = t137 + t201;
-    z[7] = t202;
-    const real t203 = B[8] * t152;
-    const real t204 = B[17] * t170;
-    const real t205 = t203 + t204;
-    const real t206 = t149 + t205;
-    z[8] = t206;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t5 = b[0] + t4;
+  real t11 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t12 = b[1] + t11;
+  real t19 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t20 = b[2] + t19;
+  real t32 = b[3] + (w[2] * t11 - w[1] * t19 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]));
+  real t44 = b[4] + (w[0] * t19 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]));
+  real t56 = b[5] + (w[1] * t4 - w[0] * t11 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]));
+  real t59 = v[2] * 2.0;
+  real t61 = v[1] * 2.0;
+  real t65 = r[1] * w_I[1];
+  real t66 = r[2] * w_I[2];
+  real t69 = r[0] * w_I[1];
+  real t71 = r[1] * w_I[0];
+  real t74 = r[0] * w_I[2];
+  real t76 = r[2] * w_I[0];
+  real t84 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t65 + t66) - (z_I[1] * (2.0 * t69 - t71) + z_I[2]
+    * (2.0 * t74 - t76)) - r[1] * z_I[5]));
+  real t87 = r[0] * w_I[0];
+  real t94 = r[1] * w_I[2];
+  real t96 = r[2] * w_I[1];
+  real t103 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t66 + t87) - z_I[0] * (2.0 * t71 - t69) - z_I[2]
+    * (2.0 * t94 - t96)) - r[2] * z_I[3]);
+  real t120 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t65 + t87) - z_I[0] * (2.0 * t76 - t74) - z_I[1]
+    * (2.0 * t96 - t94) - r[0] * z_I[4]));
+  real t124 = b[6] + (t11 * t59 - t19 * t61 + (Rc[0] * t84 + Rc[3] * t103 + Rc[6] * t120));
+  real t127 = v[0] * 2.0;
+  real t137 = b[7] + (t19 * t127 - t4 * t59 + (Rc[1] * t84 + Rc[4] * t103 + Rc[7] * t120));
+  real t149 = b[8] + (t4 * t61 - t11 * t127 + (Rc[2] * t84 + Rc[5] * t103 + Rc[8] * t120));
+  real t152 = y[0] - (gain[0] * t5 + gain[1] * t12 + gain[2] * t20 + gain[3] * t32 + gain[4] * t44 +
+    gain[5] * t56 + gain[6] * t124 + gain[7] * t137 + gain[8] * t149);
+  x[0] = t152;
+  real t170 = y[1] - (gain[9] * t5 + gain[10] * t12 + gain[11] * t20 + gain[12] * t32 + gain[13] *
+    t44 + gain[14] * t56 + gain[15] * t124 + gain[16] * t137 + gain[17] * t149);
+  x[1] = t170;
+  z[0] = t5 + (B[0] * t152 + B[9] * t170);
+  z[1] = t12 + (B[1] * t152 + B[10] * t170);
+  z[2] = t20 + (B[2] * t152 + B[11] * t170);
+  z[3] = t32 + (B[3] * t152 + B[12] * t170);
+  z[4] = t44 + (B[4] * t152 + B[13] * t170);
+  z[5] = t56 + (B[5] * t152 + B[14] * t170);
+  z[6] = t124 + (B[6] * t152 + B[15] * t170);
+  z[7] = t137 + (B[7] * t152 + B[16] * t170);
+  z[8] = t149 + (B[8] * t152 + B[17] * t170);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_tangent_solution_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 18, "", 0, 0},
-    {"gain", 18, "", 0, 0},
-    {"y", 2, "", 0, 0},
-    {"b", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_tangent_solution_with_increments_outputs[] = {
-    {"x", 2, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_tangent_solution_with_increments, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]))
 
 /* free and constrained directions of a hinge with 2 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][2] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic2_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic2_complement(in_t H, out_t W)
 {
-    const real t0 = H[10] * H[10];
-    const real t1 = H[8] * H[8];
-    const real t2 = H[6] * H[6];
-    const real t3 = H[4] * H[4];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[2] * H[2];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[3] * H[3];
-    const real t14 = t12 + t13;
-    const real t15 = H[5] * H[5];
-    const real t16 = t14 + t15;
-    const real t17 = H[7] * H[7];
-    const real t18 = t16 + t17;
-    const real t19 = H[9] * H[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[11] * H[11];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[10] * H[11];
-    const real t25 = H[8] * H[9];
-    const real t26 = H[6] * H[7];
-    const real t27 = H[4] * H[5];
-    const real t28 = H[2] * H[3];
-    const real t29 = H[0] * H[1];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t26 + t31;
-    const real t33 = t25 + t32;
-    const real t34 = t24 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[0] * t35;
-    const real t41 = 1.0 / t38;
-    const real t42 = H[0] * t36;
-    const real t43 = H[1] - t42;
-    const real t44 = t41 * t43;
-    const real t45 = t36 * t44;
-    const real t46 = t40 - t45;
-    W[0] = t46;
-    const real t47 = H[2] * t35;
-    const real t48 = H[2] * t36;
-    const real t49 = H[3] - t48;
-    const real t50 = t41 * t49;
-    const real t51 = t36 * t50;
-    const real t52 = t47 - t51;
-    W[1] = t52;
-    const real t53 = H[4] * t35;
-    const real t54 = H[4] * t36;
-    const real t55 = H[5] - t54;
-    const real t56 = t41 * t55;
-    const real t57 = t36 * t56;
-    const real t58 = t53 - t57;
-    W[2] = t58;
-    const real t59 = H[6] * t35;
-    const real t60 = H[6] * t36;
-    const real t61 = H[7] - t60;
-    const real t62 = t41 * t61;
-    const real t63 = t36 * t62;
-    const real t64 = t59 - t63;
-    W[3] = t64;
-    const real t65 = H[8] * t35;
-    const real t66 = H[8] * t36;
-    const real t67 = H[9] - t66;
-    const real t68 = t41 * t67;
-    const real t69 = t36 * t68;
-    const real t70 = t65 - t69;
-    W[4] = t70;
-    const real t71 = H[10] * t35;
-    const real t72 = H[10] * t36;
-    const real t73 = H[11] - t72;
-    const real t74 = t41 * t73;
-    const real t75 = t36 * t74;
-    const real t76 = t71 - t75;
-    W[5] = t76;
-    W[6] = t44;
-    W[7] = t50;
-    W[8] = t56;
-    W[9] = t62;
-    W[10] = t68;
-    W[11] = t74;
-    const real t77 = H[0] < 0.0;
-    const real t78 = sqrt(t10);
-    const real t79 = -t78;
-    const real t80 = t77 != 0 ? t79 : t78;
-    const real t81 = H[0] + t80;
-    const real t82 = fabs(H[0]);
-    const real t83 = t78 + t82;
-    const real t84 = t78 * t83;
-    const real t85 = 0.0 < t84;
-    const real t86 = 1.0 / t84;
-    const real t87 = t85 != 0 ? t86 : 0.0;
-    const real t88 = H[1] * t81;
-    const real t89 = t88 + t28;
-    const real t90 = t27 + t89;
-    const real t91 = t26 + t90;
-    const real t92 = t25 + t91;
-    const real t93 = t24 + t92;
-    const real t94 = t87 * t93;
-    const real t95 = H[4] * t94;
-    const real t96 = H[5] - t95;
-    const real t97 = t96 * t96;
-    const real t98 = H[10] * t94;
-    const real t99 = H[11] - t98;
-    const real t100 = t99 * t99;
-    const real t101 = H[8] * t94;
-    const real t102 = H[9] - t101;
-    const real t103 = t102 * t102;
-    const real t104 = H[6] * t94;
-    const real t105 = H[7] - t104;
-    const real t106 = t105 * t105;
-    const real t107 = H[2] * t94;
-    const real t108 = H[3] - t107;
-    const real t109 = t108 * t108;
-    const real t110 = t109 + t97;
-    const real t111 = t106 + t110;
-    const real t112 = t103 + t111;
-    const real t113 = t100 + t112;
-    const real t114 = sqrt(t113);
-    const real t115 = fabs(t108);
-    const real t116 = t114 + t115;
-    const real t117 = t114 * t116;
-    const real t118 = 0.0 < t117;
-    const real t119 = 1.0 / t117;
-    const real t120 = t118 != 0 ? t119 : 0.0;
-    const real t121 = t97 * t120;
-    const real t122 = 1.0 - t121;
-    const real t123 = H[4] * t122;
-    const real t124 = t108 < 0.0;
-    const real t125 = -t114;
-    const real t126 = t124 != 0 ? t125 : t114;
-    const real t127 = t108 + t126;
-    const real t128 = t127 * t120;
-    const real t129 = t96 * t128;
-    const real t130 = H[2] * t129;
-    const real t131 = t123 - t130;
-    const real t132 = t96 * t120;
-    const real t133 = t105 * t132;
-    const real t134 = H[6] * t133;
-    const real t135 = t131 - t134;
-    const real t136 = t102 * t132;
-    const real t137 = H[8] * t136;
-    const real t138 = t135 - t137;
-    const real t139 = t99 * t132;
-    const real t140 = H[10] * t139;
-    const real t141 = t138 - t140;
-    const real t142 = t87 * t141;
-    const real t143 = t81 * t142;
-    const real t144 = -t143;
-    W[12] = t144;
-    const real t145 = H[2] * t142;
-    const real t146 = t129 + t145;
-    const real t147 = -t146;
-    W[13] = t147;
-    const real t148 = H[4] * t142;
-    const real t149 = t122 - t148;
-    W[14] = t149;
-    const real t150 = H[6] * t142;
-    const real t151 = t133 + t150;
-    const real t152 = -t151;
-    W[15] = t152;
-    const real t153 = H[8] * t142;
-    const real t154 = t136 + t153;
-    const real t155 = -t154;
-    W[16] = t155;
-    const real t156 = H[10] * t142;
-    const real t157 = t139 + t156;
-    const real t158 = -t157;
-    W[17] = t158;
-    const real t159 = t106 * t120;
-    const real t160 = 1.0 - t159;
-    const real t161 = H[6] * t160;
-    const real t162 = t105 * t128;
-    const real t163 = H[2] * t162;
-    const real t164 = H[4] * t133;
-    const real t165 = t163 + t164;
-    const real t166 = t161 - t165;
-    const real t167 = t105 * t120;
-    const real t168 = t102 * t167;
-    const real t169 = H[8] * t168;
-    const real t170 = t166 - t169;
-    const real t171 = t99 * t167;
-    const real t172 = H[10] * t171;
-    const real t173 = t170 - t172;
-    const real t174 = t87 * t173;
-    const real t175 = t81 * t174;
-    const real t176 = -t175;
-    W[18] = t176;
-    const real t177 = H[2] * t174;
-    const real t178 = t162 + t177;
-    const real t179 = -t178;
-    W[19] = t179;
-    const real t180 = H[4] * t174;
-    const real t181 = t133 + t180;
-    const real t182 = -t181;
-    W[20] = t182;
-    const real t183 = H[6] * t174;
-    const real t184 = t160 - t183;
-    W[21] = t184;
-    const real t185 = H[8] * t174;
-    const real t186 = t168 + t185;
-    const real t187 = -t186;
-    W[22] = t187;
-    const real t188 = H[10] * t174;
-    const real t189 = t171 + t188;
-    const real t190 = -t189;
-    W[23] = t190;
-    const real t191 = t103 * t120;
-    const real t192 = 1.0 - t191;
-    const real t193 = H[8] * t192;
-    const real t194 = H[6] * t168;
-    const real t195 = t102 * t128;
-    const real t196 = H[2] * t195;
-    const real t197 = H[4] * t136;
-    const real t198 = t196 + t197;
-    const real t199 = t194 + t198;
-    const real t200 = t193 - t199;
-    const real t201 = t102 * t120;
-    const real t202 = t99 * t201;
-    const real t203 = H[10] * t202;
-    const real t204 = t200 - t203;
-    const real t205 = t87 * t204;
-    const real t206 = t81 * t205;
-    const real t207 = -t206;
-    W[24] = t207;
-    const real t208 = H[2] * t205;
-    const real t209 = t195 + t208;
-    const real t210 = -t209;
-    W[25] = t210;
-    const real t211 = H[4] * t205;
-    const real t212 = t136 + t211;
-    const real t213 = -t212;
-    W[26] = t213;
-    const real t214 = H[6] * t205;
-    const real t215 = t168 + t214;
-    const real t216 = -t215;
-    W[27] = t216;
-    const real t217 = H[8] * t205;
-    const real t218 = t192 - t217;
-    W[28] = t218;
-    const real t219 = H[10] * t205;
-    const real t220 = t202 + t219;
-    const real t221 = -t220;
-    W[29] = t221;
-    const real t222 = t100 * t120;
-    const real t223 = 1.0 - t222;
-    const real t224 = H[10] * t223;
-    const real t225 = H[8] * t202;
-    const real t226 = H[6] * t171;
-    const real t227 = t99 * t128;
-    const real t228 = H[2] * t227;
-    const real t229 = H[4] * t139;
-    const real t230 = t228 + t229;
-    const real t231 = t226 + t230;
-    const real t232 = t225 + t231;
-    const real t233 = t224 - t232;
-    const real t234 = t87 * t233;
-    const real t235 = t81 * t234;
-    const real t236 = -t235;
-    W[30] = t236;
-    const real t237 = H[2] * t234;
-    const real t238 = t227 + t237;
-    const real t239 = -t238;
-    W[31] = t239;
-    const real t240 = H[4] * t234;
-    const real t241 = t139 + t240;
-    const real t242 = -t241;
-    W[32] = t242;
-    const real t243 = H[6] * t234;
-    const real t244 = t171 + t243;
-    const real t245 = -t244;
-    W[33] = t245;
-    const real t246 = H[8] * t234;
-    const real t247 = t202 + t246;
-    const real t248 = -t247;
-    W[34] = t248;
-    const real t249 = H[10] * t234;
-    const real t250 = t223 - t249;
-    W[35] = t250;
-    return 0;
+  real t10 = H[10] * H[10] + (H[8] * H[8] + (H[6] * H[6] + (H[4] * H[4] + (H[0] * H[0] + H[2] *
+    H[2]))));
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[3] * H[3] + H[5] * H[5] + H[7] * H[7] + H[9] * H[9] + H[11] * H[11];
+  real t24 = H[10] * H[11];
+  real t25 = H[8] * H[9];
+  real t26 = H[6] * H[7];
+  real t27 = H[4] * H[5];
+  real t28 = H[2] * H[3];
+  real t34 = t24 + (t25 + (t26 + (t27 + (t28 + H[0] * H[1]))));
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t41 = 1.0 / t38;
+  real t44 = t41 * (H[1] - H[0] * t36);
+  W[0] = H[0] * t35 - t36 * t44;
+  real t50 = t41 * (H[3] - H[2] * t36);
+  W[1] = H[2] * t35 - t36 * t50;
+  real t56 = t41 * (H[5] - H[4] * t36);
+  W[2] = H[4] * t35 - t36 * t56;
+  real t62 = t41 * (H[7] - H[6] * t36);
+  W[3] = H[6] * t35 - t36 * t62;
+  real t68 = t41 * (H[9] - H[8] * t36);
+  W[4] = H[8] * t35 - t36 * t68;
+  real t74 = t41 * (H[11] - H[10] * t36);
+  W[5] = H[10] * t35 - t36 * t74;
+  W[6] = t44;
+  W[7] = t50;
+  W[8] = t56;
+  W[9] = t62;
+  W[10] = t68;
+  W[11] = t74;
+  real t78 = sqrt(t10);
+  real t79 = -t78;
+  real t81 = H[0] + ((H[0] < 0.0) ? t79 : t78);
+  real t84 = t78 * (t78 + (fabs(H[0])));
+  real t86 = 1.0 / t84;
+  real t87 = (0.0 < t84) ? t86 : 0.0;
+  real t94 = t87 * (t24 + (t25 + (t26 + (t27 + (H[1] * t81 + t28)))));
+  real t96 = H[5] - H[4] * t94;
+  real t97 = t96 * t96;
+  real t99 = H[11] - H[10] * t94;
+  real t100 = t99 * t99;
+  real t102 = H[9] - H[8] * t94;
+  real t103 = t102 * t102;
+  real t105 = H[7] - H[6] * t94;
+  real t106 = t105 * t105;
+  real t108 = H[3] - H[2] * t94;
+  real t114 = sqrt(t100 + (t103 + (t106 + (t108 * t108 + t97))));
+  real t117 = t114 * (t114 + (fabs(t108)));
+  real t119 = 1.0 / t117;
+  real t120 = (0.0 < t117) ? t119 : 0.0;
+  real t122 = 1.0 - t97 * t120;
+  real t125 = -t114;
+  real t128 = (t108 + ((t108 < 0.0) ? t125 : t114)) * t120;
+  real t129 = t96 * t128;
+  real t132 = t96 * t120;
+  real t133 = t105 * t132;
+  real t136 = t102 * t132;
+  real t139 = t99 * t132;
+  real t142 = t87 * (H[4] * t122 - H[2] * t129 - H[6] * t133 - H[8] * t136 - H[10] * t139);
+  W[12] = -(t81 * t142);
+  W[13] = -(t129 + H[2] * t142);
+  W[14] = t122 - H[4] * t142;
+  W[15] = -(t133 + H[6] * t142);
+  W[16] = -(t136 + H[8] * t142);
+  W[17] = -(t139 + H[10] * t142);
+  real t160 = 1.0 - t106 * t120;
+  real t162 = t105 * t128;
+  real t167 = t105 * t120;
+  real t168 = t102 * t167;
+  real t171 = t99 * t167;
+  real t174 = t87 * (H[6] * t160 - (H[2] * t162 + H[4] * t133) - H[8] * t168 - H[10] * t171);
+  W[18] = -(t81 * t174);
+  W[19] = -(t162 + H[2] * t174);
+  W[20] = -(t133 + H[4] * t174);
+  W[21] = t160 - H[6] * t174;
+  W[22] = -(t168 + H[8] * t174);
+  W[23] = -(t171 + H[10] * t174);
+  real t192 = 1.0 - t103 * t120;
+  real t195 = t102 * t128;
+  real t202 = t99 * (t102 * t120);
+  real t205 = t87 * (H[8] * t192 - (H[6] * t168 + (H[2] * t195 + H[4] * t136)) - H[10] * t202);
+  W[24] = -(t81 * t205);
+  W[25] = -(t195 + H[2] * t205);
+  W[26] = -(t136 + H[4] * t205);
+  W[27] = -(t168 + H[6] * t205);
+  W[28] = t192 - H[8] * t205;
+  W[29] = -(t202 + H[10] * t205);
+  real t223 = 1.0 - t100 * t120;
+  real t227 = t99 * t128;
+  real t234 = t87 * (H[10] * t223 - (H[8] * t202 + (H[6] * t171 + (H[2] * t227 + H[4] * t139))));
+  W[30] = -(t81 * t234);
+  W[31] = -(t227 + H[2] * t234);
+  W[32] = -(t139 + H[4] * t234);
+  W[33] = -(t171 + H[6] * t234);
+  W[34] = -(t202 + H[8] * t234);
+  W[35] = t223 - H[10] * t234;
+  return 0;
 }
 
-static int mstmm_sweep_generic2_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_complement_inputs[] = {
-    {"H", 12, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic2_complement_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic2_complement, (in[0], out[0]))
 
 /* a column's rows divided by D, across a hinge with 2 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -6033,33 +1787,15 @@ static const mstmm_guard mstmm_sweep_generic2_complement_guards[] = {
  * in  y[2] -H^T K - C
  * out z[2] D^-1 y
  */
-int mstmm_sweep_generic2_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_generic2_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[2] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[3] * t2;
-    const real t4 = F[2] * t3;
-    const real t5 = t0 - t4;
-    z[0] = t5;
-    z[1] = t3;
-    return 0;
+  real t3 = F[3] * (y[1] - F[2] * y[0]);
+  z[0] = F[0] * y[0] - F[2] * t3;
+  z[1] = t3;
+  return 0;
 }
 
-static int mstmm_sweep_generic2_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_divide_inputs[] = {
-    {"F", 4, "", 0, 0},
-    {"y", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_divide_outputs[] = {
-    {"z", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 2 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -6068,29 +1804,13 @@ static const mstmm_port mstmm_sweep_generic2_divide_outputs[] = {
  * in  z[2] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_generic2_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+int mstmm_sweep_generic2_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    L_ij[0] += t2;
-    return 0;
+  L_ij[0] += y[0] * z[0] + y[1] * z[1];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_couple_inputs[] = {
-    {"y", 2, "", 0, 0},
-    {"z", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 2 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -6099,31 +1819,13 @@ static const mstmm_port mstmm_sweep_generic2_couple_outputs[] = {
  * in  z[2] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic2_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_generic2_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = -t2;
-    l[0] += t3;
-    return 0;
+  l[0] += -(y[0] * z[0] + y[1] * z[1]);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_add_known_part_inputs[] = {
-    {"y", 2, "", 0, 0},
-    {"z", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 2 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -6132,30 +1834,14 @@ static const mstmm_port mstmm_sweep_generic2_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[2] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic2_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_generic2_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    const real t1 = y[1] * x[0];
-    y_0[1] += t1;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  y_0[1] += y[1] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_inputs[] = {
-    {"y", 2, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_outputs[] = {
-    {"y_0", 2, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of the bodies accelerated by a hinge with 2 speeds
  * in  S[21] inertia of everything outboard, at P
@@ -6163,243 +1849,49 @@ static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_outputs[] = {
  * in  udot[2] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic2_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e)
+int mstmm_sweep_generic2_required_load(in_t S, in_t H, in_t udot, out_t e)
 {
-    const real t0 = S[0] * H[0];
-    const real t1 = S[1] * H[2];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * H[4];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * H[6];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * H[8];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * H[10];
-    const real t10 = t8 + t9;
-    const real t11 = udot[0] * t10;
-    const real t12 = S[0] * H[1];
-    const real t13 = S[1] * H[3];
-    const real t14 = t12 + t13;
-    const real t15 = S[2] * H[5];
-    const real t16 = t14 + t15;
-    const real t17 = S[3] * H[7];
-    const real t18 = t16 + t17;
-    const real t19 = S[4] * H[9];
-    const real t20 = t18 + t19;
-    const real t21 = S[5] * H[11];
-    const real t22 = t20 + t21;
-    const real t23 = udot[1] * t22;
-    const real t24 = t11 + t23;
-    e[0] = t24;
-    const real t25 = S[1] * H[0];
-    const real t26 = S[6] * H[2];
-    const real t27 = t25 + t26;
-    const real t28 = S[7] * H[4];
-    const real t29 = t27 + t28;
-    const real t30 = S[8] * H[6];
-    const real t31 = t29 + t30;
-    const real t32 = S[9] * H[8];
-    const real t33 = t31 + t32;
-    const real t34 = S[10] * H[10];
-    const real t35 = t33 + t34;
-    const real t36 = udot[0] * t35;
-    const real t37 = S[1] * H[1];
-    const real t38 = S[6] * H[3];
-    const real t39 = t37 + t38;
-    const real t40 = S[7] * H[5];
-    const real t41 = t39 + t40;
-    const real t42 = S[8] * H[7];
-    const real t43 = t41 + t42;
-    const real t44 = S[9] * H[9];
-    const real t45 = t43 + t44;
-    const real t46 = S[10] * H[11];
-    const real t47 = t45 + t46;
-    const real t48 = udot[1] * t47;
-    const real t49 = t36 + t48;
-    e[1] = t49;
-    const real t50 = S[2] * H[0];
-    const real t51 = S[7] * H[2];
-    const real t52 = t50 + t51;
-    const real t53 = S[11] * H[4];
-    const real t54 = t52 + t53;
-    const real t55 = S[12] * H[6];
-    const real t56 = t54 + t55;
-    const real t57 = S[13] * H[8];
-    const real t58 = t56 + t57;
-    const real t59 = S[14] * H[10];
-    const real t60 = t58 + t59;
-    const real t61 = udot[0] * t60;
-    const real t62 = S[2] * H[1];
-    const real t63 = S[7] * H[3];
-    const real t64 = t62 + t63;
-    const real t65 = S[11] * H[5];
-    const real t66 = t64 + t65;
-    const real t67 = S[12] * H[7];
-    const real t68 = t66 + t67;
-    const real t69 = S[13] * H[9];
-    const real t70 = t68 + t69;
-    const real t71 = S[14] * H[11];
-    const real t72 = t70 + t71;
-    const real t73 = udot[1] * t72;
-    const real t74 = t61 + t73;
-    e[2] = t74;
-    const real t75 = S[3] * H[0];
-    const real t76 = S[8] * H[2];
-    const real t77 = t75 + t76;
-    const real t78 = S[12] * H[4];
-    const real t79 = t77 + t78;
-    const real t80 = S[15] * H[6];
-    const real t81 = t79 + t80;
-    const real t82 = S[16] * H[8];
-    const real t83 = t81 + t82;
-    const real t84 = S[17] * H[10];
-    const real t85 = t83 + t84;
-    const real t86 = udot[0] * t85;
-    const real t87 = S[3] * H[1];
-    const real t88 = S[8] * H[3];
-    const real t89 = t87 + t88;
-    const real t90 = S[12] * H[5];
-    const real t91 = t89 + t90;
-    const real t92 = S[15] * H[7];
-    const real t93 = t91 + t92;
-    const real t94 = S[16] * H[9];
-    const real t95 = t93 + t94;
-    const real t96 = S[17] * H[11];
-    const real t97 = t95 + t96;
-    const real t98 = udot[1] * t97;
-    const real t99 = t86 + t98;
-    e[3] = t99;
-    const real t100 = S[4] * H[0];
-    const real t101 = S[9] * H[2];
-    const real t102 = t100 + t101;
-    const real t103 = S[13] * H[4];
-    const real t104 = t102 + t103;
-    const real t105 = S[16] * H[6];
-    const real t106 = t104 + t105;
-    const real t107 = S[18] * H[8];
-    const real t108 = t106 + t107;
-    const real t109 = S[19] * H[10];
-    const real t110 = t108 + t109;
-    const real t111 = udot[0] * t110;
-    const real t112 = S[4] * H[1];
-    const real t113 = S[9] * H[3];
-    const real t114 = t112 + t113;
-    const real t115 = S[13] * H[5];
-    const real t116 = t114 + t115;
-    const real t117 = S[16] * H[7];
-    const real t118 = t116 + t117;
-    const real t119 = S[18] * H[9];
-    const real t120 = t118 + t119;
-    const real t121 = S[19] * H[11];
-    const real t122 = t120 + t121;
-    const real t123 = udot[1] * t122;
-    const real t124 = t111 + t123;
-    e[4] = t124;
-    const real t125 = S[5] * H[0];
-    const real t126 = S[10] * H[2];
-    const real t127 = t125 + t126;
-    const real t128 = S[14] * H[4];
-    const real t129 = t127 + t128;
-    const real t130 = S[17] * H[6];
-    const real t131 = t129 + t130;
-    const real t132 = S[19] * H[8];
-    const real t133 = t131 + t132;
-    const real t134 = S[20] * H[10];
-    const real t135 = t133 + t134;
-    const real t136 = udot[0] * t135;
-    const real t137 = S[5] * H[1];
-    const real t138 = S[10] * H[3];
-    const real t139 = t137 + t138;
-    const real t140 = S[14] * H[5];
-    const real t141 = t139 + t140;
-    const real t142 = S[17] * H[7];
-    const real t143 = t141 + t142;
-    const real t144 = S[19] * H[9];
-    const real t145 = t143 + t144;
-    const real t146 = S[20] * H[11];
-    const real t147 = t145 + t146;
-    const real t148 = udot[1] * t147;
-    const real t149 = t136 + t148;
-    e[5] = t149;
-    return 0;
+  e[0] = udot[0] * (S[0] * H[0] + S[1] * H[2] + S[2] * H[4] + S[3] * H[6] + S[4] * H[8] + S[5] *
+    H[10]) + udot[1] * (S[0] * H[1] + S[1] * H[3] + S[2] * H[5] + S[3] * H[7] + S[4] * H[9] + S[5] *
+    H[11]);
+  e[1] = udot[0] * (S[1] * H[0] + S[6] * H[2] + S[7] * H[4] + S[8] * H[6] + S[9] * H[8] + S[10] *
+    H[10]) + udot[1] * (S[1] * H[1] + S[6] * H[3] + S[7] * H[5] + S[8] * H[7] + S[9] * H[9] + S[10]
+    * H[11]);
+  e[2] = udot[0] * (S[2] * H[0] + S[7] * H[2] + S[11] * H[4] + S[12] * H[6] + S[13] * H[8] + S[14] *
+    H[10]) + udot[1] * (S[2] * H[1] + S[7] * H[3] + S[11] * H[5] + S[12] * H[7] + S[13] * H[9] +
+    S[14] * H[11]);
+  e[3] = udot[0] * (S[3] * H[0] + S[8] * H[2] + S[12] * H[4] + S[15] * H[6] + S[16] * H[8] + S[17] *
+    H[10]) + udot[1] * (S[3] * H[1] + S[8] * H[3] + S[12] * H[5] + S[15] * H[7] + S[16] * H[9] +
+    S[17] * H[11]);
+  e[4] = udot[0] * (S[4] * H[0] + S[9] * H[2] + S[13] * H[4] + S[16] * H[6] + S[18] * H[8] + S[19] *
+    H[10]) + udot[1] * (S[4] * H[1] + S[9] * H[3] + S[13] * H[5] + S[16] * H[7] + S[18] * H[9] +
+    S[19] * H[11]);
+  e[5] = udot[0] * (S[5] * H[0] + S[10] * H[2] + S[14] * H[4] + S[17] * H[6] + S[19] * H[8] + S[20]
+    * H[10]) + udot[1] * (S[5] * H[1] + S[10] * H[3] + S[14] * H[5] + S[17] * H[7] + S[19] * H[9] +
+    S[20] * H[11]);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_required_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_required_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_required_load_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"udot", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_required_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_required_load, (in[0], in[1], in[2], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 2 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][2] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[2] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[2] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic2_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y)
+int mstmm_sweep_generic2_ground_column_load(in_t H, in_t e, in_t tau, out_t y)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[2] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[4] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[6] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[8] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[10] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[3] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[5] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[7] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[9] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[11] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    return 0;
+  y[0] = tau[0] - (H[0] * e[0] + H[2] * e[1] + H[4] * e[2] + H[6] * e[3] + H[8] * e[4] + H[10] *
+    e[5]);
+  y[1] = tau[1] - (H[1] * e[0] + H[3] * e[1] + H[5] * e[2] + H[7] * e[3] + H[9] * e[4] + H[11] *
+    e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic2_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_ground_column_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_ground_column_load_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_ground_column_load_outputs[] = {
-    {"y", 2, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_ground_column_load, (in[0], in[1], in[2], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -6422,512 +1914,119 @@ static const mstmm_port mstmm_sweep_generic2_ground_column_load_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic2_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic2_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)c;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = s[1] * d_H[7];
-    const real t159 = H[7] * d_s[1];
-    const real t160 = t158 + t159;
-    const real t161 = s[0] * d_H[6];
-    const real t162 = H[6] * d_s[0];
-    const real t163 = t161 + t162;
-    const real t164 = t160 + t163;
-    const real t165 = d_c[3] + t164;
-    const real t166 = t157 + t165;
-    const real t167 = motion_I[5] * t34;
-    const real t168 = t65 * d_motion_I[5];
-    const real t169 = t167 + t168;
-    const real t170 = motion_I[4] * t19;
-    const real t171 = t73 * d_motion_I[4];
-    const real t172 = t170 + t171;
-    const real t173 = motion_I[3] * t4;
-    const real t174 = t81 * d_motion_I[3];
-    const real t175 = t173 + t174;
-    const real t176 = t172 + t175;
-    const real t177 = t169 + t176;
-    const real t178 = t166 + t177;
-    d_motion[3] = t178;
-    const real t179 = t153 * d_w[0];
-    const real t180 = w[0] * t139;
-    const real t181 = t179 + t180;
-    const real t182 = w[2] * t85;
-    const real t183 = t81 * motion_I[0];
-    const real t184 = t73 * motion_I[1];
-    const real t185 = t183 + t184;
-    const real t186 = t65 * motion_I[2];
-    const real t187 = t185 + t186;
-    const real t188 = t187 * d_w[2];
-    const real t189 = t182 + t188;
-    const real t190 = t181 - t189;
-    const real t191 = H[9] * d_s[1];
-    const real t192 = s[1] * d_H[9];
-    const real t193 = t191 + t192;
-    const real t194 = H[8] * d_s[0];
-    const real t195 = s[0] * d_H[8];
-    const real t196 = t194 + t195;
-    const real t197 = t193 + t196;
-    const real t198 = d_c[4] + t197;
-    const real t199 = t190 + t198;
-    const real t200 = motion_I[5] * t39;
-    const real t201 = t92 * d_motion_I[5];
-    const real t202 = t200 + t201;
-    const real t203 = motion_I[4] * t24;
-    const real t204 = t100 * d_motion_I[4];
-    const real t205 = t203 + t204;
-    const real t206 = motion_I[3] * t9;
-    const real t207 = t108 * d_motion_I[3];
-    const real t208 = t206 + t207;
-    const real t209 = t205 + t208;
-    const real t210 = t202 + t209;
-    const real t211 = t199 + t210;
-    d_motion[4] = t211;
-    const real t212 = w[1] * t85;
-    const real t213 = t187 * d_w[1];
-    const real t214 = t212 + t213;
-    const real t215 = t146 * d_w[0];
-    const real t216 = w[0] * t112;
-    const real t217 = t215 + t216;
-    const real t218 = t214 - t217;
-    const real t219 = H[11] * d_s[1];
-    const real t220 = s[1] * d_H[11];
-    const real t221 = t219 + t220;
-    const real t222 = H[10] * d_s[0];
-    const real t223 = s[0] * d_H[10];
-    const real t224 = t222 + t223;
-    const real t225 = t221 + t224;
-    const real t226 = d_c[5] + t225;
-    const real t227 = t218 + t226;
-    const real t228 = motion_I[5] * t44;
-    const real t229 = t119 * d_motion_I[5];
-    const real t230 = t228 + t229;
-    const real t231 = motion_I[4] * t29;
-    const real t232 = t127 * d_motion_I[4];
-    const real t233 = t231 + t232;
-    const real t234 = motion_I[3] * t14;
-    const real t235 = t135 * d_motion_I[3];
-    const real t236 = t234 + t235;
-    const real t237 = t233 + t236;
-    const real t238 = t230 + t237;
-    const real t239 = t227 + t238;
-    d_motion[5] = t239;
-    const real t240 = v[2] * t112;
-    const real t241 = t146 * d_v[2];
-    const real t242 = t240 + t241;
-    const real t243 = 2.0 * t242;
-    const real t244 = v[1] * t139;
-    const real t245 = t153 * d_v[1];
-    const real t246 = t244 + t245;
-    const real t247 = 2.0 * t246;
-    const real t248 = t243 - t247;
-    const real t249 = H[1] * d_s[1];
-    const real t250 = s[1] * d_H[1];
-    const real t251 = t249 + t250;
-    const real t252 = H[0] * d_s[0];
-    const real t253 = s[0] * d_H[0];
-    const real t254 = t252 + t253;
-    const real t255 = t251 + t254;
-    const real t256 = d_c[0] + t255;
-    const real t257 = t248 + t256;
-    const real t258 = Rt[0] * d[0];
-    const real t259 = Rt[1] * d[1];
-    const real t260 = t258 + t259;
-    const real t261 = Rt[2] * d[2];
-    const real t262 = t260 + t261;
-    const real t263 = t262 + ro[0];
-    const real t264 = motion_I[0] * motion_I[2];
-    const real t265 = t264 - motion_I[4];
-    const real t266 = t263 * t265;
-    const real t267 = Rt[3] * d[0];
-    const real t268 = Rt[4] * d[1];
-    const real t269 = t267 + t268;
-    const real t270 = Rt[5] * d[2];
-    const real t271 = t269 + t270;
-    const real t272 = t271 + ro[1];
-    const real t273 = motion_I[1] * motion_I[2];
-    const real t274 = motion_I[3] + t273;
-    const real t275 = t272 * t274;
-    const real t276 = t266 + t275;
-    const real t277 = Rt[6] * d[0];
-    const real t278 = Rt[7] * d[1];
-    const real t279 = t277 + t278;
-    const real t280 = Rt[8] * d[2];
-    const real t281 = t279 + t280;
-    const real t282 = t281 + ro[2];
-    const real t283 = motion_I[1] * motion_I[1];
-    const real t284 = motion_I[0] * motion_I[0];
-    const real t285 = t283 + t284;
-    const real t286 = t282 * t285;
-    const real t287 = t276 - t286;
-    const real t288 = t287 + motion_I[8];
-    const real t289 = t288 * t34;
-    const real t290 = t274 * t54;
-    const real t291 = motion_I[2] * d_motion_I[1];
-    const real t292 = motion_I[1] * d_motion_I[2];
-    const real t293 = t291 + t292;
-    const real t294 = d_motion_I[3] + t293;
-    const real t295 = t272 * t294;
-    const real t296 = t290 + t295;
-    const real t297 = t265 * t49;
-    const real t298 = motion_I[2] * d_motion_I[0];
-    const real t299 = motion_I[0] * d_motion_I[2];
-    const real t300 = t298 + t299;
-    const real t301 = t300 - d_motion_I[4];
-    const real t302 = t263 * t301;
-    const real t303 = t297 + t302;
-    const real t304 = t296 + t303;
-    const real t305 = t285 * t59;
-    const real t306 = motion_I[0] * d_motion_I[0];
-    const real t307 = t306 + t306;
-    const real t308 = motion_I[1] * d_motion_I[1];
-    const real t309 = t308 + t308;
-    const real t310 = t307 + t309;
-    const real t311 = t282 * t310;
-    const real t312 = t305 + t311;
-    const real t313 = t304 - t312;
-    const real t314 = d_motion_I[8] + t313;
-    const real t315 = t65 * t314;
-    const real t316 = t289 + t315;
-    const real t317 = motion_I[0] * motion_I[1];
-    const real t318 = motion_I[5] + t317;
-    const real t319 = t263 * t318;
-    const real t320 = motion_I[2] * motion_I[2];
-    const real t321 = t320 + t284;
-    const real t322 = t272 * t321;
-    const real t323 = t319 - t322;
-    const real t324 = t273 - motion_I[3];
-    const real t325 = t282 * t324;
-    const real t326 = t323 + t325;
-    const real t327 = t326 + motion_I[7];
-    const real t328 = t327 * t19;
-    const real t329 = t324 * t59;
-    const real t330 = t293 - d_motion_I[3];
-    const real t331 = t282 * t330;
-    const real t332 = t329 + t331;
-    const real t333 = t318 * t49;
-    const real t334 = motion_I[1] * d_motion_I[0];
-    const real t335 = motion_I[0] * d_motion_I[1];
-    const real t336 = t334 + t335;
-    const real t337 = d_motion_I[5] + t336;
-    const real t338 = t263 * t337;
-    const real t339 = t333 + t338;
-    const real t340 = t321 * t54;
-    const real t341 = motion_I[2] * d_motion_I[2];
-    const real t342 = t341 + t341;
-    const real t343 = t307 + t342;
-    const real t344 = t272 * t343;
-    const real t345 = t340 + t344;
-    const real t346 = t339 - t345;
-    const real t347 = t332 + t346;
-    const real t348 = d_motion_I[7] + t347;
-    const real t349 = t73 * t348;
-    const real t350 = t328 + t349;
-    const real t351 = t317 - motion_I[5];
-    const real t352 = t272 * t351;
-    const real t353 = t283 + t320;
-    const real t354 = t263 * t353;
-    const real t355 = t352 - t354;
-    const real t356 = motion_I[4] + t264;
-    const real t357 = t282 * t356;
-    const real t358 = t355 + t357;
-    const real t359 = t358 + motion_I[6];
-    const real t360 = t359 * t4;
-    const real t361 = t356 * t59;
-    const real t362 = d_motion_I[4] + t300;
-    const real t363 = t282 * t362;
-    const real t364 = t361 + t363;
-    const real t365 = t351 * t54;
-    const real t366 = t336 - d_motion_I[5];
-    const real t367 = t272 * t366;
-    const real t368 = t365 + t367;
-    const real t369 = t353 * t49;
-    const real t370 = t309 + t342;
-    const real t371 = t263 * t370;
-    const real t372 = t369 + t371;
-    const real t373 = t368 - t372;
-    const real t374 = t364 + t373;
-    const real t375 = d_motion_I[6] + t374;
-    const real t376 = t81 * t375;
-    const real t377 = t360 + t376;
-    const real t378 = t350 + t377;
-    const real t379 = t316 + t378;
-    const real t380 = t257 + t379;
-    d_motion[6] = t380;
-    const real t381 = v[0] * t139;
-    const real t382 = t153 * d_v[0];
-    const real t383 = t381 + t382;
-    const real t384 = 2.0 * t383;
-    const real t385 = v[2] * t85;
-    const real t386 = t187 * d_v[2];
-    const real t387 = t385 + t386;
-    const real t388 = 2.0 * t387;
-    const real t389 = t384 - t388;
-    const real t390 = H[3] * d_s[1];
-    const real t391 = s[1] * d_H[3];
-    const real t392 = t390 + t391;
-    const real t393 = H[2] * d_s[0];
-    const real t394 = s[0] * d_H[2];
-    const real t395 = t393 + t394;
-    const real t396 = t392 + t395;
-    const real t397 = d_c[1] + t396;
-    const real t398 = t389 + t397;
-    const real t399 = t288 * t39;
-    const real t400 = t92 * t314;
-    const real t401 = t399 + t400;
-    const real t402 = t327 * t24;
-    const real t403 = t100 * t348;
-    const real t404 = t402 + t403;
-    const real t405 = t359 * t9;
-    const real t406 = t108 * t375;
-    const real t407 = t405 + t406;
-    const real t408 = t404 + t407;
-    const real t409 = t401 + t408;
-    const real t410 = t398 + t409;
-    d_motion[7] = t410;
-    const real t411 = v[1] * t85;
-    const real t412 = t187 * d_v[1];
-    const real t413 = t411 + t412;
-    const real t414 = 2.0 * t413;
-    const real t415 = v[0] * t112;
-    const real t416 = t146 * d_v[0];
-    const real t417 = t415 + t416;
-    const real t418 = 2.0 * t417;
-    const real t419 = t414 - t418;
-    const real t420 = H[5] * d_s[1];
-    const real t421 = s[1] * d_H[5];
-    const real t422 = t420 + t421;
-    const real t423 = H[4] * d_s[0];
-    const real t424 = s[0] * d_H[4];
-    const real t425 = t423 + t424;
-    const real t426 = t422 + t425;
-    const real t427 = d_c[2] + t426;
-    const real t428 = t419 + t427;
-    const real t429 = t288 * t44;
-    const real t430 = t119 * t314;
-    const real t431 = t429 + t430;
-    const real t432 = t327 * t29;
-    const real t433 = t127 * t348;
-    const real t434 = t432 + t433;
-    const real t435 = t359 * t14;
-    const real t436 = t135 * t375;
-    const real t437 = t435 + t436;
-    const real t438 = t434 + t437;
-    const real t439 = t431 + t438;
-    const real t440 = t428 + t439;
-    d_motion[8] = t440;
-    return 0;
+  (void)c;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139) + (d_c[3] + (s[1] *
+    d_H[7] + H[7] * d_s[1] + (s[0] * d_H[6] + H[6] * d_s[0]))) + (motion_I[5] * t34 + t65 *
+    d_motion_I[5] + (motion_I[4] * t19 + t73 * d_motion_I[4] + (motion_I[3] * t4 + t81 *
+    d_motion_I[3])));
+  real t187 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t187 * d_w[2]) + (d_c[4] + (H[9] *
+    d_s[1] + s[1] * d_H[9] + (H[8] * d_s[0] + s[0] * d_H[8]))) + (motion_I[5] * t39 + t92 *
+    d_motion_I[5] + (motion_I[4] * t24 + t100 * d_motion_I[4] + (motion_I[3] * t9 + t108 *
+    d_motion_I[3])));
+  d_motion[5] = w[1] * t85 + t187 * d_w[1] - (t146 * d_w[0] + w[0] * t112) + (d_c[5] + (H[11] *
+    d_s[1] + s[1] * d_H[11] + (H[10] * d_s[0] + s[0] * d_H[10]))) + (motion_I[5] * t44 + t119 *
+    d_motion_I[5] + (motion_I[4] * t29 + t127 * d_motion_I[4] + (motion_I[3] * t14 + t135 *
+    d_motion_I[3])));
+  real t263 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t264 = motion_I[0] * motion_I[2];
+  real t265 = t264 - motion_I[4];
+  real t272 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t273 = motion_I[1] * motion_I[2];
+  real t274 = motion_I[3] + t273;
+  real t282 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t283 = motion_I[1] * motion_I[1];
+  real t284 = motion_I[0] * motion_I[0];
+  real t285 = t283 + t284;
+  real t288 = t263 * t265 + t272 * t274 - t282 * t285 + motion_I[8];
+  real t293 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t300 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t306 = motion_I[0] * d_motion_I[0];
+  real t307 = t306 + t306;
+  real t308 = motion_I[1] * d_motion_I[1];
+  real t309 = t308 + t308;
+  real t314 = d_motion_I[8] + (t274 * t54 + t272 * (d_motion_I[3] + t293) + (t265 * t49 + t263 *
+    (t300 - d_motion_I[4])) - (t285 * t59 + t282 * (t307 + t309)));
+  real t317 = motion_I[0] * motion_I[1];
+  real t318 = motion_I[5] + t317;
+  real t320 = motion_I[2] * motion_I[2];
+  real t321 = t320 + t284;
+  real t324 = t273 - motion_I[3];
+  real t327 = t263 * t318 - t272 * t321 + t282 * t324 + motion_I[7];
+  real t336 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t341 = motion_I[2] * d_motion_I[2];
+  real t342 = t341 + t341;
+  real t348 = d_motion_I[7] + (t324 * t59 + t282 * (t293 - d_motion_I[3]) + (t318 * t49 + t263 *
+    (d_motion_I[5] + t336) - (t321 * t54 + t272 * (t307 + t342))));
+  real t351 = t317 - motion_I[5];
+  real t353 = t283 + t320;
+  real t356 = motion_I[4] + t264;
+  real t359 = t272 * t351 - t263 * t353 + t282 * t356 + motion_I[6];
+  real t375 = d_motion_I[6] + (t356 * t59 + t282 * (d_motion_I[4] + t300) + (t351 * t54 + t272 *
+    (t336 - d_motion_I[5]) - (t353 * t49 + t263 * (t309 + t342))));
+  d_motion[6] = 2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]) + (d_c[0]
+    + (H[1] * d_s[1] + s[1] * d_H[1] + (H[0] * d_s[0] + s[0] * d_H[0]))) + (t288 * t34 + t65 * t314
+    + (t327 * t19 + t73 * t348 + (t359 * t4 + t81 * t375)));
+  d_motion[7] = 2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t187 * d_v[2]) + (d_c[1] +
+    (H[3] * d_s[1] + s[1] * d_H[3] + (H[2] * d_s[0] + s[0] * d_H[2]))) + (t288 * t39 + t92 * t314 +
+    (t327 * t24 + t100 * t348 + (t359 * t9 + t108 * t375)));
+  d_motion[8] = 2.0 * (v[1] * t85 + t187 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]) + (d_c[2] +
+    (H[5] * d_s[1] + s[1] * d_H[5] + (H[4] * d_s[0] + s[0] * d_H[4]))) + (t288 * t44 + t119 * t314 +
+    (t327 * t29 + t127 * t348 + (t359 * t14 + t135 * t375)));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 12, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 12, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 2, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6][2] motion subspace
@@ -6936,76 +2035,18 @@ static const mstmm_port mstmm_sweep_generic2_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[2] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic2_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic2_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    const real t0 = f[5] * d_H[10];
-    const real t1 = H[10] * d_f[5];
-    const real t2 = t0 + t1;
-    const real t3 = f[4] * d_H[8];
-    const real t4 = H[8] * d_f[4];
-    const real t5 = t3 + t4;
-    const real t6 = f[3] * d_H[6];
-    const real t7 = H[6] * d_f[3];
-    const real t8 = t6 + t7;
-    const real t9 = f[2] * d_H[4];
-    const real t10 = H[4] * d_f[2];
-    const real t11 = t9 + t10;
-    const real t12 = f[1] * d_H[2];
-    const real t13 = H[2] * d_f[1];
-    const real t14 = t12 + t13;
-    const real t15 = f[0] * d_H[0];
-    const real t16 = H[0] * d_f[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_tau[0] = t22;
-    const real t23 = H[11] * d_f[5];
-    const real t24 = f[5] * d_H[11];
-    const real t25 = t23 + t24;
-    const real t26 = H[9] * d_f[4];
-    const real t27 = f[4] * d_H[9];
-    const real t28 = t26 + t27;
-    const real t29 = H[7] * d_f[3];
-    const real t30 = f[3] * d_H[7];
-    const real t31 = t29 + t30;
-    const real t32 = H[5] * d_f[2];
-    const real t33 = f[2] * d_H[5];
-    const real t34 = t32 + t33;
-    const real t35 = H[3] * d_f[1];
-    const real t36 = f[1] * d_H[3];
-    const real t37 = t35 + t36;
-    const real t38 = H[1] * d_f[0];
-    const real t39 = f[0] * d_H[1];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t31 + t42;
-    const real t44 = t28 + t43;
-    const real t45 = t25 + t44;
-    d_tau[1] = t45;
-    return 0;
+  d_tau[0] = f[5] * d_H[10] + H[10] * d_f[5] + (f[4] * d_H[8] + H[8] * d_f[4] + (f[3] * d_H[6] +
+    H[6] * d_f[3] + (f[2] * d_H[4] + H[4] * d_f[2] + (f[1] * d_H[2] + H[2] * d_f[1] + (f[0] * d_H[0]
+    + H[0] * d_f[0])))));
+  d_tau[1] = H[11] * d_f[5] + f[5] * d_H[11] + (H[9] * d_f[4] + f[4] * d_H[9] + (H[7] * d_f[3] +
+    f[3] * d_H[7] + (H[5] * d_f[2] + f[2] * d_H[5] + (H[3] * d_f[1] + f[1] * d_H[3] + (H[1] * d_f[0]
+    + f[0] * d_H[1])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_effort_slope_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 12, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_effort_slope_outputs[] = {
-    {"d_tau", 2, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -7013,713 +2054,206 @@ static const mstmm_port mstmm_sweep_generic2_effort_slope_outputs[] = {
  * in  d_H[6][2] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic2_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic2_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    const real t0 = H[10] * H[10];
-    const real t1 = H[8] * H[8];
-    const real t2 = H[6] * H[6];
-    const real t3 = H[4] * H[4];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[2] * H[2];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 1.0 / t10;
-    const real t12 = t11 * d_H[0];
-    const real t13 = H[2] * d_H[2];
-    const real t14 = t13 + t13;
-    const real t15 = H[0] * d_H[0];
-    const real t16 = t15 + t15;
-    const real t17 = t14 + t16;
-    const real t18 = H[4] * d_H[4];
-    const real t19 = t18 + t18;
-    const real t20 = t17 + t19;
-    const real t21 = H[6] * d_H[6];
-    const real t22 = t21 + t21;
-    const real t23 = t20 + t22;
-    const real t24 = H[8] * d_H[8];
-    const real t25 = t24 + t24;
-    const real t26 = t23 + t25;
-    const real t27 = H[10] * d_H[10];
-    const real t28 = t27 + t27;
-    const real t29 = t26 + t28;
-    const real t30 = t11 * t29;
-    const real t31 = t30 / t10;
-    const real t32 = H[0] * t31;
-    const real t33 = t12 - t32;
-    const real t34 = H[1] * H[1];
-    const real t35 = H[3] * H[3];
-    const real t36 = t34 + t35;
-    const real t37 = H[5] * H[5];
-    const real t38 = t36 + t37;
-    const real t39 = H[7] * H[7];
-    const real t40 = t38 + t39;
-    const real t41 = H[9] * H[9];
-    const real t42 = t40 + t41;
-    const real t43 = H[11] * H[11];
-    const real t44 = t42 + t43;
-    const real t45 = H[10] * H[11];
-    const real t46 = H[8] * H[9];
-    const real t47 = H[6] * H[7];
-    const real t48 = H[4] * H[5];
-    const real t49 = H[2] * H[3];
-    const real t50 = H[0] * H[1];
-    const real t51 = t49 + t50;
-    const real t52 = t48 + t51;
-    const real t53 = t47 + t52;
-    const real t54 = t46 + t53;
-    const real t55 = t45 + t54;
-    const real t56 = t55 * t11;
-    const real t57 = t55 * t56;
-    const real t58 = t44 - t57;
-    const real t59 = 1.0 / t58;
-    const real t60 = H[0] * t56;
-    const real t61 = H[1] - t60;
-    const real t62 = t59 * t61;
-    const real t63 = H[1] * d_H[0];
-    const real t64 = H[0] * d_H[1];
-    const real t65 = t63 + t64;
-    const real t66 = H[3] * d_H[2];
-    const real t67 = H[2] * d_H[3];
-    const real t68 = t66 + t67;
-    const real t69 = t65 + t68;
-    const real t70 = H[5] * d_H[4];
-    const real t71 = H[4] * d_H[5];
-    const real t72 = t70 + t71;
-    const real t73 = t69 + t72;
-    const real t74 = H[7] * d_H[6];
-    const real t75 = H[6] * d_H[7];
-    const real t76 = t74 + t75;
-    const real t77 = t73 + t76;
-    const real t78 = H[9] * d_H[8];
-    const real t79 = H[8] * d_H[9];
-    const real t80 = t78 + t79;
-    const real t81 = t77 + t80;
-    const real t82 = H[11] * d_H[10];
-    const real t83 = H[10] * d_H[11];
-    const real t84 = t82 + t83;
-    const real t85 = t81 + t84;
-    const real t86 = t11 * t85;
-    const real t87 = t55 * t31;
-    const real t88 = t86 - t87;
-    const real t89 = t62 * t88;
-    const real t90 = t56 * d_H[0];
-    const real t91 = H[0] * t88;
-    const real t92 = t90 + t91;
-    const real t93 = d_H[1] - t92;
-    const real t94 = t59 * t93;
-    const real t95 = H[11] * d_H[11];
-    const real t96 = t95 + t95;
-    const real t97 = H[9] * d_H[9];
-    const real t98 = t97 + t97;
-    const real t99 = H[7] * d_H[7];
-    const real t100 = t99 + t99;
-    const real t101 = H[5] * d_H[5];
-    const real t102 = t101 + t101;
-    const real t103 = H[3] * d_H[3];
-    const real t104 = t103 + t103;
-    const real t105 = H[1] * d_H[1];
-    const real t106 = t105 + t105;
-    const real t107 = t104 + t106;
-    const real t108 = t102 + t107;
-    const real t109 = t100 + t108;
-    const real t110 = t98 + t109;
-    const real t111 = t96 + t110;
-    const real t112 = t56 * t85;
-    const real t113 = t55 * t88;
-    const real t114 = t112 + t113;
-    const real t115 = t111 - t114;
-    const real t116 = t59 * t115;
-    const real t117 = t116 / t58;
-    const real t118 = t61 * t117;
-    const real t119 = t94 - t118;
-    const real t120 = t56 * t119;
-    const real t121 = t89 + t120;
-    const real t122 = t33 - t121;
-    d_W[0] = t122;
-    const real t123 = t11 * d_H[2];
-    const real t124 = H[2] * t31;
-    const real t125 = t123 - t124;
-    const real t126 = H[2] * t56;
-    const real t127 = H[3] - t126;
-    const real t128 = t59 * t127;
-    const real t129 = t128 * t88;
-    const real t130 = t56 * d_H[2];
-    const real t131 = H[2] * t88;
-    const real t132 = t130 + t131;
-    const real t133 = d_H[3] - t132;
-    const real t134 = t59 * t133;
-    const real t135 = t127 * t117;
-    const real t136 = t134 - t135;
-    const real t137 = t56 * t136;
-    const real t138 = t129 + t137;
-    const real t139 = t125 - t138;
-    d_W[1] = t139;
-    const real t140 = t11 * d_H[4];
-    const real t141 = H[4] * t31;
-    const real t142 = t140 - t141;
-    const real t143 = H[4] * t56;
-    const real t144 = H[5] - t143;
-    const real t145 = t59 * t144;
-    const real t146 = t145 * t88;
-    const real t147 = t56 * d_H[4];
-    const real t148 = H[4] * t88;
-    const real t149 = t147 + t148;
-    const real t150 = d_H[5] - t149;
-    const real t151 = t59 * t150;
-    const real t152 = t144 * t117;
-    const real t153 = t151 - t152;
-    const real t154 = t56 * t153;
-    const real t155 = t146 + t154;
-    const real t156 = t142 - t155;
-    d_W[2] = t156;
-    const real t157 = t11 * d_H[6];
-    const real t158 = H[6] * t31;
-    const real t159 = t157 - t158;
-    const real t160 = H[6] * t56;
-    const real t161 = H[7] - t160;
-    const real t162 = t59 * t161;
-    const real t163 = t162 * t88;
-    const real t164 = t56 * d_H[6];
-    const real t165 = H[6] * t88;
-    const real t166 = t164 + t165;
-    const real t167 = d_H[7] - t166;
-    const real t168 = t59 * t167;
-    const real t169 = t161 * t117;
-    const real t170 = t168 - t169;
-    const real t171 = t56 * t170;
-    const real t172 = t163 + t171;
-    const real t173 = t159 - t172;
-    d_W[3] = t173;
-    const real t174 = t11 * d_H[8];
-    const real t175 = H[8] * t31;
-    const real t176 = t174 - t175;
-    const real t177 = H[8] * t56;
-    const real t178 = H[9] - t177;
-    const real t179 = t59 * t178;
-    const real t180 = t179 * t88;
-    const real t181 = t56 * d_H[8];
-    const real t182 = H[8] * t88;
-    const real t183 = t181 + t182;
-    const real t184 = d_H[9] - t183;
-    const real t185 = t59 * t184;
-    const real t186 = t178 * t117;
-    const real t187 = t185 - t186;
-    const real t188 = t56 * t187;
-    const real t189 = t180 + t188;
-    const real t190 = t176 - t189;
-    d_W[4] = t190;
-    const real t191 = t11 * d_H[10];
-    const real t192 = H[10] * t31;
-    const real t193 = t191 - t192;
-    const real t194 = H[10] * t56;
-    const real t195 = H[11] - t194;
-    const real t196 = t59 * t195;
-    const real t197 = t196 * t88;
-    const real t198 = t56 * d_H[10];
-    const real t199 = H[10] * t88;
-    const real t200 = t198 + t199;
-    const real t201 = d_H[11] - t200;
-    const real t202 = t59 * t201;
-    const real t203 = t195 * t117;
-    const real t204 = t202 - t203;
-    const real t205 = t56 * t204;
-    const real t206 = t197 + t205;
-    const real t207 = t193 - t206;
-    d_W[5] = t207;
-    d_W[6] = t119;
-    d_W[7] = t136;
-    d_W[8] = t153;
-    d_W[9] = t170;
-    d_W[10] = t187;
-    d_W[11] = t204;
-    const real t208 = sqrt(t10);
-    const real t209 = fabs(H[0]);
-    const real t210 = t208 + t209;
-    const real t211 = t208 * t210;
-    const real t212 = 0.0 < t211;
-    const real t213 = 1.0 / t211;
-    const real t214 = t212 != 0 ? t213 : 0.0;
-    const real t215 = H[0] < 0.0;
-    const real t216 = -t208;
-    const real t217 = t215 != 0 ? t216 : t208;
-    const real t218 = H[0] + t217;
-    const real t219 = H[1] * t218;
-    const real t220 = t49 + t219;
-    const real t221 = t48 + t220;
-    const real t222 = t47 + t221;
-    const real t223 = t46 + t222;
-    const real t224 = t45 + t223;
-    const real t225 = t214 * t224;
-    const real t226 = H[4] * t225;
-    const real t227 = H[5] - t226;
-    const real t228 = t227 * t227;
-    const real t229 = H[10] * t225;
-    const real t230 = H[11] - t229;
-    const real t231 = t230 * t230;
-    const real t232 = H[8] * t225;
-    const real t233 = H[9] - t232;
-    const real t234 = t233 * t233;
-    const real t235 = H[6] * t225;
-    const real t236 = H[7] - t235;
-    const real t237 = t236 * t236;
-    const real t238 = H[2] * t225;
-    const real t239 = H[3] - t238;
-    const real t240 = t239 * t239;
-    const real t241 = t228 + t240;
-    const real t242 = t237 + t241;
-    const real t243 = t234 + t242;
-    const real t244 = t231 + t243;
-    const real t245 = sqrt(t244);
-    const real t246 = fabs(t239);
-    const real t247 = t245 + t246;
-    const real t248 = t245 * t247;
-    const real t249 = 0.0 < t248;
-    const real t250 = 1.0 / t248;
-    const real t251 = t249 != 0 ? t250 : 0.0;
-    const real t252 = t228 * t251;
-    const real t253 = 1.0 - t252;
-    const real t254 = H[4] * t253;
-    const real t255 = t239 < 0.0;
-    const real t256 = -t245;
-    const real t257 = t255 != 0 ? t256 : t245;
-    const real t258 = t239 + t257;
-    const real t259 = t251 * t258;
-    const real t260 = t227 * t259;
-    const real t261 = H[2] * t260;
-    const real t262 = t254 - t261;
-    const real t263 = t227 * t251;
-    const real t264 = t236 * t263;
-    const real t265 = H[6] * t264;
-    const real t266 = t262 - t265;
-    const real t267 = t233 * t263;
-    const real t268 = H[8] * t267;
-    const real t269 = t266 - t268;
-    const real t270 = t230 * t263;
-    const real t271 = H[10] * t270;
-    const real t272 = t269 - t271;
-    const real t273 = t214 * t272;
-    const real t274 = t208 * 2.0;
-    const real t275 = t29 / t274;
-    const real t276 = -t275;
-    const real t277 = t215 != 0 ? t276 : t275;
-    const real t278 = d_H[0] + t277;
-    const real t279 = t273 * t278;
-    const real t280 = t210 * t275;
-    const real t281 = H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0]);
-    const real t282 = d_H[0] * t281;
-    const real t283 = t275 + t282;
-    const real t284 = t208 * t283;
-    const real t285 = t280 + t284;
-    const real t286 = t213 * t285;
-    const real t287 = t286 / t211;
-    const real t288 = -t287;
-    const real t289 = t212 != 0 ? t288 : 0.0;
-    const real t290 = t272 * t289;
-    const real t291 = t253 * d_H[4];
-    const real t292 = t225 * d_H[4];
-    const real t293 = t224 * t289;
-    const real t294 = t218 * d_H[1];
-    const real t295 = H[1] * t278;
-    const real t296 = t294 + t295;
-    const real t297 = t68 + t296;
-    const real t298 = t72 + t297;
-    const real t299 = t76 + t298;
-    const real t300 = t80 + t299;
-    const real t301 = t84 + t300;
-    const real t302 = t214 * t301;
-    const real t303 = t293 + t302;
-    const real t304 = H[4] * t303;
-    const real t305 = t292 + t304;
-    const real t306 = d_H[5] - t305;
-    const real t307 = t227 * t306;
-    const real t308 = t307 + t307;
-    const real t309 = t251 * t308;
-    const real t310 = t225 * d_H[2];
-    const real t311 = H[2] * t303;
-    const real t312 = t310 + t311;
-    const real t313 = d_H[3] - t312;
-    const real t314 = t239 * t313;
-    const real t315 = t314 + t314;
-    const real t316 = t315 + t308;
-    const real t317 = t225 * d_H[6];
-    const real t318 = H[6] * t303;
-    const real t319 = t317 + t318;
-    const real t320 = d_H[7] - t319;
-    const real t321 = t236 * t320;
-    const real t322 = t321 + t321;
-    const real t323 = t316 + t322;
-    const real t324 = t225 * d_H[8];
-    const real t325 = H[8] * t303;
-    const real t326 = t324 + t325;
-    const real t327 = d_H[9] - t326;
-    const real t328 = t233 * t327;
-    const real t329 = t328 + t328;
-    const real t330 = t323 + t329;
-    const real t331 = t225 * d_H[10];
-    const real t332 = H[10] * t303;
-    const real t333 = t331 + t332;
-    const real t334 = d_H[11] - t333;
-    const real t335 = t230 * t334;
-    const real t336 = t335 + t335;
-    const real t337 = t330 + t336;
-    const real t338 = t245 * 2.0;
-    const real t339 = t337 / t338;
-    const real t340 = t247 * t339;
-    const real t341 = t239 > 0 ? 1 : (t239 < 0 ? -1 : t239);
-    const real t342 = t313 * t341;
-    const real t343 = t342 + t339;
-    const real t344 = t245 * t343;
-    const real t345 = t340 + t344;
-    const real t346 = t250 * t345;
-    const real t347 = t346 / t248;
-    const real t348 = -t347;
-    const real t349 = t249 != 0 ? t348 : 0.0;
-    const real t350 = t228 * t349;
-    const real t351 = t309 + t350;
-    const real t352 = H[4] * t351;
-    const real t353 = t291 - t352;
-    const real t354 = t260 * d_H[2];
-    const real t355 = t259 * t306;
-    const real t356 = t258 * t349;
-    const real t357 = -t339;
-    const real t358 = t255 != 0 ? t357 : t339;
-    const real t359 = t313 + t358;
-    const real t360 = t251 * t359;
-    const real t361 = t356 + t360;
-    const real t362 = t227 * t361;
-    const real t363 = t355 + t362;
-    const real t364 = H[2] * t363;
-    const real t365 = t354 + t364;
-    const real t366 = t353 - t365;
-    const real t367 = t264 * d_H[6];
-    const real t368 = t263 * t320;
-    const real t369 = t251 * t306;
-    const real t370 = t227 * t349;
-    const real t371 = t369 + t370;
-    const real t372 = t236 * t371;
-    const real t373 = t368 + t372;
-    const real t374 = H[6] * t373;
-    const real t375 = t367 + t374;
-    const real t376 = t366 - t375;
-    const real t377 = t267 * d_H[8];
-    const real t378 = t263 * t327;
-    const real t379 = t233 * t371;
-    const real t380 = t378 + t379;
-    const real t381 = H[8] * t380;
-    const real t382 = t377 + t381;
-    const real t383 = t376 - t382;
-    const real t384 = t270 * d_H[10];
-    const real t385 = t263 * t334;
-    const real t386 = t230 * t371;
-    const real t387 = t385 + t386;
-    const real t388 = H[10] * t387;
-    const real t389 = t384 + t388;
-    const real t390 = t383 - t389;
-    const real t391 = t214 * t390;
-    const real t392 = t290 + t391;
-    const real t393 = t218 * t392;
-    const real t394 = t279 + t393;
-    const real t395 = -t394;
-    d_W[12] = t395;
-    const real t396 = t273 * d_H[2];
-    const real t397 = H[2] * t392;
-    const real t398 = t396 + t397;
-    const real t399 = t363 + t398;
-    const real t400 = -t399;
-    d_W[13] = t400;
-    const real t401 = t273 * d_H[4];
-    const real t402 = H[4] * t392;
-    const real t403 = t401 + t402;
-    const real t404 = t351 + t403;
-    const real t405 = -t404;
-    d_W[14] = t405;
-    const real t406 = t273 * d_H[6];
-    const real t407 = H[6] * t392;
-    const real t408 = t406 + t407;
-    const real t409 = t373 + t408;
-    const real t410 = -t409;
-    d_W[15] = t410;
-    const real t411 = t273 * d_H[8];
-    const real t412 = H[8] * t392;
-    const real t413 = t411 + t412;
-    const real t414 = t380 + t413;
-    const real t415 = -t414;
-    d_W[16] = t415;
-    const real t416 = t273 * d_H[10];
-    const real t417 = H[10] * t392;
-    const real t418 = t416 + t417;
-    const real t419 = t387 + t418;
-    const real t420 = -t419;
-    d_W[17] = t420;
-    const real t421 = t237 * t251;
-    const real t422 = 1.0 - t421;
-    const real t423 = H[6] * t422;
-    const real t424 = t236 * t259;
-    const real t425 = H[2] * t424;
-    const real t426 = H[4] * t264;
-    const real t427 = t425 + t426;
-    const real t428 = t423 - t427;
-    const real t429 = t236 * t251;
-    const real t430 = t233 * t429;
-    const real t431 = H[8] * t430;
-    const real t432 = t428 - t431;
-    const real t433 = t230 * t429;
-    const real t434 = H[10] * t433;
-    const real t435 = t432 - t434;
-    const real t436 = t214 * t435;
-    const real t437 = t436 * t278;
-    const real t438 = t435 * t289;
-    const real t439 = t422 * d_H[6];
-    const real t440 = t251 * t322;
-    const real t441 = t237 * t349;
-    const real t442 = t440 + t441;
-    const real t443 = H[6] * t442;
-    const real t444 = t439 - t443;
-    const real t445 = t264 * d_H[4];
-    const real t446 = H[4] * t373;
-    const real t447 = t445 + t446;
-    const real t448 = t424 * d_H[2];
-    const real t449 = t259 * t320;
-    const real t450 = t236 * t361;
-    const real t451 = t449 + t450;
-    const real t452 = H[2] * t451;
-    const real t453 = t448 + t452;
-    const real t454 = t447 + t453;
-    const real t455 = t444 - t454;
-    const real t456 = t430 * d_H[8];
-    const real t457 = t429 * t327;
-    const real t458 = t251 * t320;
-    const real t459 = t236 * t349;
-    const real t460 = t458 + t459;
-    const real t461 = t233 * t460;
-    const real t462 = t457 + t461;
-    const real t463 = H[8] * t462;
-    const real t464 = t456 + t463;
-    const real t465 = t455 - t464;
-    const real t466 = t433 * d_H[10];
-    const real t467 = t429 * t334;
-    const real t468 = t230 * t460;
-    const real t469 = t467 + t468;
-    const real t470 = H[10] * t469;
-    const real t471 = t466 + t470;
-    const real t472 = t465 - t471;
-    const real t473 = t214 * t472;
-    const real t474 = t438 + t473;
-    const real t475 = t218 * t474;
-    const real t476 = t437 + t475;
-    const real t477 = -t476;
-    d_W[18] = t477;
-    const real t478 = t436 * d_H[2];
-    const real t479 = H[2] * t474;
-    const real t480 = t478 + t479;
-    const real t481 = t451 + t480;
-    const real t482 = -t481;
-    d_W[19] = t482;
-    const real t483 = t436 * d_H[4];
-    const real t484 = H[4] * t474;
-    const real t485 = t483 + t484;
-    const real t486 = t373 + t485;
-    const real t487 = -t486;
-    d_W[20] = t487;
-    const real t488 = t436 * d_H[6];
-    const real t489 = H[6] * t474;
-    const real t490 = t488 + t489;
-    const real t491 = t442 + t490;
-    const real t492 = -t491;
-    d_W[21] = t492;
-    const real t493 = t436 * d_H[8];
-    const real t494 = H[8] * t474;
-    const real t495 = t493 + t494;
-    const real t496 = t462 + t495;
-    const real t497 = -t496;
-    d_W[22] = t497;
-    const real t498 = t436 * d_H[10];
-    const real t499 = H[10] * t474;
-    const real t500 = t498 + t499;
-    const real t501 = t469 + t500;
-    const real t502 = -t501;
-    d_W[23] = t502;
-    const real t503 = t234 * t251;
-    const real t504 = 1.0 - t503;
-    const real t505 = H[8] * t504;
-    const real t506 = H[6] * t430;
-    const real t507 = t233 * t259;
-    const real t508 = H[2] * t507;
-    const real t509 = H[4] * t267;
-    const real t510 = t508 + t509;
-    const real t511 = t506 + t510;
-    const real t512 = t505 - t511;
-    const real t513 = t233 * t251;
-    const real t514 = t230 * t513;
-    const real t515 = H[10] * t514;
-    const real t516 = t512 - t515;
-    const real t517 = t214 * t516;
-    const real t518 = t517 * t278;
-    const real t519 = t516 * t289;
-    const real t520 = t504 * d_H[8];
-    const real t521 = t251 * t329;
-    const real t522 = t234 * t349;
-    const real t523 = t521 + t522;
-    const real t524 = H[8] * t523;
-    const real t525 = t520 - t524;
-    const real t526 = t267 * d_H[4];
-    const real t527 = H[4] * t380;
-    const real t528 = t526 + t527;
-    const real t529 = t507 * d_H[2];
-    const real t530 = t259 * t327;
-    const real t531 = t233 * t361;
-    const real t532 = t530 + t531;
-    const real t533 = H[2] * t532;
-    const real t534 = t529 + t533;
-    const real t535 = t528 + t534;
-    const real t536 = t430 * d_H[6];
-    const real t537 = H[6] * t462;
-    const real t538 = t536 + t537;
-    const real t539 = t535 + t538;
-    const real t540 = t525 - t539;
-    const real t541 = t514 * d_H[10];
-    const real t542 = t513 * t334;
-    const real t543 = t251 * t327;
-    const real t544 = t233 * t349;
-    const real t545 = t543 + t544;
-    const real t546 = t230 * t545;
-    const real t547 = t542 + t546;
-    const real t548 = H[10] * t547;
-    const real t549 = t541 + t548;
-    const real t550 = t540 - t549;
-    const real t551 = t214 * t550;
-    const real t552 = t519 + t551;
-    const real t553 = t218 * t552;
-    const real t554 = t518 + t553;
-    const real t555 = -t554;
-    d_W[24] = t555;
-    const real t556 = t517 * d_H[2];
-    const real t557 = H[2] * t552;
-    const real t558 = t556 + t557;
-    const real t559 = t532 + t558;
-    const real t560 = -t559;
-    d_W[25] = t560;
-    const real t561 = t517 * d_H[4];
-    const real t562 = H[4] * t552;
-    const real t563 = t561 + t562;
-    const real t564 = t380 + t563;
-    const real t565 = -t564;
-    d_W[26] = t565;
-    const real t566 = t517 * d_H[6];
-    const real t567 = H[6] * t552;
-    const real t568 = t566 + t567;
-    const real t569 = t462 + t568;
-    const real t570 = -t569;
-    d_W[27] = t570;
-    const real t571 = t517 * d_H[8];
-    const real t572 = H[8] * t552;
-    const real t573 = t571 + t572;
-    const real t574 = t523 + t573;
-    const real t575 = -t574;
-    d_W[28] = t575;
-    const real t576 = t517 * d_H[10];
-    const real t577 = H[10] * t552;
-    const real t578 = t576 + t577;
-    const real t579 = t547 + t578;
-    const real t580 = -t579;
-    d_W[29] = t580;
-    const real t581 = t231 * t251;
-    const real t582 = 1.0 - t581;
-    const real t583 = H[10] * t582;
-    const real t584 = H[8] * t514;
-    const real t585 = H[6] * t433;
-    const real t586 = t230 * t259;
-    const real t587 = H[2] * t586;
-    const real t588 = H[4] * t270;
-    const real t589 = t587 + t588;
-    const real t590 = t585 + t589;
-    const real t591 = t584 + t590;
-    const real t592 = t583 - t591;
-    const real t593 = t214 * t592;
-    const real t594 = t593 * t278;
-    const real t595 = t592 * t289;
-    const real t596 = t582 * d_H[10];
-    const real t597 = t251 * t336;
-    const real t598 = t231 * t349;
-    const real t599 = t597 + t598;
-    const real t600 = H[10] * t599;
-    const real t601 = t596 - t600;
-    const real t602 = t270 * d_H[4];
-    const real t603 = H[4] * t387;
-    const real t604 = t602 + t603;
-    const real t605 = t586 * d_H[2];
-    const real t606 = t259 * t334;
-    const real t607 = t230 * t361;
-    const real t608 = t606 + t607;
-    const real t609 = H[2] * t608;
-    const real t610 = t605 + t609;
-    const real t611 = t604 + t610;
-    const real t612 = t433 * d_H[6];
-    const real t613 = H[6] * t469;
-    const real t614 = t612 + t613;
-    const real t615 = t611 + t614;
-    const real t616 = t514 * d_H[8];
-    const real t617 = H[8] * t547;
-    const real t618 = t616 + t617;
-    const real t619 = t615 + t618;
-    const real t620 = t601 - t619;
-    const real t621 = t214 * t620;
-    const real t622 = t595 + t621;
-    const real t623 = t218 * t622;
-    const real t624 = t594 + t623;
-    const real t625 = -t624;
-    d_W[30] = t625;
-    const real t626 = t593 * d_H[2];
-    const real t627 = H[2] * t622;
-    const real t628 = t626 + t627;
-    const real t629 = t608 + t628;
-    const real t630 = -t629;
-    d_W[31] = t630;
-    const real t631 = t593 * d_H[4];
-    const real t632 = H[4] * t622;
-    const real t633 = t631 + t632;
-    const real t634 = t387 + t633;
-    const real t635 = -t634;
-    d_W[32] = t635;
-    const real t636 = t593 * d_H[6];
-    const real t637 = H[6] * t622;
-    const real t638 = t636 + t637;
-    const real t639 = t469 + t638;
-    const real t640 = -t639;
-    d_W[33] = t640;
-    const real t641 = t593 * d_H[8];
-    const real t642 = H[8] * t622;
-    const real t643 = t641 + t642;
-    const real t644 = t547 + t643;
-    const real t645 = -t644;
-    d_W[34] = t645;
-    const real t646 = t593 * d_H[10];
-    const real t647 = H[10] * t622;
-    const real t648 = t646 + t647;
-    const real t649 = t599 + t648;
-    const real t650 = -t649;
-    d_W[35] = t650;
-    return 0;
+  real t10 = H[10] * H[10] + (H[8] * H[8] + (H[6] * H[6] + (H[4] * H[4] + (H[0] * H[0] + H[2] *
+    H[2]))));
+  real t11 = 1.0 / t10;
+  real t13 = H[2] * d_H[2];
+  real t15 = H[0] * d_H[0];
+  real t18 = H[4] * d_H[4];
+  real t21 = H[6] * d_H[6];
+  real t24 = H[8] * d_H[8];
+  real t27 = H[10] * d_H[10];
+  real t29 = t13 + t13 + (t15 + t15) + (t18 + t18) + (t21 + t21) + (t24 + t24) + (t27 + t27);
+  real t31 = t11 * t29 / t10;
+  real t45 = H[10] * H[11];
+  real t46 = H[8] * H[9];
+  real t47 = H[6] * H[7];
+  real t48 = H[4] * H[5];
+  real t49 = H[2] * H[3];
+  real t55 = t45 + (t46 + (t47 + (t48 + (t49 + H[0] * H[1]))));
+  real t56 = t55 * t11;
+  real t58 = H[1] * H[1] + H[3] * H[3] + H[5] * H[5] + H[7] * H[7] + H[9] * H[9] + H[11] * H[11] -
+    t55 * t56;
+  real t59 = 1.0 / t58;
+  real t61 = H[1] - H[0] * t56;
+  real t68 = H[3] * d_H[2] + H[2] * d_H[3];
+  real t72 = H[5] * d_H[4] + H[4] * d_H[5];
+  real t76 = H[7] * d_H[6] + H[6] * d_H[7];
+  real t80 = H[9] * d_H[8] + H[8] * d_H[9];
+  real t84 = H[11] * d_H[10] + H[10] * d_H[11];
+  real t85 = H[1] * d_H[0] + H[0] * d_H[1] + t68 + t72 + t76 + t80 + t84;
+  real t88 = t11 * t85 - t55 * t31;
+  real t95 = H[11] * d_H[11];
+  real t97 = H[9] * d_H[9];
+  real t99 = H[7] * d_H[7];
+  real t101 = H[5] * d_H[5];
+  real t103 = H[3] * d_H[3];
+  real t105 = H[1] * d_H[1];
+  real t117 = t59 * (t95 + t95 + (t97 + t97 + (t99 + t99 + (t101 + t101 + (t103 + t103 + (t105 +
+    t105))))) - (t56 * t85 + t55 * t88)) / t58;
+  real t119 = t59 * (d_H[1] - (t56 * d_H[0] + H[0] * t88)) - t61 * t117;
+  d_W[0] = t11 * d_H[0] - H[0] * t31 - (t59 * t61 * t88 + t56 * t119);
+  real t127 = H[3] - H[2] * t56;
+  real t136 = t59 * (d_H[3] - (t56 * d_H[2] + H[2] * t88)) - t127 * t117;
+  d_W[1] = t11 * d_H[2] - H[2] * t31 - (t59 * t127 * t88 + t56 * t136);
+  real t144 = H[5] - H[4] * t56;
+  real t153 = t59 * (d_H[5] - (t56 * d_H[4] + H[4] * t88)) - t144 * t117;
+  d_W[2] = t11 * d_H[4] - H[4] * t31 - (t59 * t144 * t88 + t56 * t153);
+  real t161 = H[7] - H[6] * t56;
+  real t170 = t59 * (d_H[7] - (t56 * d_H[6] + H[6] * t88)) - t161 * t117;
+  d_W[3] = t11 * d_H[6] - H[6] * t31 - (t59 * t161 * t88 + t56 * t170);
+  real t178 = H[9] - H[8] * t56;
+  real t187 = t59 * (d_H[9] - (t56 * d_H[8] + H[8] * t88)) - t178 * t117;
+  d_W[4] = t11 * d_H[8] - H[8] * t31 - (t59 * t178 * t88 + t56 * t187);
+  real t195 = H[11] - H[10] * t56;
+  real t204 = t59 * (d_H[11] - (t56 * d_H[10] + H[10] * t88)) - t195 * t117;
+  d_W[5] = t11 * d_H[10] - H[10] * t31 - (t59 * t195 * t88 + t56 * t204);
+  d_W[6] = t119;
+  d_W[7] = t136;
+  d_W[8] = t153;
+  d_W[9] = t170;
+  d_W[10] = t187;
+  d_W[11] = t204;
+  real t208 = sqrt(t10);
+  real t210 = t208 + (fabs(H[0]));
+  real t211 = t208 * t210;
+  real t212 = 0.0 < t211;
+  real t213 = 1.0 / t211;
+  real t214 = t212 != 0 ? t213 : 0.0;
+  real t215 = H[0] < 0.0;
+  real t216 = -t208;
+  real t218 = H[0] + (t215 != 0 ? t216 : t208);
+  real t224 = t45 + (t46 + (t47 + (t48 + (t49 + H[1] * t218))));
+  real t225 = t214 * t224;
+  real t227 = H[5] - H[4] * t225;
+  real t228 = t227 * t227;
+  real t230 = H[11] - H[10] * t225;
+  real t231 = t230 * t230;
+  real t233 = H[9] - H[8] * t225;
+  real t234 = t233 * t233;
+  real t236 = H[7] - H[6] * t225;
+  real t237 = t236 * t236;
+  real t239 = H[3] - H[2] * t225;
+  real t245 = sqrt(t231 + (t234 + (t237 + (t228 + t239 * t239))));
+  real t247 = t245 + (fabs(t239));
+  real t248 = t245 * t247;
+  real t249 = 0.0 < t248;
+  real t250 = 1.0 / t248;
+  real t251 = t249 != 0 ? t250 : 0.0;
+  real t253 = 1.0 - t228 * t251;
+  real t255 = t239 < 0.0;
+  real t256 = -t245;
+  real t258 = t239 + (t255 != 0 ? t256 : t245);
+  real t259 = t251 * t258;
+  real t260 = t227 * t259;
+  real t263 = t227 * t251;
+  real t264 = t236 * t263;
+  real t267 = t233 * t263;
+  real t270 = t230 * t263;
+  real t272 = H[4] * t253 - H[2] * t260 - H[6] * t264 - H[8] * t267 - H[10] * t270;
+  real t273 = t214 * t272;
+  real t275 = t29 / (t208 * 2.0);
+  real t276 = -t275;
+  real t278 = d_H[0] + (t215 != 0 ? t276 : t275);
+  real t288 = -(t213 * (t210 * t275 + t208 * (t275 + d_H[0] * (H[0] > 0 ? 1 : (H[0] < 0 ? -1 :
+    H[0])))) / t211);
+  real t289 = t212 != 0 ? t288 : 0.0;
+  real t303 = t224 * t289 + t214 * (t84 + (t80 + (t76 + (t72 + (t68 + (t218 * d_H[1] + H[1] *
+    t278))))));
+  real t306 = d_H[5] - (t225 * d_H[4] + H[4] * t303);
+  real t307 = t227 * t306;
+  real t308 = t307 + t307;
+  real t313 = d_H[3] - (t225 * d_H[2] + H[2] * t303);
+  real t314 = t239 * t313;
+  real t320 = d_H[7] - (t225 * d_H[6] + H[6] * t303);
+  real t321 = t236 * t320;
+  real t322 = t321 + t321;
+  real t327 = d_H[9] - (t225 * d_H[8] + H[8] * t303);
+  real t328 = t233 * t327;
+  real t329 = t328 + t328;
+  real t334 = d_H[11] - (t225 * d_H[10] + H[10] * t303);
+  real t335 = t230 * t334;
+  real t336 = t335 + t335;
+  real t339 = (t314 + t314 + t308 + t322 + t329 + t336) / (t245 * 2.0);
+  real t348 = -(t250 * (t247 * t339 + t245 * (t313 * (t239 > 0 ? 1 : (t239 < 0 ? -1 : t239)) +
+    t339)) / t248);
+  real t349 = t249 != 0 ? t348 : 0.0;
+  real t351 = t251 * t308 + t228 * t349;
+  real t357 = -t339;
+  real t361 = t258 * t349 + t251 * (t313 + (t255 != 0 ? t357 : t339));
+  real t363 = t259 * t306 + t227 * t361;
+  real t371 = t251 * t306 + t227 * t349;
+  real t373 = t263 * t320 + t236 * t371;
+  real t380 = t263 * t327 + t233 * t371;
+  real t387 = t263 * t334 + t230 * t371;
+  real t392 = t272 * t289 + t214 * (t253 * d_H[4] - H[4] * t351 - (t260 * d_H[2] + H[2] * t363) -
+    (t264 * d_H[6] + H[6] * t373) - (t267 * d_H[8] + H[8] * t380) - (t270 * d_H[10] + H[10] *
+    t387));
+  d_W[12] = -(t273 * t278 + t218 * t392);
+  d_W[13] = -(t363 + (t273 * d_H[2] + H[2] * t392));
+  d_W[14] = -(t351 + (t273 * d_H[4] + H[4] * t392));
+  d_W[15] = -(t373 + (t273 * d_H[6] + H[6] * t392));
+  d_W[16] = -(t380 + (t273 * d_H[8] + H[8] * t392));
+  d_W[17] = -(t387 + (t273 * d_H[10] + H[10] * t392));
+  real t422 = 1.0 - t237 * t251;
+  real t424 = t236 * t259;
+  real t429 = t236 * t251;
+  real t430 = t233 * t429;
+  real t433 = t230 * t429;
+  real t435 = H[6] * t422 - (H[2] * t424 + H[4] * t264) - H[8] * t430 - H[10] * t433;
+  real t436 = t214 * t435;
+  real t442 = t251 * t322 + t237 * t349;
+  real t451 = t259 * t320 + t236 * t361;
+  real t460 = t251 * t320 + t236 * t349;
+  real t462 = t429 * t327 + t233 * t460;
+  real t469 = t429 * t334 + t230 * t460;
+  real t474 = t435 * t289 + t214 * (t422 * d_H[6] - H[6] * t442 - (t264 * d_H[4] + H[4] * t373 +
+    (t424 * d_H[2] + H[2] * t451)) - (t430 * d_H[8] + H[8] * t462) - (t433 * d_H[10] + H[10] *
+    t469));
+  d_W[18] = -(t436 * t278 + t218 * t474);
+  d_W[19] = -(t451 + (t436 * d_H[2] + H[2] * t474));
+  d_W[20] = -(t373 + (t436 * d_H[4] + H[4] * t474));
+  d_W[21] = -(t442 + (t436 * d_H[6] + H[6] * t474));
+  d_W[22] = -(t462 + (t436 * d_H[8] + H[8] * t474));
+  d_W[23] = -(t469 + (t436 * d_H[10] + H[10] * t474));
+  real t504 = 1.0 - t234 * t251;
+  real t507 = t233 * t259;
+  real t513 = t233 * t251;
+  real t514 = t230 * t513;
+  real t516 = H[8] * t504 - (H[6] * t430 + (H[2] * t507 + H[4] * t267)) - H[10] * t514;
+  real t517 = t214 * t516;
+  real t523 = t251 * t329 + t234 * t349;
+  real t532 = t259 * t327 + t233 * t361;
+  real t547 = t513 * t334 + t230 * (t251 * t327 + t233 * t349);
+  real t552 = t516 * t289 + t214 * (t504 * d_H[8] - H[8] * t523 - (t267 * d_H[4] + H[4] * t380 +
+    (t507 * d_H[2] + H[2] * t532) + (t430 * d_H[6] + H[6] * t462)) - (t514 * d_H[10] + H[10] *
+    t547));
+  d_W[24] = -(t517 * t278 + t218 * t552);
+  d_W[25] = -(t532 + (t517 * d_H[2] + H[2] * t552));
+  d_W[26] = -(t380 + (t517 * d_H[4] + H[4] * t552));
+  d_W[27] = -(t462 + (t517 * d_H[6] + H[6] * t552));
+  d_W[28] = -(t523 + (t517 * d_H[8] + H[8] * t552));
+  d_W[29] = -(t547 + (t517 * d_H[10] + H[10] * t552));
+  real t582 = 1.0 - t231 * t251;
+  real t586 = t230 * t259;
+  real t592 = H[10] * t582 - (H[8] * t514 + (H[6] * t433 + (H[2] * t586 + H[4] * t270)));
+  real t593 = t214 * t592;
+  real t599 = t251 * t336 + t231 * t349;
+  real t608 = t259 * t334 + t230 * t361;
+  real t622 = t592 * t289 + t214 * (t582 * d_H[10] - H[10] * t599 - (t270 * d_H[4] + H[4] * t387 +
+    (t586 * d_H[2] + H[2] * t608) + (t433 * d_H[6] + H[6] * t469) + (t514 * d_H[8] + H[8] * t547)));
+  d_W[30] = -(t593 * t278 + t218 * t622);
+  d_W[31] = -(t608 + (t593 * d_H[2] + H[2] * t622));
+  d_W[32] = -(t387 + (t593 * d_H[4] + H[4] * t622));
+  d_W[33] = -(t469 + (t593 * d_H[6] + H[6] * t622));
+  d_W[34] = -(t547 + (t593 * d_H[8] + H[8] * t622));
+  d_W[35] = -(t599 + (t593 * d_H[10] + H[10] * t622));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_complement_slope_inputs[] = {
-    {"H", 12, "", 0, 0},
-    {"d_H", 12, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_complement_slope, (in[0], in[1], out[0]))
 
 /* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -7730,37 +2264,13 @@ static const mstmm_port mstmm_sweep_generic2_complement_slope_outputs[] = {
  * in  d_z[2] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic2_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+int mstmm_sweep_generic2_add_known_part_slope(in_t y, in_t z, in_t d_y, in_t d_z, out_t d_l)
 {
-    const real t0 = z[1] * d_y[1];
-    const real t1 = y[1] * d_z[1];
-    const real t2 = t0 + t1;
-    const real t3 = z[0] * d_y[0];
-    const real t4 = y[0] * d_z[0];
-    const real t5 = t3 + t4;
-    const real t6 = t2 + t5;
-    const real t7 = -t6;
-    d_l[0] += t7;
-    return 0;
+  d_l[0] += -(z[1] * d_y[1] + y[1] * d_z[1] + (z[0] * d_y[0] + y[0] * d_z[0]));
+  return 0;
 }
 
-static int mstmm_sweep_generic2_add_known_part_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_add_known_part_slope_inputs[] = {
-    {"y", 2, "", 0, 0},
-    {"z", 2, "", 0, 0},
-    {"d_y", 2, "", 0, 0},
-    {"d_z", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_add_known_part_slope_outputs[] = {
-    {"d_l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_add_known_part_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -7771,429 +2281,189 @@ static const mstmm_port mstmm_sweep_generic2_add_known_part_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[2] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic2_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+int mstmm_sweep_generic2_add_multiplier_effort_slope(in_t y, in_t x, in_t d_y, in_t d_x,
+    out_t d_y_0)
 {
-    const real t0 = x[0] * d_y[0];
-    const real t1 = y[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_y_0[0] += t2;
-    const real t3 = y[1] * d_x[0];
-    const real t4 = x[0] * d_y[1];
-    const real t5 = t3 + t4;
-    d_y_0[1] += t5;
-    return 0;
+  d_y_0[0] += x[0] * d_y[0] + y[0] * d_x[0];
+  d_y_0[1] += y[1] * d_x[0] + x[0] * d_y[1];
+  return 0;
 }
 
-static int mstmm_sweep_generic2_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic2_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_slope_inputs[] = {
-    {"y", 2, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_y", 2, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic2_add_multiplier_effort_slope_outputs[] = {
-    {"d_y_0", 2, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic2_add_multiplier_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic2_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic2_forward,
-        .call = mstmm_sweep_generic2_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_forward_inputs,
-        .outputs = mstmm_sweep_generic2_forward_outputs,
-        .ir_hash = "144ea1029efd5dde6c568cdc20f2cd3737ef738525baaf0fd7e347be323a598d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic2_condense,
-        .call = mstmm_sweep_generic2_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic2_condense_inputs,
-        .outputs = mstmm_sweep_generic2_condense_outputs,
-        .ir_hash = "8f5dafbe839afc148faf8d12c60dc5412b0cbcccd1012321971e992c3118be49",
-        .n_guards = 6,
-        .guards = mstmm_sweep_generic2_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic2_recover,
-        .call = mstmm_sweep_generic2_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_recover_inputs,
-        .outputs = mstmm_sweep_generic2_recover_outputs,
-        .ir_hash = "ba5c5ee03c7dd6e82265083f68146f07a622bee5b54a7de538def2cd835dabfd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic2_effort,
-        .call = mstmm_sweep_generic2_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_effort_inputs,
-        .outputs = mstmm_sweep_generic2_effort_outputs,
-        .ir_hash = "55981ceb41e9913af801839379a489df5508e7b2e3d5406b047b93d02fd6f643",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic2_project,
-        .call = mstmm_sweep_generic2_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_project_inputs,
-        .outputs = mstmm_sweep_generic2_project_outputs,
-        .ir_hash = "f1fa509cb7c51f46950b8be2acc745c314c5a8bdc75d6af878462665ad3ceb58",
-        .n_guards = 2,
-        .guards = mstmm_sweep_generic2_project_guards,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic2_factor,
-        .call = mstmm_sweep_generic2_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_factor_inputs,
-        .outputs = mstmm_sweep_generic2_factor_outputs,
-        .ir_hash = "0786041ba7df584596c766a2254976dc93a33a1282fb01f9887b012790ee188a",
-        .n_guards = 4,
-        .guards = mstmm_sweep_generic2_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic2_column_load,
-        .call = mstmm_sweep_generic2_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_column_load_inputs,
-        .outputs = mstmm_sweep_generic2_column_load_outputs,
-        .ir_hash = "09b311b223e1f7259e3ea0d899f0116cb9f7b0aeb4ea3ab94874818cc9a5ebc1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic2_column_acceleration,
-        .call = mstmm_sweep_generic2_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic2_column_acceleration_outputs,
-        .ir_hash = "d7587e63819d2f28e5e291931b5ec631a720f0ae65767fb32a5d0cadf22e971c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic2_qr_eliminate,
-        .call = mstmm_sweep_generic2_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic2_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic2_qr_eliminate_outputs,
-        .ir_hash = "4c9c2336a7b9f8fea9fb00d79fb316f1d63571245c4351aab36754ca93a23f11",
-        .n_guards = 4,
-        .guards = mstmm_sweep_generic2_qr_eliminate_guards,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_carrier,
-        .call = mstmm_sweep_generic2_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_carrier_outputs,
-        .ir_hash = "7d62d4b72b38673ca162629d153284a300d13a7010ea99bc83f3123f3578ef2b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_column,
-        .call = mstmm_sweep_generic2_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_column_outputs,
-        .ir_hash = "d258bf2a8b78eb1f602b22984570d1135bac8e2728138f465753a4444cc0d663",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_coordinate_change",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_coordinate_change,
-        .call = mstmm_sweep_generic2_tangent_coordinate_change_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_coordinate_change_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_coordinate_change_outputs,
-        .ir_hash = "f898c9beeb1f25b2fa2da5b6585a5fc45e6bfe626ef1efe462c7229594ff294b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_steady",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_steady,
-        .call = mstmm_sweep_generic2_tangent_steady_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_tangent_steady_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_steady_outputs,
-        .ir_hash = "520c764627cf4097c190da93c6215eee14b499978aea4e5f98ad293be2332967",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rotational",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_rotational,
-        .call = mstmm_sweep_generic2_tangent_rotational_call,
-        .n_inputs = 9,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_tangent_rotational_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_rotational_outputs,
-        .ir_hash = "781a2c4008a7e59b0c94d305b65f71ef78b6856eb07f58432e9f4b062c1985ba",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rows",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_rows,
-        .call = mstmm_sweep_generic2_tangent_rows_call,
-        .n_inputs = 4,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic2_tangent_rows_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_rows_outputs,
-        .ir_hash = "ee0de2c0fd6f96412b95a8dbb2542aea766117ec349fb55075d2e531ae51fd9a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_reduce",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_reduce,
-        .call = mstmm_sweep_generic2_tangent_reduce_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_tangent_reduce_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_reduce_outputs,
-        .ir_hash = "30f69fe0bf4b1af5409eb9ef412d76f626f526f69e67c8dfcd4107b25c39ad4c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_load,
-        .call = mstmm_sweep_generic2_tangent_load_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_load_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_load_outputs,
-        .ir_hash = "a3ccbea4761d56a235340588cb12e0530a1b9319fad1041ec9221d78e22fb52b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_solution,
-        .call = mstmm_sweep_generic2_tangent_solution_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_solution_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_solution_outputs,
-        .ir_hash = "9c3805a0036a3d750c46db203c1e6506cd4149319c19af62f0f29db53abd5141",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_load_with_increments,
-        .call = mstmm_sweep_generic2_tangent_load_with_increments_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_load_with_increments_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_load_with_increments_outputs,
-        .ir_hash = "6202899baa055af05f38011153ab3986623da74e4ad97f2031fa4ecfce6c3aea",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic2_tangent_solution_with_increments,
-        .call = mstmm_sweep_generic2_tangent_solution_with_increments_call,
-        .n_inputs = 10,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic2_tangent_solution_with_increments_inputs,
-        .outputs = mstmm_sweep_generic2_tangent_solution_with_increments_outputs,
-        .ir_hash = "02d375ff13c073c7cb977ee9bbcdd9496114adb54c80e14e31a358aa19af6df9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic2_complement,
-        .call = mstmm_sweep_generic2_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_complement_inputs,
-        .outputs = mstmm_sweep_generic2_complement_outputs,
-        .ir_hash = "11025136447d6ecdd0fa07a9c4383b32bc372ee7fbed616668070a223b03fe0b",
-        .n_guards = 2,
-        .guards = mstmm_sweep_generic2_complement_guards,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_generic2_divide,
-        .call = mstmm_sweep_generic2_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_divide_inputs,
-        .outputs = mstmm_sweep_generic2_divide_outputs,
-        .ir_hash = "dbe108d2a0f52db0f7f8ac1e22236eef41fe8abfd89c7d3dbb7c2907c4135069",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_generic2_couple,
-        .call = mstmm_sweep_generic2_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_couple_inputs,
-        .outputs = mstmm_sweep_generic2_couple_outputs,
-        .ir_hash = "57a9d83c984525c9c3fa66ed18f6ca2f89011d6ebd3594fc77e8cac02a9d2ed7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_generic2_add_known_part,
-        .call = mstmm_sweep_generic2_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_add_known_part_inputs,
-        .outputs = mstmm_sweep_generic2_add_known_part_outputs,
-        .ir_hash = "bb2460bf020973365ec6434b3f1e44104b8065b1ee1d4424a377a054f3f06acd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_generic2_add_multiplier_effort,
-        .call = mstmm_sweep_generic2_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_generic2_add_multiplier_effort_outputs,
-        .ir_hash = "7034f3fdb4c876a38240f978e280b25e9d90dc79c4f0573ae2bfc658af26d9a2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_load",
-        .function = (void (*)(void))mstmm_sweep_generic2_required_load,
-        .call = mstmm_sweep_generic2_required_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_required_load_inputs,
-        .outputs = mstmm_sweep_generic2_required_load_outputs,
-        .ir_hash = "718b414f7c13fc8ff7c009a5b01999e7643819216da017ba9c5f0c75c40f622b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_generic2_ground_column_load,
-        .call = mstmm_sweep_generic2_ground_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_ground_column_load_inputs,
-        .outputs = mstmm_sweep_generic2_ground_column_load_outputs,
-        .ir_hash = "276fb1081d589e5f4d460a5c5aa97bd15535bfda577a2fe7d48fa03055394cbe",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_forward_slope,
-        .call = mstmm_sweep_generic2_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic2_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic2_forward_slope_outputs,
-        .ir_hash = "c9b74ce91f6ef1d31f5a47ea3fb70f66f15b636d50b2eef1bc0923cdbeffab92",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_effort_slope,
-        .call = mstmm_sweep_generic2_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic2_effort_slope_outputs,
-        .ir_hash = "b81a2bdecc7d7aa144534042477941f6bda227ab1317708dc9a6b54e3499983e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_complement_slope,
-        .call = mstmm_sweep_generic2_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic2_complement_slope_outputs,
-        .ir_hash = "06891534e4024a459b98b81e90c0028b35b52123c2fcf24fc6495fe686a982ef",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_add_known_part_slope,
-        .call = mstmm_sweep_generic2_add_known_part_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_add_known_part_slope_inputs,
-        .outputs = mstmm_sweep_generic2_add_known_part_slope_outputs,
-        .ir_hash = "1946d03265736f4a86b4bc991cfa9244e9354eb11e196e5ff13c80196e6bd32f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic2_add_multiplier_effort_slope,
-        .call = mstmm_sweep_generic2_add_multiplier_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic2_add_multiplier_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic2_add_multiplier_effort_slope_outputs,
-        .ir_hash = "5aa1db7ebba055ecca216bfa485b969ac0b500f89baa35a992a247b51581b683",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic2_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 12, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 2, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "962addadfcce57b37a9ab6f4e96dc4dc0255f61ab8759118fb8c12eb203c95be", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic2_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 12, "", 0, 0}, {"g", 2, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "5df2b75324bd54401cfa71d56fd68ce4c7e0a83a39ac61d6ab3744f56398f0fe", 6, (const
+    mstmm_guard[]){{1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 2 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic2_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"G", 12, "", 0, 0}, {"g", 2, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 2, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "972f69669e9e8cf8083829793fc7a576d92458619c3bac90c565533fc9448d3b", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic2_effort), 2, 1, (const mstmm_port[]){{"H", 12, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 2, "N, N*m", 0, 0}},
+    "6a191e5232dc6e75b17e9a9f8344b04196152fb37fbc91e188cb184ac745c331", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic2_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 2, "", 0, 0}},
+    "8069643f2dbafcdca27afff5e44931d5c1a312472f0cb9d66f639b2b7aaf7b77", 2, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}}},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic2_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"W", 4, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 4, "", 0,
+    0}, {"G", 12, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "435c9bd6dd2dcc12b8f5f43b73abab3aab412310fa4ce4ad69076bbf265f61f8", 4, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 2 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic2_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"G", 12, "", 0,
+    0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 2,
+    "N, N*m", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "d13f0e65af88315c0220b8926b1afba5dfe159baedbd36d0493c20ad70051f05", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic2_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"F", 4, "", 0, 0},
+    {"G", 12, "", 0, 0}, {"y", 2, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 2, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "afcc7e70dead15bf949595fbf3c0c3d7c43f298f94ce6037f4b3a228e80c554a", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic2_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 12, "", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 12, "", 0, 0}, {"g", 2, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "6a12962c177373d17a1ae4edb25c6113db9259fddb01be24af23ab339b086dd5", 4, (const mstmm_guard[]){{1,
+    "speed 1 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}}},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 12, "", 0, 0}, {"s", 2, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "f555e4e7e6a39782a13be6e131482f416c374dafb6a02b0bb351afb68d06f3eb", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 12, "", 0, 0}, {"s", 2, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 12, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    2, "", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"laws", 2, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 2, "", 0, 0}},
+    "346f2ae5cbb5f516ef3cf9af9c875227607b8f9600ca6e7764e38833abb1aa33", 0, NULL},
+  {"tangent_coordinate_change", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_coordinate_change), 2,
+    2, (const mstmm_port[]){{"H", 12, "", 0, 0}, {"d_q", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "68d1f53fe8f99b6879c7f032e07bb156017991ee37a11ee21a8ec05f14cde03f", 0, NULL},
+  {"tangent_steady", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_steady), 11, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 12, "", 0, 0}, {"v", 3, "", 0,
+    0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 2, "", 0, 0},
+    {"d_s", 2, "", 0, 0}, {"J", 2, "kg*m2 or kg", 0, 0}, {"laws", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 2, "", 0, 0}},
+    "ef5863460899540abf9f0461460818c620119c57597bf51939c7313214a91540", 0, NULL},
+  {"tangent_rotational", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_rotational), 9, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"H", 12, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 2, "", 0, 0}, {"d_s", 2, "", 0, 0}, {"J", 2,
+    "kg*m2 or kg", 0, 0}, {"laws", 2, "", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6,
+    "", 0, 0}, {"row", 2, "", 0, 0}},
+    "1594df51b14a3cbddefce2fc37864b988c5dc50addeb1bbcbbd05e41a7c49c6a", 0, NULL},
+  {"tangent_rows", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_rows), 4, 4, (const
+    mstmm_port[]){{"H", 12, "", 0, 0}, {"B", 18, "", 0, 0}, {"W", 4, "", 0, 0}, {"S", 54, "", 0,
+    0}}, (const mstmm_port[]){{"K", 12, "", 0, 0}, {"right", 18, "", 0, 0}, {"D", 4, "", 0, 0},
+    {"one", 4, "", 0, 0}}, "81b1b4978d0a135e418ca6564643e9a4a4c214a1ba4e7b75db570553a94e7c4a", 0,
+    NULL},
+  {"tangent_reduce", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_reduce), 4, 3, (const
+    mstmm_port[]){{"inverse", 4, "", 0, 0}, {"right", 18, "", 0, 0}, {"K", 12, "", 0, 0}, {"G", 12,
+    "", 0, 0}}, (const mstmm_port[]){{"gain", 18, "", 0, 0}, {"V", 12, "", 0, 0}, {"S", 54, "", 1,
+    0}}, "d899052f3063d031ca2471b5cdfd8693cc8676369ff6a0f42190537abe2259dc", 0, NULL},
+  {"tangent_load", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_load), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"V", 12, "", 0,
+    0}, {"inverse", 4, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"y", 2, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "675aab1a5fcd783fef893c94f2d06a4bb74a04ce601edbace7d64012f586231c", 0, NULL},
+  {"tangent_solution", MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_solution), 9, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 18, "", 0, 0}, {"gain", 18,
+    "", 0, 0}, {"y", 2, "", 0, 0}}, (const mstmm_port[]){{"x", 2, "", 0, 0}, {"z", 9, "", 0, 0}},
+    "6eaf38106ad9c46652a997929dc5060d32d6030412782180b0b38700617cac9f", 0, NULL},
+  {"tangent_load_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_load_with_increments), 8, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 12, "", 0, 0}, {"V", 12, "", 0,
+    0}, {"inverse", 4, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 2, "", 0, 0}, {"e_b", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 2, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "ff0ee9ef8a401b62e81cb6fc23eefc08508d40b27c17c5c3b887f577bca3e12a", 0, NULL},
+  {"tangent_solution_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic2_tangent_solution_with_increments), 10, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 18, "", 0, 0}, {"gain", 18,
+    "", 0, 0}, {"y", 2, "", 0, 0}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"x", 2, "", 0, 0},
+    {"z", 9, "", 0, 0}}, "ffec17d7f0048118a8949b7ad630b0f5e1f6233dfd1ab4569e785f66c011e2ef", 0,
+    NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic2_complement), 1, 1, (const mstmm_port[]){{"H",
+    12, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "d7e4289c4425936dee1795d2c450b23cbbbff795b41200392b33bc765da7693f", 2, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}}},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_generic2_divide), 2, 1, (const mstmm_port[]){{"F", 4, "",
+    0, 0}, {"y", 2, "", 0, 0}}, (const mstmm_port[]){{"z", 2, "", 0, 0}},
+    "4ff14301baf36e6b0e4ffd6833923b3367cab5648948d1abee713d3c744a571d", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_generic2_couple), 2, 1, (const mstmm_port[]){{"y", 2, "",
+    0, 0}, {"z", 2, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "4edfa82eaa4691418925adc51b3d7b117559a25ce0747df35517d5b575f62711", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_generic2_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 2, "", 0, 0}, {"z", 2, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "ae5a5369692af4867844dc9c6a5deda5fa8fe2fd716d19fc805de03732f84241", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_generic2_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 2, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    2, "", 1, 0}}, "fd26193311c7c048b7bdb1d3e7ab54a7d13ef6daf7f3e0c045eb04ffc0d3c24a", 0, NULL},
+  {"required_load", MSTMM_FUNCTIONS(mstmm_sweep_generic2_required_load), 3, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"H", 12, "", 0, 0}, {"udot", 2, "", 0, 0}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "13ff90bad4a6f32083ac5dd5045d078fdc5553f46ab0034b93b44fbfd3cb648c", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic2_ground_column_load), 3, 1, (const
+    mstmm_port[]){{"H", 12, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"y", 2, "N, N*m", 0, 0}},
+    "90da298b3a50ffb2206c2bcb509b2492ecbb2363e0e7260dfced19f6830d0a6f", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic2_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 12, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 2, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 12, "", 0,
+    0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 2, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "37b36258292d4b8a640f495287d6fa3134f14b07e0dfabff801dcac6e249c9a0",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic2_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 12, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 12, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 2, "N, N*m", 0, 0}},
+    "c8dceb758466924dcf457797b3514a011d6bc601d056417a5332be56d7ac7d02", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic2_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 12, "", 0, 0}, {"d_H", 12, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "",
+    0, 0}}, "b82db5fd449a7ded3c28628d8eab291ee6e179c7710d46f70dfb69f21c1804f9", 0, NULL},
+  {"add_known_part_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic2_add_known_part_slope), 4, 1, (const
+    mstmm_port[]){{"y", 2, "", 0, 0}, {"z", 2, "", 0, 0}, {"d_y", 2, "", 0, 0}, {"d_z", 2, "", 0,
+    0}}, (const mstmm_port[]){{"d_l", 1, "", 1, 0}},
+    "570f7dc05a2ea3b828cc2b0b57ab3cbc360fdde0efdf8c8d71aebdb55d026be7", 0, NULL},
+  {"add_multiplier_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic2_add_multiplier_effort_slope),
+    4, 1, (const mstmm_port[]){{"y", 2, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_y", 2, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_y_0", 2, "", 1, 0}},
+    "64d85bba405772ca44e5db0b450aee5ccf83a9ce471cad42d041d9d76eb76be4", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic2 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic2",
-    .hash = "046e2c55a8776c078dfc0aebf9f186f1bd419b6dcc4ef300d657c0e38d68630c",
+    .hash = "c5de32129ae23626419120eeca2ba42aa4e4cc4716e216419689ca3dcc035e8c",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -10,105 +10,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic3;
-int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic3_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic3_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic3_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic3_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic3_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic3_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic3_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x);
-int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row);
-int mstmm_sweep_generic3_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
-int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one);
-int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S);
-int mstmm_sweep_generic3_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic3_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic3_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z);
-int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic3_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_generic3_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_generic3_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic3_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y);
-int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic3_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-int mstmm_sweep_generic3_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic3_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -127,8 +28,6 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 #endif
 
 /* bias motion outboard of a hinge with 3 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -143,279 +42,70 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic3_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic3_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = H[9] * s[0];
-    const real t87 = H[10] * s[1];
-    const real t88 = t86 + t87;
-    const real t89 = H[11] * s[2];
-    const real t90 = t88 + t89;
-    const real t91 = c[3] + t90;
-    const real t92 = w[2] * t73;
-    const real t93 = w[1] * t79;
-    const real t94 = t92 - t93;
-    const real t95 = t91 + t94;
-    const real t96 = t85 + t95;
-    motion[3] = t96;
-    const real t97 = motion_I[3] * t9;
-    const real t98 = motion_I[4] * t24;
-    const real t99 = t97 + t98;
-    const real t100 = motion_I[5] * t39;
-    const real t101 = t99 + t100;
-    const real t102 = H[12] * s[0];
-    const real t103 = H[13] * s[1];
-    const real t104 = t102 + t103;
-    const real t105 = H[14] * s[2];
-    const real t106 = t104 + t105;
-    const real t107 = c[4] + t106;
-    const real t108 = w[0] * t79;
-    const real t109 = w[2] * t67;
-    const real t110 = t108 - t109;
-    const real t111 = t107 + t110;
-    const real t112 = t101 + t111;
-    motion[4] = t112;
-    const real t113 = motion_I[3] * t14;
-    const real t114 = motion_I[4] * t29;
-    const real t115 = t113 + t114;
-    const real t116 = motion_I[5] * t44;
-    const real t117 = t115 + t116;
-    const real t118 = H[15] * s[0];
-    const real t119 = H[16] * s[1];
-    const real t120 = t118 + t119;
-    const real t121 = H[17] * s[2];
-    const real t122 = t120 + t121;
-    const real t123 = c[5] + t122;
-    const real t124 = w[1] * t67;
-    const real t125 = w[0] * t73;
-    const real t126 = t124 - t125;
-    const real t127 = t123 + t126;
-    const real t128 = t117 + t127;
-    motion[5] = t128;
-    const real t129 = motion_I[0] * motion_I[1];
-    const real t130 = t129 - motion_I[5];
-    const real t131 = t56 * t130;
-    const real t132 = motion_I[1] * motion_I[1];
-    const real t133 = motion_I[2] * motion_I[2];
-    const real t134 = t132 + t133;
-    const real t135 = t50 * t134;
-    const real t136 = t131 - t135;
-    const real t137 = motion_I[0] * motion_I[2];
-    const real t138 = motion_I[4] + t137;
-    const real t139 = t62 * t138;
-    const real t140 = t136 + t139;
-    const real t141 = motion_I[6] + t140;
-    const real t142 = t4 * t141;
-    const real t143 = motion_I[5] + t129;
-    const real t144 = t50 * t143;
-    const real t145 = motion_I[0] * motion_I[0];
-    const real t146 = t133 + t145;
-    const real t147 = t56 * t146;
-    const real t148 = t144 - t147;
-    const real t149 = motion_I[1] * motion_I[2];
-    const real t150 = t149 - motion_I[3];
-    const real t151 = t62 * t150;
-    const real t152 = t148 + t151;
-    const real t153 = motion_I[7] + t152;
-    const real t154 = t19 * t153;
-    const real t155 = t142 + t154;
-    const real t156 = t137 - motion_I[4];
-    const real t157 = t50 * t156;
-    const real t158 = motion_I[3] + t149;
-    const real t159 = t56 * t158;
-    const real t160 = t157 + t159;
-    const real t161 = t132 + t145;
-    const real t162 = t62 * t161;
-    const real t163 = t160 - t162;
-    const real t164 = motion_I[8] + t163;
-    const real t165 = t34 * t164;
-    const real t166 = t155 + t165;
-    const real t167 = H[0] * s[0];
-    const real t168 = H[1] * s[1];
-    const real t169 = t167 + t168;
-    const real t170 = H[2] * s[2];
-    const real t171 = t169 + t170;
-    const real t172 = c[0] + t171;
-    const real t173 = v[2] * t73;
-    const real t174 = 2.0 * t173;
-    const real t175 = v[1] * t79;
-    const real t176 = 2.0 * t175;
-    const real t177 = t174 - t176;
-    const real t178 = t172 + t177;
-    const real t179 = t166 + t178;
-    motion[6] = t179;
-    const real t180 = t9 * t141;
-    const real t181 = t24 * t153;
-    const real t182 = t180 + t181;
-    const real t183 = t39 * t164;
-    const real t184 = t182 + t183;
-    const real t185 = H[3] * s[0];
-    const real t186 = H[4] * s[1];
-    const real t187 = t185 + t186;
-    const real t188 = H[5] * s[2];
-    const real t189 = t187 + t188;
-    const real t190 = c[1] + t189;
-    const real t191 = v[0] * t79;
-    const real t192 = 2.0 * t191;
-    const real t193 = v[2] * t67;
-    const real t194 = 2.0 * t193;
-    const real t195 = t192 - t194;
-    const real t196 = t190 + t195;
-    const real t197 = t184 + t196;
-    motion[7] = t197;
-    const real t198 = t14 * t141;
-    const real t199 = t29 * t153;
-    const real t200 = t198 + t199;
-    const real t201 = t44 * t164;
-    const real t202 = t200 + t201;
-    const real t203 = H[6] * s[0];
-    const real t204 = H[7] * s[1];
-    const real t205 = t203 + t204;
-    const real t206 = H[8] * s[2];
-    const real t207 = t205 + t206;
-    const real t208 = c[2] + t207;
-    const real t209 = v[1] * t67;
-    const real t210 = 2.0 * t209;
-    const real t211 = v[0] * t73;
-    const real t212 = 2.0 * t211;
-    const real t213 = t210 - t212;
-    const real t214 = t208 + t213;
-    const real t215 = t202 + t214;
-    motion[8] = t215;
-    return 0;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + (H[9] * s[0] +
+    H[10] * s[1] + H[11] * s[2]) + (w[2] * t73 - w[1] * t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + (H[12] * s[0] +
+    H[13] * s[1] + H[14] * s[2]) + (w[0] * t79 - w[2] * t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + (H[15] * s[0] +
+    H[16] * s[1] + H[17] * s[2]) + (w[1] * t67 - w[0] * t73));
+  real t129 = motion_I[0] * motion_I[1];
+  real t132 = motion_I[1] * motion_I[1];
+  real t133 = motion_I[2] * motion_I[2];
+  real t137 = motion_I[0] * motion_I[2];
+  real t141 = motion_I[6] + (t56 * (t129 - motion_I[5]) - t50 * (t132 + t133) + t62 * (motion_I[4] +
+    t137));
+  real t145 = motion_I[0] * motion_I[0];
+  real t149 = motion_I[1] * motion_I[2];
+  real t153 = motion_I[7] + (t50 * (motion_I[5] + t129) - t56 * (t133 + t145) + t62 * (t149 -
+    motion_I[3]));
+  real t164 = motion_I[8] + (t50 * (t137 - motion_I[4]) + t56 * (motion_I[3] + t149) - t62 * (t132 +
+    t145));
+  motion[6] = t4 * t141 + t19 * t153 + t34 * t164 + (c[0] + (H[0] * s[0] + H[1] * s[1] + H[2] *
+    s[2]) + (2.0 * (v[2] * t73) - 2.0 * (v[1] * t79)));
+  motion[7] = t9 * t141 + t24 * t153 + t39 * t164 + (c[1] + (H[3] * s[0] + H[4] * s[1] + H[5] *
+    s[2]) + (2.0 * (v[0] * t79) - 2.0 * (v[2] * t67)));
+  motion[8] = t14 * t141 + t29 * t153 + t44 * t164 + (c[2] + (H[6] * s[0] + H[7] * s[1] + H[8] *
+    s[2]) + (2.0 * (v[1] * t67) - 2.0 * (v[0] * t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the free coordinates
@@ -429,1147 +119,243 @@ static const mstmm_port mstmm_sweep_generic3_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic3_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[3] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[3] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[6] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[9] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[12] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[15] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[3] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[3] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[6] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[9] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[12] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[15] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[6] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[3] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[6] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[9] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[12] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[15] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[9] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[3] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[6] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[9] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[12] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[15] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[12] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[3] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[6] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[9] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[12] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[15] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[15] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t79 = H[1] * S[0];
-    const real t80 = H[4] * S[1];
-    const real t81 = t79 + t80;
-    const real t82 = H[7] * S[2];
-    const real t83 = t81 + t82;
-    const real t84 = H[10] * S[3];
-    const real t85 = t83 + t84;
-    const real t86 = H[13] * S[4];
-    const real t87 = t85 + t86;
-    const real t88 = H[16] * S[5];
-    const real t89 = t87 + t88;
-    const real t90 = H[1] * t89;
-    const real t91 = H[1] * S[1];
-    const real t92 = H[4] * S[6];
-    const real t93 = t91 + t92;
-    const real t94 = H[7] * S[7];
-    const real t95 = t93 + t94;
-    const real t96 = H[10] * S[8];
-    const real t97 = t95 + t96;
-    const real t98 = H[13] * S[9];
-    const real t99 = t97 + t98;
-    const real t100 = H[16] * S[10];
-    const real t101 = t99 + t100;
-    const real t102 = H[4] * t101;
-    const real t103 = t90 + t102;
-    const real t104 = H[1] * S[2];
-    const real t105 = H[4] * S[7];
-    const real t106 = t104 + t105;
-    const real t107 = H[7] * S[11];
-    const real t108 = t106 + t107;
-    const real t109 = H[10] * S[12];
-    const real t110 = t108 + t109;
-    const real t111 = H[13] * S[13];
-    const real t112 = t110 + t111;
-    const real t113 = H[16] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = H[7] * t114;
-    const real t116 = t103 + t115;
-    const real t117 = H[1] * S[3];
-    const real t118 = H[4] * S[8];
-    const real t119 = t117 + t118;
-    const real t120 = H[7] * S[12];
-    const real t121 = t119 + t120;
-    const real t122 = H[10] * S[15];
-    const real t123 = t121 + t122;
-    const real t124 = H[13] * S[16];
-    const real t125 = t123 + t124;
-    const real t126 = H[16] * S[17];
-    const real t127 = t125 + t126;
-    const real t128 = H[10] * t127;
-    const real t129 = t116 + t128;
-    const real t130 = H[1] * S[4];
-    const real t131 = H[4] * S[9];
-    const real t132 = t130 + t131;
-    const real t133 = H[7] * S[13];
-    const real t134 = t132 + t133;
-    const real t135 = H[10] * S[16];
-    const real t136 = t134 + t135;
-    const real t137 = H[13] * S[18];
-    const real t138 = t136 + t137;
-    const real t139 = H[16] * S[19];
-    const real t140 = t138 + t139;
-    const real t141 = H[13] * t140;
-    const real t142 = t129 + t141;
-    const real t143 = H[1] * S[5];
-    const real t144 = H[4] * S[10];
-    const real t145 = t143 + t144;
-    const real t146 = H[7] * S[14];
-    const real t147 = t145 + t146;
-    const real t148 = H[10] * S[17];
-    const real t149 = t147 + t148;
-    const real t150 = H[13] * S[19];
-    const real t151 = t149 + t150;
-    const real t152 = H[16] * S[20];
-    const real t153 = t151 + t152;
-    const real t154 = H[16] * t153;
-    const real t155 = t142 + t154;
-    const real t156 = J[1] + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * t89;
-    const real t159 = H[3] * t101;
-    const real t160 = t158 + t159;
-    const real t161 = H[6] * t114;
-    const real t162 = t160 + t161;
-    const real t163 = H[9] * t127;
-    const real t164 = t162 + t163;
-    const real t165 = H[12] * t140;
-    const real t166 = t164 + t165;
-    const real t167 = H[15] * t153;
-    const real t168 = t166 + t167;
-    const real t169 = 1.0 / t77;
-    const real t170 = t168 * t169;
-    const real t171 = t168 * t170;
-    const real t172 = t156 - t171;
-    const real t173 = t157 < t172;
-    if (!(t173 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t174 = H[2] * S[0];
-    const real t175 = H[5] * S[1];
-    const real t176 = t174 + t175;
-    const real t177 = H[8] * S[2];
-    const real t178 = t176 + t177;
-    const real t179 = H[11] * S[3];
-    const real t180 = t178 + t179;
-    const real t181 = H[14] * S[4];
-    const real t182 = t180 + t181;
-    const real t183 = H[17] * S[5];
-    const real t184 = t182 + t183;
-    const real t185 = H[2] * t184;
-    const real t186 = H[2] * S[1];
-    const real t187 = H[5] * S[6];
-    const real t188 = t186 + t187;
-    const real t189 = H[8] * S[7];
-    const real t190 = t188 + t189;
-    const real t191 = H[11] * S[8];
-    const real t192 = t190 + t191;
-    const real t193 = H[14] * S[9];
-    const real t194 = t192 + t193;
-    const real t195 = H[17] * S[10];
-    const real t196 = t194 + t195;
-    const real t197 = H[5] * t196;
-    const real t198 = t185 + t197;
-    const real t199 = H[2] * S[2];
-    const real t200 = H[5] * S[7];
-    const real t201 = t199 + t200;
-    const real t202 = H[8] * S[11];
-    const real t203 = t201 + t202;
-    const real t204 = H[11] * S[12];
-    const real t205 = t203 + t204;
-    const real t206 = H[14] * S[13];
-    const real t207 = t205 + t206;
-    const real t208 = H[17] * S[14];
-    const real t209 = t207 + t208;
-    const real t210 = H[8] * t209;
-    const real t211 = t198 + t210;
-    const real t212 = H[2] * S[3];
-    const real t213 = H[5] * S[8];
-    const real t214 = t212 + t213;
-    const real t215 = H[8] * S[12];
-    const real t216 = t214 + t215;
-    const real t217 = H[11] * S[15];
-    const real t218 = t216 + t217;
-    const real t219 = H[14] * S[16];
-    const real t220 = t218 + t219;
-    const real t221 = H[17] * S[17];
-    const real t222 = t220 + t221;
-    const real t223 = H[11] * t222;
-    const real t224 = t211 + t223;
-    const real t225 = H[2] * S[4];
-    const real t226 = H[5] * S[9];
-    const real t227 = t225 + t226;
-    const real t228 = H[8] * S[13];
-    const real t229 = t227 + t228;
-    const real t230 = H[11] * S[16];
-    const real t231 = t229 + t230;
-    const real t232 = H[14] * S[18];
-    const real t233 = t231 + t232;
-    const real t234 = H[17] * S[19];
-    const real t235 = t233 + t234;
-    const real t236 = H[14] * t235;
-    const real t237 = t224 + t236;
-    const real t238 = H[2] * S[5];
-    const real t239 = H[5] * S[10];
-    const real t240 = t238 + t239;
-    const real t241 = H[8] * S[14];
-    const real t242 = t240 + t241;
-    const real t243 = H[11] * S[17];
-    const real t244 = t242 + t243;
-    const real t245 = H[14] * S[19];
-    const real t246 = t244 + t245;
-    const real t247 = H[17] * S[20];
-    const real t248 = t246 + t247;
-    const real t249 = H[17] * t248;
-    const real t250 = t237 + t249;
-    const real t251 = J[2] + t250;
-    const real t252 = t251 * ((real)1 / (real)10000000000000);
-    const real t253 = H[0] * t184;
-    const real t254 = H[3] * t196;
-    const real t255 = t253 + t254;
-    const real t256 = H[6] * t209;
-    const real t257 = t255 + t256;
-    const real t258 = H[9] * t222;
-    const real t259 = t257 + t258;
-    const real t260 = H[12] * t235;
-    const real t261 = t259 + t260;
-    const real t262 = H[15] * t248;
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t169;
-    const real t265 = t263 * t264;
-    const real t266 = t251 - t265;
-    const real t267 = H[1] * t184;
-    const real t268 = H[4] * t196;
-    const real t269 = t267 + t268;
-    const real t270 = H[7] * t209;
-    const real t271 = t269 + t270;
-    const real t272 = H[10] * t222;
-    const real t273 = t271 + t272;
-    const real t274 = H[13] * t235;
-    const real t275 = t273 + t274;
-    const real t276 = H[16] * t248;
-    const real t277 = t275 + t276;
-    const real t278 = t263 * t170;
-    const real t279 = t277 - t278;
-    const real t280 = 1.0 / t172;
-    const real t281 = t280 * t279;
-    const real t282 = t279 * t281;
-    const real t283 = t266 - t282;
-    const real t284 = t252 < t283;
-    if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t285 = H[6] * H[6];
-    const real t286 = H[0] * H[0];
-    const real t287 = H[3] * H[3];
-    const real t288 = t286 + t287;
-    const real t289 = t285 + t288;
-    const real t290 = 0.0 < floor_[0];
-    const real t291 = S[0] + S[6];
-    const real t292 = S[11] + t291;
-    const real t293 = ((real)1 / (real)300000000000000) * t292;
-    const real t294 = t290 != 0 ? floor_[0] : t293;
-    const real t295 = t289 * t294;
-    const real t296 = H[15] * H[15];
-    const real t297 = H[9] * H[9];
-    const real t298 = H[12] * H[12];
-    const real t299 = t297 + t298;
-    const real t300 = t296 + t299;
-    const real t301 = 0.0 < floor_[1];
-    const real t302 = S[15] + S[18];
-    const real t303 = S[20] + t302;
-    const real t304 = ((real)1 / (real)300000000000000) * t303;
-    const real t305 = t301 != 0 ? floor_[1] : t304;
-    const real t306 = t300 * t305;
-    const real t307 = t295 + t306;
-    const real t308 = t307 < t77;
-    if (!(t308 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t309 = H[7] * H[7];
-    const real t310 = H[1] * H[1];
-    const real t311 = H[4] * H[4];
-    const real t312 = t310 + t311;
-    const real t313 = t309 + t312;
-    const real t314 = t294 * t313;
-    const real t315 = H[16] * H[16];
-    const real t316 = H[10] * H[10];
-    const real t317 = H[13] * H[13];
-    const real t318 = t316 + t317;
-    const real t319 = t315 + t318;
-    const real t320 = t305 * t319;
-    const real t321 = t314 + t320;
-    const real t322 = t321 < t156;
-    if (!(t322 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t323 = H[8] * H[8];
-    const real t324 = H[2] * H[2];
-    const real t325 = H[5] * H[5];
-    const real t326 = t324 + t325;
-    const real t327 = t323 + t326;
-    const real t328 = t294 * t327;
-    const real t329 = H[17] * H[17];
-    const real t330 = H[11] * H[11];
-    const real t331 = H[14] * H[14];
-    const real t332 = t330 + t331;
-    const real t333 = t329 + t332;
-    const real t334 = t305 * t333;
-    const real t335 = t328 + t334;
-    const real t336 = t335 < t251;
-    if (!(t336 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    const real t337 = t10 * t169;
-    const real t338 = t10 * t170;
-    const real t339 = t89 - t338;
-    const real t340 = t280 * t339;
-    const real t341 = 1.0 / t283;
-    const real t342 = t10 * t264;
-    const real t343 = t184 - t342;
-    const real t344 = t281 * t339;
-    const real t345 = t343 - t344;
-    const real t346 = t341 * t345;
-    const real t347 = t281 * t346;
-    const real t348 = t340 - t347;
-    const real t349 = t170 * t348;
-    const real t350 = t337 - t349;
-    const real t351 = t264 * t346;
-    const real t352 = t350 - t351;
-    G[0] = t352;
-    const real t353 = t22 * t169;
-    const real t354 = t22 * t170;
-    const real t355 = t101 - t354;
-    const real t356 = t280 * t355;
-    const real t357 = t22 * t264;
-    const real t358 = t196 - t357;
-    const real t359 = t281 * t355;
-    const real t360 = t358 - t359;
-    const real t361 = t341 * t360;
-    const real t362 = t281 * t361;
-    const real t363 = t356 - t362;
-    const real t364 = t170 * t363;
-    const real t365 = t353 - t364;
-    const real t366 = t264 * t361;
-    const real t367 = t365 - t366;
-    G[1] = t367;
-    const real t368 = t35 * t169;
-    const real t369 = t35 * t170;
-    const real t370 = t114 - t369;
-    const real t371 = t280 * t370;
-    const real t372 = t35 * t264;
-    const real t373 = t209 - t372;
-    const real t374 = t281 * t370;
-    const real t375 = t373 - t374;
-    const real t376 = t341 * t375;
-    const real t377 = t281 * t376;
-    const real t378 = t371 - t377;
-    const real t379 = t170 * t378;
-    const real t380 = t368 - t379;
-    const real t381 = t264 * t376;
-    const real t382 = t380 - t381;
-    G[2] = t382;
-    const real t383 = t48 * t169;
-    const real t384 = t48 * t170;
-    const real t385 = t127 - t384;
-    const real t386 = t280 * t385;
-    const real t387 = t48 * t264;
-    const real t388 = t222 - t387;
-    const real t389 = t281 * t385;
-    const real t390 = t388 - t389;
-    const real t391 = t341 * t390;
-    const real t392 = t281 * t391;
-    const real t393 = t386 - t392;
-    const real t394 = t170 * t393;
-    const real t395 = t383 - t394;
-    const real t396 = t264 * t391;
-    const real t397 = t395 - t396;
-    G[3] = t397;
-    const real t398 = t61 * t169;
-    const real t399 = t61 * t170;
-    const real t400 = t140 - t399;
-    const real t401 = t280 * t400;
-    const real t402 = t61 * t264;
-    const real t403 = t235 - t402;
-    const real t404 = t281 * t400;
-    const real t405 = t403 - t404;
-    const real t406 = t341 * t405;
-    const real t407 = t281 * t406;
-    const real t408 = t401 - t407;
-    const real t409 = t170 * t408;
-    const real t410 = t398 - t409;
-    const real t411 = t264 * t406;
-    const real t412 = t410 - t411;
-    G[4] = t412;
-    const real t413 = t74 * t169;
-    const real t414 = t74 * t170;
-    const real t415 = t153 - t414;
-    const real t416 = t280 * t415;
-    const real t417 = t74 * t264;
-    const real t418 = t248 - t417;
-    const real t419 = t281 * t415;
-    const real t420 = t418 - t419;
-    const real t421 = t341 * t420;
-    const real t422 = t281 * t421;
-    const real t423 = t416 - t422;
-    const real t424 = t170 * t423;
-    const real t425 = t413 - t424;
-    const real t426 = t264 * t421;
-    const real t427 = t425 - t426;
-    G[5] = t427;
-    G[6] = t348;
-    G[7] = t363;
-    G[8] = t378;
-    G[9] = t393;
-    G[10] = t408;
-    G[11] = t423;
-    G[12] = t346;
-    G[13] = t361;
-    G[14] = t376;
-    G[15] = t391;
-    G[16] = t406;
-    G[17] = t421;
-    const real t428 = H[0] * e[0];
-    const real t429 = H[3] * e[1];
-    const real t430 = t428 + t429;
-    const real t431 = H[6] * e[2];
-    const real t432 = t430 + t431;
-    const real t433 = H[9] * e[3];
-    const real t434 = t432 + t433;
-    const real t435 = H[12] * e[4];
-    const real t436 = t434 + t435;
-    const real t437 = H[15] * e[5];
-    const real t438 = t436 + t437;
-    const real t439 = tau[0] - t438;
-    const real t440 = t169 * t439;
-    const real t441 = H[1] * e[0];
-    const real t442 = H[4] * e[1];
-    const real t443 = t441 + t442;
-    const real t444 = H[7] * e[2];
-    const real t445 = t443 + t444;
-    const real t446 = H[10] * e[3];
-    const real t447 = t445 + t446;
-    const real t448 = H[13] * e[4];
-    const real t449 = t447 + t448;
-    const real t450 = H[16] * e[5];
-    const real t451 = t449 + t450;
-    const real t452 = tau[1] - t451;
-    const real t453 = t170 * t439;
-    const real t454 = t452 - t453;
-    const real t455 = t280 * t454;
-    const real t456 = H[2] * e[0];
-    const real t457 = H[5] * e[1];
-    const real t458 = t456 + t457;
-    const real t459 = H[8] * e[2];
-    const real t460 = t458 + t459;
-    const real t461 = H[11] * e[3];
-    const real t462 = t460 + t461;
-    const real t463 = H[14] * e[4];
-    const real t464 = t462 + t463;
-    const real t465 = H[17] * e[5];
-    const real t466 = t464 + t465;
-    const real t467 = tau[2] - t466;
-    const real t468 = t264 * t439;
-    const real t469 = t467 - t468;
-    const real t470 = t281 * t454;
-    const real t471 = t469 - t470;
-    const real t472 = t341 * t471;
-    const real t473 = t281 * t472;
-    const real t474 = t455 - t473;
-    const real t475 = t170 * t474;
-    const real t476 = t440 - t475;
-    const real t477 = t264 * t472;
-    const real t478 = t476 - t477;
-    g[0] = t478;
-    g[1] = t474;
-    g[2] = t472;
-    const real t479 = t10 * t352;
-    const real t480 = t89 * t348;
-    const real t481 = t479 + t480;
-    const real t482 = t184 * t346;
-    const real t483 = t481 + t482;
-    const real t484 = S[0] - t483;
-    const real t485 = Rc[0] * t484;
-    const real t486 = t10 * t367;
-    const real t487 = t89 * t363;
-    const real t488 = t486 + t487;
-    const real t489 = t184 * t361;
-    const real t490 = t488 + t489;
-    const real t491 = S[1] - t490;
-    const real t492 = Rc[1] * t491;
-    const real t493 = t485 + t492;
-    const real t494 = t10 * t382;
-    const real t495 = t89 * t378;
-    const real t496 = t494 + t495;
-    const real t497 = t184 * t376;
-    const real t498 = t496 + t497;
-    const real t499 = S[2] - t498;
-    const real t500 = Rc[2] * t499;
-    const real t501 = t493 + t500;
-    const real t502 = Rc[0] * t501;
-    const real t503 = Rc[0] * t491;
-    const real t504 = t22 * t367;
-    const real t505 = t101 * t363;
-    const real t506 = t504 + t505;
-    const real t507 = t196 * t361;
-    const real t508 = t506 + t507;
-    const real t509 = S[6] - t508;
-    const real t510 = Rc[1] * t509;
-    const real t511 = t503 + t510;
-    const real t512 = t22 * t382;
-    const real t513 = t101 * t378;
-    const real t514 = t512 + t513;
-    const real t515 = t196 * t376;
-    const real t516 = t514 + t515;
-    const real t517 = S[7] - t516;
-    const real t518 = Rc[2] * t517;
-    const real t519 = t511 + t518;
-    const real t520 = Rc[1] * t519;
-    const real t521 = t502 + t520;
-    const real t522 = Rc[0] * t499;
-    const real t523 = Rc[1] * t517;
-    const real t524 = t522 + t523;
-    const real t525 = t35 * t382;
-    const real t526 = t114 * t378;
-    const real t527 = t525 + t526;
-    const real t528 = t209 * t376;
-    const real t529 = t527 + t528;
-    const real t530 = S[11] - t529;
-    const real t531 = Rc[2] * t530;
-    const real t532 = t524 + t531;
-    const real t533 = Rc[2] * t532;
-    const real t534 = t521 + t533;
-    S_I[0] += t534;
-    const real t535 = Rc[3] * t501;
-    const real t536 = Rc[4] * t519;
-    const real t537 = t535 + t536;
-    const real t538 = Rc[5] * t532;
-    const real t539 = t537 + t538;
-    S_I[1] += t539;
-    const real t540 = Rc[6] * t501;
-    const real t541 = Rc[7] * t519;
-    const real t542 = t540 + t541;
-    const real t543 = Rc[8] * t532;
-    const real t544 = t542 + t543;
-    S_I[2] += t544;
-    const real t545 = t10 * t397;
-    const real t546 = t89 * t393;
-    const real t547 = t545 + t546;
-    const real t548 = t184 * t391;
-    const real t549 = t547 + t548;
-    const real t550 = S[3] - t549;
-    const real t551 = Rc[0] * t550;
-    const real t552 = t22 * t397;
-    const real t553 = t101 * t393;
-    const real t554 = t552 + t553;
-    const real t555 = t196 * t391;
-    const real t556 = t554 + t555;
-    const real t557 = S[8] - t556;
-    const real t558 = Rc[1] * t557;
-    const real t559 = t551 + t558;
-    const real t560 = t35 * t397;
-    const real t561 = t114 * t393;
-    const real t562 = t560 + t561;
-    const real t563 = t209 * t391;
-    const real t564 = t562 + t563;
-    const real t565 = S[12] - t564;
-    const real t566 = Rc[2] * t565;
-    const real t567 = t559 + t566;
-    const real t568 = Rc[0] * t567;
-    const real t569 = t10 * t412;
-    const real t570 = t89 * t408;
-    const real t571 = t569 + t570;
-    const real t572 = t184 * t406;
-    const real t573 = t571 + t572;
-    const real t574 = S[4] - t573;
-    const real t575 = Rc[0] * t574;
-    const real t576 = t22 * t412;
-    const real t577 = t101 * t408;
-    const real t578 = t576 + t577;
-    const real t579 = t196 * t406;
-    const real t580 = t578 + t579;
-    const real t581 = S[9] - t580;
-    const real t582 = Rc[1] * t581;
-    const real t583 = t575 + t582;
-    const real t584 = t35 * t412;
-    const real t585 = t114 * t408;
-    const real t586 = t584 + t585;
-    const real t587 = t209 * t406;
-    const real t588 = t586 + t587;
-    const real t589 = S[13] - t588;
-    const real t590 = Rc[2] * t589;
-    const real t591 = t583 + t590;
-    const real t592 = Rc[1] * t591;
-    const real t593 = t568 + t592;
-    const real t594 = t10 * t427;
-    const real t595 = t89 * t423;
-    const real t596 = t594 + t595;
-    const real t597 = t184 * t421;
-    const real t598 = t596 + t597;
-    const real t599 = S[5] - t598;
-    const real t600 = Rc[0] * t599;
-    const real t601 = t22 * t427;
-    const real t602 = t101 * t423;
-    const real t603 = t601 + t602;
-    const real t604 = t196 * t421;
-    const real t605 = t603 + t604;
-    const real t606 = S[10] - t605;
-    const real t607 = Rc[1] * t606;
-    const real t608 = t600 + t607;
-    const real t609 = t35 * t427;
-    const real t610 = t114 * t423;
-    const real t611 = t609 + t610;
-    const real t612 = t209 * t421;
-    const real t613 = t611 + t612;
-    const real t614 = S[14] - t613;
-    const real t615 = Rc[2] * t614;
-    const real t616 = t608 + t615;
-    const real t617 = Rc[2] * t616;
-    const real t618 = t593 + t617;
-    const real t619 = r[1] * t544;
-    const real t620 = r[2] * t539;
-    const real t621 = t619 - t620;
-    const real t622 = t618 + t621;
-    S_I[3] += t622;
-    const real t623 = Rc[3] * t567;
-    const real t624 = Rc[4] * t591;
-    const real t625 = t623 + t624;
-    const real t626 = Rc[5] * t616;
-    const real t627 = t625 + t626;
-    const real t628 = r[2] * t534;
-    const real t629 = r[0] * t544;
-    const real t630 = t628 - t629;
-    const real t631 = t627 + t630;
-    S_I[4] += t631;
-    const real t632 = Rc[6] * t567;
-    const real t633 = Rc[7] * t591;
-    const real t634 = t632 + t633;
-    const real t635 = Rc[8] * t616;
-    const real t636 = t634 + t635;
-    const real t637 = r[0] * t539;
-    const real t638 = r[1] * t534;
-    const real t639 = t637 - t638;
-    const real t640 = t636 + t639;
-    S_I[5] += t640;
-    const real t641 = Rc[3] * t484;
-    const real t642 = Rc[4] * t491;
-    const real t643 = t641 + t642;
-    const real t644 = Rc[5] * t499;
-    const real t645 = t643 + t644;
-    const real t646 = Rc[3] * t645;
-    const real t647 = Rc[3] * t491;
-    const real t648 = Rc[4] * t509;
-    const real t649 = t647 + t648;
-    const real t650 = Rc[5] * t517;
-    const real t651 = t649 + t650;
-    const real t652 = Rc[4] * t651;
-    const real t653 = t646 + t652;
-    const real t654 = Rc[3] * t499;
-    const real t655 = Rc[4] * t517;
-    const real t656 = t654 + t655;
-    const real t657 = Rc[5] * t530;
-    const real t658 = t656 + t657;
-    const real t659 = Rc[5] * t658;
-    const real t660 = t653 + t659;
-    S_I[6] += t660;
-    const real t661 = Rc[6] * t645;
-    const real t662 = Rc[7] * t651;
-    const real t663 = t661 + t662;
-    const real t664 = Rc[8] * t658;
-    const real t665 = t663 + t664;
-    S_I[7] += t665;
-    const real t666 = Rc[3] * t550;
-    const real t667 = Rc[4] * t557;
-    const real t668 = t666 + t667;
-    const real t669 = Rc[5] * t565;
-    const real t670 = t668 + t669;
-    const real t671 = Rc[0] * t670;
-    const real t672 = Rc[3] * t574;
-    const real t673 = Rc[4] * t581;
-    const real t674 = t672 + t673;
-    const real t675 = Rc[5] * t589;
-    const real t676 = t674 + t675;
-    const real t677 = Rc[1] * t676;
-    const real t678 = t671 + t677;
-    const real t679 = Rc[3] * t599;
-    const real t680 = Rc[4] * t606;
-    const real t681 = t679 + t680;
-    const real t682 = Rc[5] * t614;
-    const real t683 = t681 + t682;
-    const real t684 = Rc[2] * t683;
-    const real t685 = t678 + t684;
-    const real t686 = r[1] * t665;
-    const real t687 = r[2] * t660;
-    const real t688 = t686 - t687;
-    const real t689 = t685 + t688;
-    S_I[8] += t689;
-    const real t690 = Rc[3] * t670;
-    const real t691 = Rc[4] * t676;
-    const real t692 = t690 + t691;
-    const real t693 = Rc[5] * t683;
-    const real t694 = t692 + t693;
-    const real t695 = r[0] * t665;
-    const real t696 = t620 - t695;
-    const real t697 = t694 + t696;
-    S_I[9] += t697;
-    const real t698 = Rc[6] * t670;
-    const real t699 = Rc[7] * t676;
-    const real t700 = t698 + t699;
-    const real t701 = Rc[8] * t683;
-    const real t702 = t700 + t701;
-    const real t703 = r[0] * t660;
-    const real t704 = r[1] * t539;
-    const real t705 = t703 - t704;
-    const real t706 = t702 + t705;
-    S_I[10] += t706;
-    const real t707 = Rc[6] * t484;
-    const real t708 = Rc[7] * t491;
-    const real t709 = t707 + t708;
-    const real t710 = Rc[8] * t499;
-    const real t711 = t709 + t710;
-    const real t712 = Rc[6] * t711;
-    const real t713 = Rc[6] * t491;
-    const real t714 = Rc[7] * t509;
-    const real t715 = t713 + t714;
-    const real t716 = Rc[8] * t517;
-    const real t717 = t715 + t716;
-    const real t718 = Rc[7] * t717;
-    const real t719 = t712 + t718;
-    const real t720 = Rc[6] * t499;
-    const real t721 = Rc[7] * t517;
-    const real t722 = t720 + t721;
-    const real t723 = Rc[8] * t530;
-    const real t724 = t722 + t723;
-    const real t725 = Rc[8] * t724;
-    const real t726 = t719 + t725;
-    S_I[11] += t726;
-    const real t727 = Rc[6] * t550;
-    const real t728 = Rc[7] * t557;
-    const real t729 = t727 + t728;
-    const real t730 = Rc[8] * t565;
-    const real t731 = t729 + t730;
-    const real t732 = Rc[0] * t731;
-    const real t733 = Rc[6] * t574;
-    const real t734 = Rc[7] * t581;
-    const real t735 = t733 + t734;
-    const real t736 = Rc[8] * t589;
-    const real t737 = t735 + t736;
-    const real t738 = Rc[1] * t737;
-    const real t739 = t732 + t738;
-    const real t740 = Rc[6] * t599;
-    const real t741 = Rc[7] * t606;
-    const real t742 = t740 + t741;
-    const real t743 = Rc[8] * t614;
-    const real t744 = t742 + t743;
-    const real t745 = Rc[2] * t744;
-    const real t746 = t739 + t745;
-    const real t747 = r[1] * t726;
-    const real t748 = r[2] * t665;
-    const real t749 = t747 - t748;
-    const real t750 = t746 + t749;
-    S_I[12] += t750;
-    const real t751 = Rc[3] * t731;
-    const real t752 = Rc[4] * t737;
-    const real t753 = t751 + t752;
-    const real t754 = Rc[5] * t744;
-    const real t755 = t753 + t754;
-    const real t756 = r[2] * t544;
-    const real t757 = r[0] * t726;
-    const real t758 = t756 - t757;
-    const real t759 = t755 + t758;
-    S_I[13] += t759;
-    const real t760 = Rc[6] * t731;
-    const real t761 = Rc[7] * t737;
-    const real t762 = t760 + t761;
-    const real t763 = Rc[8] * t744;
-    const real t764 = t762 + t763;
-    const real t765 = t695 - t619;
-    const real t766 = t764 + t765;
-    S_I[14] += t766;
-    const real t767 = t48 * t397;
-    const real t768 = t127 * t393;
-    const real t769 = t767 + t768;
-    const real t770 = t222 * t391;
-    const real t771 = t769 + t770;
-    const real t772 = S[15] - t771;
-    const real t773 = Rc[0] * t772;
-    const real t774 = t48 * t412;
-    const real t775 = t127 * t408;
-    const real t776 = t774 + t775;
-    const real t777 = t222 * t406;
-    const real t778 = t776 + t777;
-    const real t779 = S[16] - t778;
-    const real t780 = Rc[1] * t779;
-    const real t781 = t773 + t780;
-    const real t782 = t48 * t427;
-    const real t783 = t127 * t423;
-    const real t784 = t782 + t783;
-    const real t785 = t222 * t421;
-    const real t786 = t784 + t785;
-    const real t787 = S[17] - t786;
-    const real t788 = Rc[2] * t787;
-    const real t789 = t781 + t788;
-    const real t790 = Rc[0] * t789;
-    const real t791 = Rc[0] * t779;
-    const real t792 = t61 * t412;
-    const real t793 = t140 * t408;
-    const real t794 = t792 + t793;
-    const real t795 = t235 * t406;
-    const real t796 = t794 + t795;
-    const real t797 = S[18] - t796;
-    const real t798 = Rc[1] * t797;
-    const real t799 = t791 + t798;
-    const real t800 = t61 * t427;
-    const real t801 = t140 * t423;
-    const real t802 = t800 + t801;
-    const real t803 = t235 * t421;
-    const real t804 = t802 + t803;
-    const real t805 = S[19] - t804;
-    const real t806 = Rc[2] * t805;
-    const real t807 = t799 + t806;
-    const real t808 = Rc[1] * t807;
-    const real t809 = t790 + t808;
-    const real t810 = Rc[0] * t787;
-    const real t811 = Rc[1] * t805;
-    const real t812 = t810 + t811;
-    const real t813 = t74 * t427;
-    const real t814 = t153 * t423;
-    const real t815 = t813 + t814;
-    const real t816 = t248 * t421;
-    const real t817 = t815 + t816;
-    const real t818 = S[20] - t817;
-    const real t819 = Rc[2] * t818;
-    const real t820 = t812 + t819;
-    const real t821 = Rc[2] * t820;
-    const real t822 = t809 + t821;
-    const real t823 = r[1] * t750;
-    const real t824 = r[2] * t689;
-    const real t825 = t823 - t824;
-    const real t826 = r[1] * t746;
-    const real t827 = r[2] * t685;
-    const real t828 = t826 - t827;
-    const real t829 = t825 + t828;
-    const real t830 = t822 + t829;
-    S_I[15] += t830;
-    const real t831 = Rc[3] * t789;
-    const real t832 = Rc[4] * t807;
-    const real t833 = t831 + t832;
-    const real t834 = Rc[5] * t820;
-    const real t835 = t833 + t834;
-    const real t836 = r[1] * t759;
-    const real t837 = r[2] * t697;
-    const real t838 = t836 - t837;
-    const real t839 = r[2] * t618;
-    const real t840 = r[0] * t746;
-    const real t841 = t839 - t840;
-    const real t842 = t838 + t841;
-    const real t843 = t835 + t842;
-    S_I[16] += t843;
-    const real t844 = Rc[6] * t789;
-    const real t845 = Rc[7] * t807;
-    const real t846 = t844 + t845;
-    const real t847 = Rc[8] * t820;
-    const real t848 = t846 + t847;
-    const real t849 = r[1] * t766;
-    const real t850 = r[2] * t706;
-    const real t851 = t849 - t850;
-    const real t852 = r[0] * t685;
-    const real t853 = r[1] * t618;
-    const real t854 = t852 - t853;
-    const real t855 = t851 + t854;
-    const real t856 = t848 + t855;
-    S_I[17] += t856;
-    const real t857 = Rc[3] * t772;
-    const real t858 = Rc[4] * t779;
-    const real t859 = t857 + t858;
-    const real t860 = Rc[5] * t787;
-    const real t861 = t859 + t860;
-    const real t862 = Rc[3] * t861;
-    const real t863 = Rc[3] * t779;
-    const real t864 = Rc[4] * t797;
-    const real t865 = t863 + t864;
-    const real t866 = Rc[5] * t805;
-    const real t867 = t865 + t866;
-    const real t868 = Rc[4] * t867;
-    const real t869 = t862 + t868;
-    const real t870 = Rc[3] * t787;
-    const real t871 = Rc[4] * t805;
-    const real t872 = t870 + t871;
-    const real t873 = Rc[5] * t818;
-    const real t874 = t872 + t873;
-    const real t875 = Rc[5] * t874;
-    const real t876 = t869 + t875;
-    const real t877 = r[2] * t631;
-    const real t878 = r[0] * t759;
-    const real t879 = t877 - t878;
-    const real t880 = r[2] * t627;
-    const real t881 = r[0] * t755;
-    const real t882 = t880 - t881;
-    const real t883 = t879 + t882;
-    const real t884 = t876 + t883;
-    S_I[18] += t884;
-    const real t885 = Rc[6] * t861;
-    const real t886 = Rc[7] * t867;
-    const real t887 = t885 + t886;
-    const real t888 = Rc[8] * t874;
-    const real t889 = t887 + t888;
-    const real t890 = r[2] * t640;
-    const real t891 = r[0] * t766;
-    const real t892 = t890 - t891;
-    const real t893 = r[0] * t694;
-    const real t894 = r[1] * t627;
-    const real t895 = t893 - t894;
-    const real t896 = t892 + t895;
-    const real t897 = t889 + t896;
-    S_I[19] += t897;
-    const real t898 = Rc[6] * t772;
-    const real t899 = Rc[7] * t779;
-    const real t900 = t898 + t899;
-    const real t901 = Rc[8] * t787;
-    const real t902 = t900 + t901;
-    const real t903 = Rc[6] * t902;
-    const real t904 = Rc[6] * t779;
-    const real t905 = Rc[7] * t797;
-    const real t906 = t904 + t905;
-    const real t907 = Rc[8] * t805;
-    const real t908 = t906 + t907;
-    const real t909 = Rc[7] * t908;
-    const real t910 = t903 + t909;
-    const real t911 = Rc[6] * t787;
-    const real t912 = Rc[7] * t805;
-    const real t913 = t911 + t912;
-    const real t914 = Rc[8] * t818;
-    const real t915 = t913 + t914;
-    const real t916 = Rc[8] * t915;
-    const real t917 = t910 + t916;
-    const real t918 = r[0] * t706;
-    const real t919 = r[1] * t640;
-    const real t920 = t918 - t919;
-    const real t921 = r[0] * t702;
-    const real t922 = r[1] * t636;
-    const real t923 = t921 - t922;
-    const real t924 = t920 + t923;
-    const real t925 = t917 + t924;
-    S_I[20] += t925;
-    const real t926 = t10 * t478;
-    const real t927 = t89 * t474;
-    const real t928 = t926 + t927;
-    const real t929 = t184 * t472;
-    const real t930 = t928 + t929;
-    const real t931 = e[0] + t930;
-    const real t932 = Rc[0] * t931;
-    const real t933 = t22 * t478;
-    const real t934 = t101 * t474;
-    const real t935 = t933 + t934;
-    const real t936 = t196 * t472;
-    const real t937 = t935 + t936;
-    const real t938 = e[1] + t937;
-    const real t939 = Rc[1] * t938;
-    const real t940 = t932 + t939;
-    const real t941 = t35 * t478;
-    const real t942 = t114 * t474;
-    const real t943 = t941 + t942;
-    const real t944 = t209 * t472;
-    const real t945 = t943 + t944;
-    const real t946 = e[2] + t945;
-    const real t947 = Rc[2] * t946;
-    const real t948 = t940 + t947;
-    e_I[0] += t948;
-    const real t949 = Rc[3] * t931;
-    const real t950 = Rc[4] * t938;
-    const real t951 = t949 + t950;
-    const real t952 = Rc[5] * t946;
-    const real t953 = t951 + t952;
-    e_I[1] += t953;
-    const real t954 = Rc[6] * t931;
-    const real t955 = Rc[7] * t938;
-    const real t956 = t954 + t955;
-    const real t957 = Rc[8] * t946;
-    const real t958 = t956 + t957;
-    e_I[2] += t958;
-    const real t959 = t48 * t478;
-    const real t960 = t127 * t474;
-    const real t961 = t959 + t960;
-    const real t962 = t222 * t472;
-    const real t963 = t961 + t962;
-    const real t964 = e[3] + t963;
-    const real t965 = Rc[0] * t964;
-    const real t966 = t61 * t478;
-    const real t967 = t140 * t474;
-    const real t968 = t966 + t967;
-    const real t969 = t235 * t472;
-    const real t970 = t968 + t969;
-    const real t971 = e[4] + t970;
-    const real t972 = Rc[1] * t971;
-    const real t973 = t965 + t972;
-    const real t974 = t74 * t478;
-    const real t975 = t153 * t474;
-    const real t976 = t974 + t975;
-    const real t977 = t248 * t472;
-    const real t978 = t976 + t977;
-    const real t979 = e[5] + t978;
-    const real t980 = Rc[2] * t979;
-    const real t981 = t973 + t980;
-    const real t982 = Rc[6] * r[1];
-    const real t983 = Rc[3] * r[2];
-    const real t984 = t982 - t983;
-    const real t985 = t931 * t984;
-    const real t986 = Rc[7] * r[1];
-    const real t987 = Rc[4] * r[2];
-    const real t988 = t986 - t987;
-    const real t989 = t938 * t988;
-    const real t990 = t985 + t989;
-    const real t991 = Rc[8] * r[1];
-    const real t992 = Rc[5] * r[2];
-    const real t993 = t991 - t992;
-    const real t994 = t946 * t993;
-    const real t995 = t990 + t994;
-    const real t996 = t981 + t995;
-    e_I[3] += t996;
-    const real t997 = Rc[3] * t964;
-    const real t998 = Rc[4] * t971;
-    const real t999 = t997 + t998;
-    const real t1000 = Rc[5] * t979;
-    const real t1001 = t999 + t1000;
-    const real t1002 = Rc[0] * r[2];
-    const real t1003 = Rc[6] * r[0];
-    const real t1004 = t1002 - t1003;
-    const real t1005 = t931 * t1004;
-    const real t1006 = Rc[1] * r[2];
-    const real t1007 = Rc[7] * r[0];
-    const real t1008 = t1006 - t1007;
-    const real t1009 = t938 * t1008;
-    const real t1010 = t1005 + t1009;
-    const real t1011 = Rc[2] * r[2];
-    const real t1012 = Rc[8] * r[0];
-    const real t1013 = t1011 - t1012;
-    const real t1014 = t946 * t1013;
-    const real t1015 = t1010 + t1014;
-    const real t1016 = t1001 + t1015;
-    e_I[4] += t1016;
-    const real t1017 = Rc[6] * t964;
-    const real t1018 = Rc[7] * t971;
-    const real t1019 = t1017 + t1018;
-    const real t1020 = Rc[8] * t979;
-    const real t1021 = t1019 + t1020;
-    const real t1022 = Rc[3] * r[0];
-    const real t1023 = Rc[0] * r[1];
-    const real t1024 = t1022 - t1023;
-    const real t1025 = t931 * t1024;
-    const real t1026 = Rc[4] * r[0];
-    const real t1027 = Rc[1] * r[1];
-    const real t1028 = t1026 - t1027;
-    const real t1029 = t938 * t1028;
-    const real t1030 = t1025 + t1029;
-    const real t1031 = Rc[5] * r[0];
-    const real t1032 = Rc[2] * r[1];
-    const real t1033 = t1031 - t1032;
-    const real t1034 = t946 * t1033;
-    const real t1035 = t1030 + t1034;
-    const real t1036 = t1021 + t1035;
-    e_I[5] += t1036;
-    return 0;
+  real t10 = H[0] * S[0] + H[3] * S[1] + H[6] * S[2] + H[9] * S[3] + H[12] * S[4] + H[15] * S[5];
+  real t22 = H[0] * S[1] + H[3] * S[6] + H[6] * S[7] + H[9] * S[8] + H[12] * S[9] + H[15] * S[10];
+  real t35 = H[0] * S[2] + H[3] * S[7] + H[6] * S[11] + H[9] * S[12] + H[12] * S[13] + H[15] *
+    S[14];
+  real t48 = H[0] * S[3] + H[3] * S[8] + H[6] * S[12] + H[9] * S[15] + H[12] * S[16] + H[15] *
+    S[17];
+  real t61 = H[0] * S[4] + H[3] * S[9] + H[6] * S[13] + H[9] * S[16] + H[12] * S[18] + H[15] *
+    S[19];
+  real t74 = H[0] * S[5] + H[3] * S[10] + H[6] * S[14] + H[9] * S[17] + H[12] * S[19] + H[15] *
+    S[20];
+  real t77 = J[0] + (H[0] * t10 + H[3] * t22 + H[6] * t35 + H[9] * t48 + H[12] * t61 + H[15] * t74);
+  real t78 = 0.0 < t77;
+  if (!(t78 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t89 = H[1] * S[0] + H[4] * S[1] + H[7] * S[2] + H[10] * S[3] + H[13] * S[4] + H[16] * S[5];
+  real t101 = H[1] * S[1] + H[4] * S[6] + H[7] * S[7] + H[10] * S[8] + H[13] * S[9] + H[16] * S[10];
+  real t114 = H[1] * S[2] + H[4] * S[7] + H[7] * S[11] + H[10] * S[12] + H[13] * S[13] + H[16] *
+    S[14];
+  real t127 = H[1] * S[3] + H[4] * S[8] + H[7] * S[12] + H[10] * S[15] + H[13] * S[16] + H[16] *
+    S[17];
+  real t140 = H[1] * S[4] + H[4] * S[9] + H[7] * S[13] + H[10] * S[16] + H[13] * S[18] + H[16] *
+    S[19];
+  real t153 = H[1] * S[5] + H[4] * S[10] + H[7] * S[14] + H[10] * S[17] + H[13] * S[19] + H[16] *
+    S[20];
+  real t156 = J[1] + (H[1] * t89 + H[4] * t101 + H[7] * t114 + H[10] * t127 + H[13] * t140 + H[16] *
+    t153);
+  real t168 = H[0] * t89 + H[3] * t101 + H[6] * t114 + H[9] * t127 + H[12] * t140 + H[15] * t153;
+  real t169 = 1.0 / t77;
+  real t170 = t168 * t169;
+  real t172 = t156 - t168 * t170;
+  real t173 = t156 * ((real)1 / (real)10000000000000) < t172;
+  if (!(t173 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t184 = H[2] * S[0] + H[5] * S[1] + H[8] * S[2] + H[11] * S[3] + H[14] * S[4] + H[17] * S[5];
+  real t196 = H[2] * S[1] + H[5] * S[6] + H[8] * S[7] + H[11] * S[8] + H[14] * S[9] + H[17] * S[10];
+  real t209 = H[2] * S[2] + H[5] * S[7] + H[8] * S[11] + H[11] * S[12] + H[14] * S[13] + H[17] *
+    S[14];
+  real t222 = H[2] * S[3] + H[5] * S[8] + H[8] * S[12] + H[11] * S[15] + H[14] * S[16] + H[17] *
+    S[17];
+  real t235 = H[2] * S[4] + H[5] * S[9] + H[8] * S[13] + H[11] * S[16] + H[14] * S[18] + H[17] *
+    S[19];
+  real t248 = H[2] * S[5] + H[5] * S[10] + H[8] * S[14] + H[11] * S[17] + H[14] * S[19] + H[17] *
+    S[20];
+  real t251 = J[2] + (H[2] * t184 + H[5] * t196 + H[8] * t209 + H[11] * t222 + H[14] * t235 + H[17]
+    * t248);
+  real t263 = H[0] * t184 + H[3] * t196 + H[6] * t209 + H[9] * t222 + H[12] * t235 + H[15] * t248;
+  real t264 = t263 * t169;
+  real t279 = H[1] * t184 + H[4] * t196 + H[7] * t209 + H[10] * t222 + H[13] * t235 + H[16] * t248 -
+    t263 * t170;
+  real t280 = 1.0 / t172;
+  real t281 = t280 * t279;
+  real t283 = t251 - t263 * t264 - t279 * t281;
+  real t284 = t251 * ((real)1 / (real)10000000000000) < t283;
+  if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t78 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t173 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  if (!(t284 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t293 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t294 = (0.0 < floor_[0]) ? floor_[0] : t293;
+  real t304 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t305 = (0.0 < floor_[1]) ? floor_[1] : t304;
+  if (!(((H[6] * H[6] + (H[0] * H[0] + H[3] * H[3])) * t294 + (H[15] * H[15] + (H[9] * H[9] + H[12] * H[12])) * t305 < t77))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t294 * (H[7] * H[7] + (H[1] * H[1] + H[4] * H[4])) + t305 * (H[16] * H[16] + (H[10] * H[10] + H[13] * H[13])) < t156))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t294 * (H[8] * H[8] + (H[2] * H[2] + H[5] * H[5])) + t305 * (H[17] * H[17] + (H[11] * H[11] + H[14] * H[14])) < t251))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  real t339 = t89 - t10 * t170;
+  real t341 = 1.0 / t283;
+  real t346 = t341 * (t184 - t10 * t264 - t281 * t339);
+  real t348 = t280 * t339 - t281 * t346;
+  real t352 = t10 * t169 - t170 * t348 - t264 * t346;
+  G[0] = t352;
+  real t355 = t101 - t22 * t170;
+  real t361 = t341 * (t196 - t22 * t264 - t281 * t355);
+  real t363 = t280 * t355 - t281 * t361;
+  real t367 = t22 * t169 - t170 * t363 - t264 * t361;
+  G[1] = t367;
+  real t370 = t114 - t35 * t170;
+  real t376 = t341 * (t209 - t35 * t264 - t281 * t370);
+  real t378 = t280 * t370 - t281 * t376;
+  real t382 = t35 * t169 - t170 * t378 - t264 * t376;
+  G[2] = t382;
+  real t385 = t127 - t48 * t170;
+  real t391 = t341 * (t222 - t48 * t264 - t281 * t385);
+  real t393 = t280 * t385 - t281 * t391;
+  real t397 = t48 * t169 - t170 * t393 - t264 * t391;
+  G[3] = t397;
+  real t400 = t140 - t61 * t170;
+  real t406 = t341 * (t235 - t61 * t264 - t281 * t400);
+  real t408 = t280 * t400 - t281 * t406;
+  real t412 = t61 * t169 - t170 * t408 - t264 * t406;
+  G[4] = t412;
+  real t415 = t153 - t74 * t170;
+  real t421 = t341 * (t248 - t74 * t264 - t281 * t415);
+  real t423 = t280 * t415 - t281 * t421;
+  real t427 = t74 * t169 - t170 * t423 - t264 * t421;
+  G[5] = t427;
+  G[6] = t348;
+  G[7] = t363;
+  G[8] = t378;
+  G[9] = t393;
+  G[10] = t408;
+  G[11] = t423;
+  G[12] = t346;
+  G[13] = t361;
+  G[14] = t376;
+  G[15] = t391;
+  G[16] = t406;
+  G[17] = t421;
+  real t439 = tau[0] - (H[0] * e[0] + H[3] * e[1] + H[6] * e[2] + H[9] * e[3] + H[12] * e[4] + H[15]
+    * e[5]);
+  real t454 = tau[1] - (H[1] * e[0] + H[4] * e[1] + H[7] * e[2] + H[10] * e[3] + H[13] * e[4] +
+    H[16] * e[5]) - t170 * t439;
+  real t472 = t341 * (tau[2] - (H[2] * e[0] + H[5] * e[1] + H[8] * e[2] + H[11] * e[3] + H[14] *
+    e[4] + H[17] * e[5]) - t264 * t439 - t281 * t454);
+  real t474 = t280 * t454 - t281 * t472;
+  real t478 = t169 * t439 - t170 * t474 - t264 * t472;
+  g[0] = t478;
+  g[1] = t474;
+  g[2] = t472;
+  real t484 = S[0] - (t10 * t352 + t89 * t348 + t184 * t346);
+  real t491 = S[1] - (t10 * t367 + t89 * t363 + t184 * t361);
+  real t499 = S[2] - (t10 * t382 + t89 * t378 + t184 * t376);
+  real t501 = Rc[0] * t484 + Rc[1] * t491 + Rc[2] * t499;
+  real t509 = S[6] - (t22 * t367 + t101 * t363 + t196 * t361);
+  real t517 = S[7] - (t22 * t382 + t101 * t378 + t196 * t376);
+  real t519 = Rc[0] * t491 + Rc[1] * t509 + Rc[2] * t517;
+  real t530 = S[11] - (t35 * t382 + t114 * t378 + t209 * t376);
+  real t532 = Rc[0] * t499 + Rc[1] * t517 + Rc[2] * t530;
+  real t534 = Rc[0] * t501 + Rc[1] * t519 + Rc[2] * t532;
+  S_I[0] += t534;
+  real t539 = Rc[3] * t501 + Rc[4] * t519 + Rc[5] * t532;
+  S_I[1] += t539;
+  real t544 = Rc[6] * t501 + Rc[7] * t519 + Rc[8] * t532;
+  S_I[2] += t544;
+  real t550 = S[3] - (t10 * t397 + t89 * t393 + t184 * t391);
+  real t557 = S[8] - (t22 * t397 + t101 * t393 + t196 * t391);
+  real t565 = S[12] - (t35 * t397 + t114 * t393 + t209 * t391);
+  real t567 = Rc[0] * t550 + Rc[1] * t557 + Rc[2] * t565;
+  real t574 = S[4] - (t10 * t412 + t89 * t408 + t184 * t406);
+  real t581 = S[9] - (t22 * t412 + t101 * t408 + t196 * t406);
+  real t589 = S[13] - (t35 * t412 + t114 * t408 + t209 * t406);
+  real t591 = Rc[0] * t574 + Rc[1] * t581 + Rc[2] * t589;
+  real t599 = S[5] - (t10 * t427 + t89 * t423 + t184 * t421);
+  real t606 = S[10] - (t22 * t427 + t101 * t423 + t196 * t421);
+  real t614 = S[14] - (t35 * t427 + t114 * t423 + t209 * t421);
+  real t616 = Rc[0] * t599 + Rc[1] * t606 + Rc[2] * t614;
+  real t618 = Rc[0] * t567 + Rc[1] * t591 + Rc[2] * t616;
+  real t619 = r[1] * t544;
+  real t620 = r[2] * t539;
+  S_I[3] += t618 + (t619 - t620);
+  real t627 = Rc[3] * t567 + Rc[4] * t591 + Rc[5] * t616;
+  real t631 = t627 + (r[2] * t534 - r[0] * t544);
+  S_I[4] += t631;
+  real t636 = Rc[6] * t567 + Rc[7] * t591 + Rc[8] * t616;
+  real t640 = t636 + (r[0] * t539 - r[1] * t534);
+  S_I[5] += t640;
+  real t645 = Rc[3] * t484 + Rc[4] * t491 + Rc[5] * t499;
+  real t651 = Rc[3] * t491 + Rc[4] * t509 + Rc[5] * t517;
+  real t658 = Rc[3] * t499 + Rc[4] * t517 + Rc[5] * t530;
+  real t660 = Rc[3] * t645 + Rc[4] * t651 + Rc[5] * t658;
+  S_I[6] += t660;
+  real t665 = Rc[6] * t645 + Rc[7] * t651 + Rc[8] * t658;
+  S_I[7] += t665;
+  real t670 = Rc[3] * t550 + Rc[4] * t557 + Rc[5] * t565;
+  real t676 = Rc[3] * t574 + Rc[4] * t581 + Rc[5] * t589;
+  real t683 = Rc[3] * t599 + Rc[4] * t606 + Rc[5] * t614;
+  real t685 = Rc[0] * t670 + Rc[1] * t676 + Rc[2] * t683;
+  real t689 = t685 + (r[1] * t665 - r[2] * t660);
+  S_I[8] += t689;
+  real t694 = Rc[3] * t670 + Rc[4] * t676 + Rc[5] * t683;
+  real t695 = r[0] * t665;
+  real t697 = t694 + (t620 - t695);
+  S_I[9] += t697;
+  real t702 = Rc[6] * t670 + Rc[7] * t676 + Rc[8] * t683;
+  real t706 = t702 + (r[0] * t660 - r[1] * t539);
+  S_I[10] += t706;
+  real t726 = Rc[6] * (Rc[6] * t484 + Rc[7] * t491 + Rc[8] * t499) + Rc[7] * (Rc[6] * t491 + Rc[7] *
+    t509 + Rc[8] * t517) + Rc[8] * (Rc[6] * t499 + Rc[7] * t517 + Rc[8] * t530);
+  S_I[11] += t726;
+  real t731 = Rc[6] * t550 + Rc[7] * t557 + Rc[8] * t565;
+  real t737 = Rc[6] * t574 + Rc[7] * t581 + Rc[8] * t589;
+  real t744 = Rc[6] * t599 + Rc[7] * t606 + Rc[8] * t614;
+  real t746 = Rc[0] * t731 + Rc[1] * t737 + Rc[2] * t744;
+  real t750 = t746 + (r[1] * t726 - r[2] * t665);
+  S_I[12] += t750;
+  real t755 = Rc[3] * t731 + Rc[4] * t737 + Rc[5] * t744;
+  real t759 = t755 + (r[2] * t544 - r[0] * t726);
+  S_I[13] += t759;
+  real t766 = Rc[6] * t731 + Rc[7] * t737 + Rc[8] * t744 + (t695 - t619);
+  S_I[14] += t766;
+  real t772 = S[15] - (t48 * t397 + t127 * t393 + t222 * t391);
+  real t779 = S[16] - (t48 * t412 + t127 * t408 + t222 * t406);
+  real t787 = S[17] - (t48 * t427 + t127 * t423 + t222 * t421);
+  real t789 = Rc[0] * t772 + Rc[1] * t779 + Rc[2] * t787;
+  real t797 = S[18] - (t61 * t412 + t140 * t408 + t235 * t406);
+  real t805 = S[19] - (t61 * t427 + t140 * t423 + t235 * t421);
+  real t807 = Rc[0] * t779 + Rc[1] * t797 + Rc[2] * t805;
+  real t818 = S[20] - (t74 * t427 + t153 * t423 + t248 * t421);
+  real t820 = Rc[0] * t787 + Rc[1] * t805 + Rc[2] * t818;
+  S_I[15] += Rc[0] * t789 + Rc[1] * t807 + Rc[2] * t820 + (r[1] * t750 - r[2] * t689 + (r[1] * t746
+    - r[2] * t685));
+  S_I[16] += Rc[3] * t789 + Rc[4] * t807 + Rc[5] * t820 + (r[1] * t759 - r[2] * t697 + (r[2] * t618
+    - r[0] * t746));
+  S_I[17] += Rc[6] * t789 + Rc[7] * t807 + Rc[8] * t820 + (r[1] * t766 - r[2] * t706 + (r[0] * t685
+    - r[1] * t618));
+  real t861 = Rc[3] * t772 + Rc[4] * t779 + Rc[5] * t787;
+  real t867 = Rc[3] * t779 + Rc[4] * t797 + Rc[5] * t805;
+  real t874 = Rc[3] * t787 + Rc[4] * t805 + Rc[5] * t818;
+  S_I[18] += Rc[3] * t861 + Rc[4] * t867 + Rc[5] * t874 + (r[2] * t631 - r[0] * t759 + (r[2] * t627
+    - r[0] * t755));
+  S_I[19] += Rc[6] * t861 + Rc[7] * t867 + Rc[8] * t874 + (r[2] * t640 - r[0] * t766 + (r[0] * t694
+    - r[1] * t627));
+  S_I[20] += Rc[6] * (Rc[6] * t772 + Rc[7] * t779 + Rc[8] * t787) + Rc[7] * (Rc[6] * t779 + Rc[7] *
+    t797 + Rc[8] * t805) + Rc[8] * (Rc[6] * t787 + Rc[7] * t805 + Rc[8] * t818) + (r[0] * t706 -
+    r[1] * t640 + (r[0] * t702 - r[1] * t636));
+  real t931 = e[0] + (t10 * t478 + t89 * t474 + t184 * t472);
+  real t938 = e[1] + (t22 * t478 + t101 * t474 + t196 * t472);
+  real t946 = e[2] + (t35 * t478 + t114 * t474 + t209 * t472);
+  e_I[0] += Rc[0] * t931 + Rc[1] * t938 + Rc[2] * t946;
+  e_I[1] += Rc[3] * t931 + Rc[4] * t938 + Rc[5] * t946;
+  e_I[2] += Rc[6] * t931 + Rc[7] * t938 + Rc[8] * t946;
+  real t964 = e[3] + (t48 * t478 + t127 * t474 + t222 * t472);
+  real t971 = e[4] + (t61 * t478 + t140 * t474 + t235 * t472);
+  real t979 = e[5] + (t74 * t478 + t153 * t474 + t248 * t472);
+  e_I[3] += Rc[0] * t964 + Rc[1] * t971 + Rc[2] * t979 + (t931 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t938 * (Rc[7] * r[1] - Rc[4] * r[2]) + t946 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t964 + Rc[4] * t971 + Rc[5] * t979 + (t931 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t938 * (Rc[1] * r[2] - Rc[7] * r[0]) + t946 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t964 + Rc[7] * t971 + Rc[8] * t979 + (t931 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t938 * (Rc[4] * r[0] - Rc[1] * r[1]) + t946 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_condense_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic3_condense_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic3_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the free coordinates
@@ -1579,216 +365,50 @@ static const mstmm_guard mstmm_sweep_generic3_condense_guards[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic3_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic3_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    const real t78 = H[0] * t53;
-    const real t79 = H[1] * t65;
-    const real t80 = t78 + t79;
-    const real t81 = H[2] * t77;
-    const real t82 = t80 + t81;
-    const real t83 = t16 + t82;
-    delta[0] = t83;
-    const real t84 = H[3] * t53;
-    const real t85 = H[4] * t65;
-    const real t86 = t84 + t85;
-    const real t87 = H[5] * t77;
-    const real t88 = t86 + t87;
-    const real t89 = t22 + t88;
-    delta[1] = t89;
-    const real t90 = H[6] * t53;
-    const real t91 = H[7] * t65;
-    const real t92 = t90 + t91;
-    const real t93 = H[8] * t77;
-    const real t94 = t92 + t93;
-    const real t95 = t29 + t94;
-    delta[2] = t95;
-    const real t96 = H[9] * t53;
-    const real t97 = H[10] * t65;
-    const real t98 = t96 + t97;
-    const real t99 = H[11] * t77;
-    const real t100 = t98 + t99;
-    const real t101 = t36 + t100;
-    delta[3] = t101;
-    const real t102 = H[12] * t53;
-    const real t103 = H[13] * t65;
-    const real t104 = t102 + t103;
-    const real t105 = H[14] * t77;
-    const real t106 = t104 + t105;
-    const real t107 = t43 + t106;
-    delta[4] = t107;
-    const real t108 = H[15] * t53;
-    const real t109 = H[16] * t65;
-    const real t110 = t108 + t109;
-    const real t111 = H[17] * t77;
-    const real t112 = t110 + t111;
-    const real t113 = t50 + t112;
-    delta[5] = t113;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  delta[0] = t16 + (H[0] * t53 + H[1] * t65 + H[2] * t77);
+  delta[1] = t22 + (H[3] * t53 + H[4] * t65 + H[5] * t77);
+  delta[2] = t29 + (H[6] * t53 + H[7] * t65 + H[8] * t77);
+  delta[3] = t36 + (H[9] * t53 + H[10] * t65 + H[11] * t77);
+  delta[4] = t43 + (H[12] * t53 + H[13] * t65 + H[14] * t77);
+  delta[5] = t50 + (H[15] * t53 + H[16] * t65 + H[17] * t77);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_recover_outputs[] = {
-    {"udot", 3, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 3 speeds
  * in  H[6][3] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[3] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic3_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic3_effort(in_t H, in_t f, out_t tau)
 {
-    const real t0 = H[0] * f[0];
-    const real t1 = H[3] * f[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * f[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * f[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * f[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * f[5];
-    const real t10 = t8 + t9;
-    tau[0] = t10;
-    const real t11 = H[1] * f[0];
-    const real t12 = H[4] * f[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[7] * f[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[10] * f[3];
-    const real t17 = t15 + t16;
-    const real t18 = H[13] * f[4];
-    const real t19 = t17 + t18;
-    const real t20 = H[16] * f[5];
-    const real t21 = t19 + t20;
-    tau[1] = t21;
-    const real t22 = H[2] * f[0];
-    const real t23 = H[5] * f[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[8] * f[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[11] * f[3];
-    const real t28 = t26 + t27;
-    const real t29 = H[14] * f[4];
-    const real t30 = t28 + t29;
-    const real t31 = H[17] * f[5];
-    const real t32 = t30 + t31;
-    tau[2] = t32;
-    return 0;
+  tau[0] = H[0] * f[0] + H[3] * f[1] + H[6] * f[2] + H[9] * f[3] + H[12] * f[4] + H[15] * f[5];
+  tau[1] = H[1] * f[0] + H[4] * f[1] + H[7] * f[2] + H[10] * f[3] + H[13] * f[4] + H[16] * f[5];
+  tau[2] = H[2] * f[0] + H[5] * f[1] + H[8] * f[2] + H[11] * f[3] + H[14] * f[4] + H[17] * f[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_effort_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_effort_outputs[] = {
-    {"tau", 3, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 3 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -1798,227 +418,51 @@ static const mstmm_port mstmm_sweep_generic3_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[3] accelerations of the coordinates
  */
-int mstmm_sweep_generic3_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic3_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    const real t0 = H[0] * H[0];
-    const real t1 = H[3] * H[3];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * H[6];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * H[9];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * H[12];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * H[15];
-    const real t10 = t8 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[4] * H[4];
-    const real t14 = t12 + t13;
-    const real t15 = H[7] * H[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[10] * H[10];
-    const real t18 = t16 + t17;
-    const real t19 = H[13] * H[13];
-    const real t20 = t18 + t19;
-    const real t21 = H[16] * H[16];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[0] * H[1];
-    const real t25 = H[3] * H[4];
-    const real t26 = t24 + t25;
-    const real t27 = H[6] * H[7];
-    const real t28 = t26 + t27;
-    const real t29 = H[9] * H[10];
-    const real t30 = t28 + t29;
-    const real t31 = H[12] * H[13];
-    const real t32 = t30 + t31;
-    const real t33 = H[15] * H[16];
-    const real t34 = t32 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[5] * H[5];
-    const real t42 = t40 + t41;
-    const real t43 = H[8] * H[8];
-    const real t44 = t42 + t43;
-    const real t45 = H[11] * H[11];
-    const real t46 = t44 + t45;
-    const real t47 = H[14] * H[14];
-    const real t48 = t46 + t47;
-    const real t49 = H[17] * H[17];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[0] * H[2];
-    const real t53 = H[3] * H[5];
-    const real t54 = t52 + t53;
-    const real t55 = H[6] * H[8];
-    const real t56 = t54 + t55;
-    const real t57 = H[9] * H[11];
-    const real t58 = t56 + t57;
-    const real t59 = H[12] * H[14];
-    const real t60 = t58 + t59;
-    const real t61 = H[15] * H[17];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[4] * H[5];
-    const real t68 = t66 + t67;
-    const real t69 = H[7] * H[8];
-    const real t70 = t68 + t69;
-    const real t71 = H[10] * H[11];
-    const real t72 = t70 + t71;
-    const real t73 = H[13] * H[14];
-    const real t74 = t72 + t73;
-    const real t75 = H[16] * H[17];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t84 = r[2] * delta_I[4];
-    const real t85 = r[1] * delta_I[5];
-    const real t86 = t84 - t85;
-    const real t87 = delta_I[0] + t86;
-    const real t88 = Rc[0] * t87;
-    const real t89 = r[0] * delta_I[5];
-    const real t90 = r[2] * delta_I[3];
-    const real t91 = t89 - t90;
-    const real t92 = delta_I[1] + t91;
-    const real t93 = Rc[3] * t92;
-    const real t94 = t88 + t93;
-    const real t95 = r[1] * delta_I[3];
-    const real t96 = r[0] * delta_I[4];
-    const real t97 = t95 - t96;
-    const real t98 = delta_I[2] + t97;
-    const real t99 = Rc[6] * t98;
-    const real t100 = t94 + t99;
-    const real t101 = delta[0] - t100;
-    const real t102 = H[0] * t101;
-    const real t103 = Rc[1] * t87;
-    const real t104 = Rc[4] * t92;
-    const real t105 = t103 + t104;
-    const real t106 = Rc[7] * t98;
-    const real t107 = t105 + t106;
-    const real t108 = delta[1] - t107;
-    const real t109 = H[3] * t108;
-    const real t110 = t102 + t109;
-    const real t111 = Rc[2] * t87;
-    const real t112 = Rc[5] * t92;
-    const real t113 = t111 + t112;
-    const real t114 = Rc[8] * t98;
-    const real t115 = t113 + t114;
-    const real t116 = delta[2] - t115;
-    const real t117 = H[6] * t116;
-    const real t118 = t110 + t117;
-    const real t119 = Rc[0] * delta_I[3];
-    const real t120 = Rc[3] * delta_I[4];
-    const real t121 = t119 + t120;
-    const real t122 = Rc[6] * delta_I[5];
-    const real t123 = t121 + t122;
-    const real t124 = delta[3] - t123;
-    const real t125 = H[9] * t124;
-    const real t126 = t118 + t125;
-    const real t127 = Rc[1] * delta_I[3];
-    const real t128 = Rc[4] * delta_I[4];
-    const real t129 = t127 + t128;
-    const real t130 = Rc[7] * delta_I[5];
-    const real t131 = t129 + t130;
-    const real t132 = delta[4] - t131;
-    const real t133 = H[12] * t132;
-    const real t134 = t126 + t133;
-    const real t135 = Rc[2] * delta_I[3];
-    const real t136 = Rc[5] * delta_I[4];
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * delta_I[5];
-    const real t139 = t137 + t138;
-    const real t140 = delta[5] - t139;
-    const real t141 = H[15] * t140;
-    const real t142 = t134 + t141;
-    const real t143 = t142 * t35;
-    const real t144 = H[1] * t101;
-    const real t145 = H[4] * t108;
-    const real t146 = t144 + t145;
-    const real t147 = H[7] * t116;
-    const real t148 = t146 + t147;
-    const real t149 = H[10] * t124;
-    const real t150 = t148 + t149;
-    const real t151 = H[13] * t132;
-    const real t152 = t150 + t151;
-    const real t153 = H[16] * t140;
-    const real t154 = t152 + t153;
-    const real t155 = t142 * t36;
-    const real t156 = t154 - t155;
-    const real t157 = t79 * t156;
-    const real t158 = 1.0 / t82;
-    const real t159 = H[2] * t101;
-    const real t160 = H[5] * t108;
-    const real t161 = t159 + t160;
-    const real t162 = H[8] * t116;
-    const real t163 = t161 + t162;
-    const real t164 = H[11] * t124;
-    const real t165 = t163 + t164;
-    const real t166 = H[14] * t132;
-    const real t167 = t165 + t166;
-    const real t168 = H[17] * t140;
-    const real t169 = t167 + t168;
-    const real t170 = t142 * t63;
-    const real t171 = t169 - t170;
-    const real t172 = t80 * t156;
-    const real t173 = t171 - t172;
-    const real t174 = t158 * t173;
-    const real t175 = t80 * t174;
-    const real t176 = t157 - t175;
-    const real t177 = t36 * t176;
-    const real t178 = t143 - t177;
-    const real t179 = t63 * t174;
-    const real t180 = t178 - t179;
-    udot[0] = t180;
-    udot[1] = t176;
-    udot[2] = t174;
-    return 0;
+  real t10 = H[0] * H[0] + H[3] * H[3] + H[6] * H[6] + H[9] * H[9] + H[12] * H[12] + H[15] * H[15];
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[4] * H[4] + H[7] * H[7] + H[10] * H[10] + H[13] * H[13] + H[16] *
+    H[16];
+  real t34 = H[0] * H[1] + H[3] * H[4] + H[6] * H[7] + H[9] * H[10] + H[12] * H[13] + H[15] * H[16];
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[5] * H[5] + H[8] * H[8] + H[11] * H[11] + H[14] * H[14] + H[17] *
+    H[17];
+  real t62 = H[0] * H[2] + H[3] * H[5] + H[6] * H[8] + H[9] * H[11] + H[12] * H[14] + H[15] * H[17];
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[4] * H[5] + H[7] * H[8] + H[10] * H[11] + H[13] * H[14] + H[16] * H[17]
+    - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t87 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t92 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t98 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t101 = delta[0] - (Rc[0] * t87 + Rc[3] * t92 + Rc[6] * t98);
+  real t108 = delta[1] - (Rc[1] * t87 + Rc[4] * t92 + Rc[7] * t98);
+  real t116 = delta[2] - (Rc[2] * t87 + Rc[5] * t92 + Rc[8] * t98);
+  real t124 = delta[3] - (Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5]);
+  real t132 = delta[4] - (Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5]);
+  real t140 = delta[5] - (Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5]);
+  real t142 = H[0] * t101 + H[3] * t108 + H[6] * t116 + H[9] * t124 + H[12] * t132 + H[15] * t140;
+  real t156 = H[1] * t101 + H[4] * t108 + H[7] * t116 + H[10] * t124 + H[13] * t132 + H[16] * t140 -
+    t142 * t36;
+  real t174 = 1.0 / t82 * (H[2] * t101 + H[5] * t108 + H[8] * t116 + H[11] * t124 + H[14] * t132 +
+    H[17] * t140 - t142 * t63 - t80 * t156);
+  real t176 = t79 * t156 - t80 * t174;
+  udot[0] = t142 * t35 - t36 * t176 - t63 * t174;
+  udot[1] = t176;
+  udot[2] = t174;
+  return 0;
 }
 
-static int mstmm_sweep_generic3_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_project_outputs[] = {
-    {"udot", 3, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic3_project_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic3_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 3 free speeds, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the free coordinates
@@ -2030,989 +474,234 @@ static const mstmm_guard mstmm_sweep_generic3_project_guards[] = {
  * out G[3][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic3_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic3_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[3] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[3] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[6] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[9] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[12] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[15] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[3] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[3] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[6] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[9] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[12] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[15] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[6] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[3] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[6] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[9] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[12] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[15] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[9] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[3] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[6] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[9] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[12] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[15] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[12] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[3] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[6] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[9] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[12] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[15] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[15] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] - W[0];
-    const real t78 = t76 + t77;
-    const real t79 = 0.0 < t78;
-    if (!(t79 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t80 = H[1] * S[0];
-    const real t81 = H[4] * S[1];
-    const real t82 = t80 + t81;
-    const real t83 = H[7] * S[2];
-    const real t84 = t82 + t83;
-    const real t85 = H[10] * S[3];
-    const real t86 = t84 + t85;
-    const real t87 = H[13] * S[4];
-    const real t88 = t86 + t87;
-    const real t89 = H[16] * S[5];
-    const real t90 = t88 + t89;
-    const real t91 = H[1] * t90;
-    const real t92 = H[1] * S[1];
-    const real t93 = H[4] * S[6];
-    const real t94 = t92 + t93;
-    const real t95 = H[7] * S[7];
-    const real t96 = t94 + t95;
-    const real t97 = H[10] * S[8];
-    const real t98 = t96 + t97;
-    const real t99 = H[13] * S[9];
-    const real t100 = t98 + t99;
-    const real t101 = H[16] * S[10];
-    const real t102 = t100 + t101;
-    const real t103 = H[4] * t102;
-    const real t104 = t91 + t103;
-    const real t105 = H[1] * S[2];
-    const real t106 = H[4] * S[7];
-    const real t107 = t105 + t106;
-    const real t108 = H[7] * S[11];
-    const real t109 = t107 + t108;
-    const real t110 = H[10] * S[12];
-    const real t111 = t109 + t110;
-    const real t112 = H[13] * S[13];
-    const real t113 = t111 + t112;
-    const real t114 = H[16] * S[14];
-    const real t115 = t113 + t114;
-    const real t116 = H[7] * t115;
-    const real t117 = t104 + t116;
-    const real t118 = H[1] * S[3];
-    const real t119 = H[4] * S[8];
-    const real t120 = t118 + t119;
-    const real t121 = H[7] * S[12];
-    const real t122 = t120 + t121;
-    const real t123 = H[10] * S[15];
-    const real t124 = t122 + t123;
-    const real t125 = H[13] * S[16];
-    const real t126 = t124 + t125;
-    const real t127 = H[16] * S[17];
-    const real t128 = t126 + t127;
-    const real t129 = H[10] * t128;
-    const real t130 = t117 + t129;
-    const real t131 = H[1] * S[4];
-    const real t132 = H[4] * S[9];
-    const real t133 = t131 + t132;
-    const real t134 = H[7] * S[13];
-    const real t135 = t133 + t134;
-    const real t136 = H[10] * S[16];
-    const real t137 = t135 + t136;
-    const real t138 = H[13] * S[18];
-    const real t139 = t137 + t138;
-    const real t140 = H[16] * S[19];
-    const real t141 = t139 + t140;
-    const real t142 = H[13] * t141;
-    const real t143 = t130 + t142;
-    const real t144 = H[1] * S[5];
-    const real t145 = H[4] * S[10];
-    const real t146 = t144 + t145;
-    const real t147 = H[7] * S[14];
-    const real t148 = t146 + t147;
-    const real t149 = H[10] * S[17];
-    const real t150 = t148 + t149;
-    const real t151 = H[13] * S[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[16] * S[20];
-    const real t154 = t152 + t153;
-    const real t155 = H[16] * t154;
-    const real t156 = t143 + t155;
-    const real t157 = J[1] - W[4];
-    const real t158 = t156 + t157;
-    const real t159 = t158 * ((real)1 / (real)10000000000000);
-    const real t160 = H[0] * t90;
-    const real t161 = H[3] * t102;
-    const real t162 = t160 + t161;
-    const real t163 = H[6] * t115;
-    const real t164 = t162 + t163;
-    const real t165 = H[9] * t128;
-    const real t166 = t164 + t165;
-    const real t167 = H[12] * t141;
-    const real t168 = t166 + t167;
-    const real t169 = H[15] * t154;
-    const real t170 = t168 + t169;
-    const real t171 = W[1] + W[3];
-    const real t172 = 0.5 * t171;
-    const real t173 = t170 - t172;
-    const real t174 = 1.0 / t78;
-    const real t175 = t173 * t174;
-    const real t176 = t173 * t175;
-    const real t177 = t158 - t176;
-    const real t178 = t159 < t177;
-    if (!(t178 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t179 = H[2] * S[0];
-    const real t180 = H[5] * S[1];
-    const real t181 = t179 + t180;
-    const real t182 = H[8] * S[2];
-    const real t183 = t181 + t182;
-    const real t184 = H[11] * S[3];
-    const real t185 = t183 + t184;
-    const real t186 = H[14] * S[4];
-    const real t187 = t185 + t186;
-    const real t188 = H[17] * S[5];
-    const real t189 = t187 + t188;
-    const real t190 = H[2] * t189;
-    const real t191 = H[2] * S[1];
-    const real t192 = H[5] * S[6];
-    const real t193 = t191 + t192;
-    const real t194 = H[8] * S[7];
-    const real t195 = t193 + t194;
-    const real t196 = H[11] * S[8];
-    const real t197 = t195 + t196;
-    const real t198 = H[14] * S[9];
-    const real t199 = t197 + t198;
-    const real t200 = H[17] * S[10];
-    const real t201 = t199 + t200;
-    const real t202 = H[5] * t201;
-    const real t203 = t190 + t202;
-    const real t204 = H[2] * S[2];
-    const real t205 = H[5] * S[7];
-    const real t206 = t204 + t205;
-    const real t207 = H[8] * S[11];
-    const real t208 = t206 + t207;
-    const real t209 = H[11] * S[12];
-    const real t210 = t208 + t209;
-    const real t211 = H[14] * S[13];
-    const real t212 = t210 + t211;
-    const real t213 = H[17] * S[14];
-    const real t214 = t212 + t213;
-    const real t215 = H[8] * t214;
-    const real t216 = t203 + t215;
-    const real t217 = H[2] * S[3];
-    const real t218 = H[5] * S[8];
-    const real t219 = t217 + t218;
-    const real t220 = H[8] * S[12];
-    const real t221 = t219 + t220;
-    const real t222 = H[11] * S[15];
-    const real t223 = t221 + t222;
-    const real t224 = H[14] * S[16];
-    const real t225 = t223 + t224;
-    const real t226 = H[17] * S[17];
-    const real t227 = t225 + t226;
-    const real t228 = H[11] * t227;
-    const real t229 = t216 + t228;
-    const real t230 = H[2] * S[4];
-    const real t231 = H[5] * S[9];
-    const real t232 = t230 + t231;
-    const real t233 = H[8] * S[13];
-    const real t234 = t232 + t233;
-    const real t235 = H[11] * S[16];
-    const real t236 = t234 + t235;
-    const real t237 = H[14] * S[18];
-    const real t238 = t236 + t237;
-    const real t239 = H[17] * S[19];
-    const real t240 = t238 + t239;
-    const real t241 = H[14] * t240;
-    const real t242 = t229 + t241;
-    const real t243 = H[2] * S[5];
-    const real t244 = H[5] * S[10];
-    const real t245 = t243 + t244;
-    const real t246 = H[8] * S[14];
-    const real t247 = t245 + t246;
-    const real t248 = H[11] * S[17];
-    const real t249 = t247 + t248;
-    const real t250 = H[14] * S[19];
-    const real t251 = t249 + t250;
-    const real t252 = H[17] * S[20];
-    const real t253 = t251 + t252;
-    const real t254 = H[17] * t253;
-    const real t255 = t242 + t254;
-    const real t256 = J[2] - W[8];
-    const real t257 = t255 + t256;
-    const real t258 = t257 * ((real)1 / (real)10000000000000);
-    const real t259 = H[0] * t189;
-    const real t260 = H[3] * t201;
-    const real t261 = t259 + t260;
-    const real t262 = H[6] * t214;
-    const real t263 = t261 + t262;
-    const real t264 = H[9] * t227;
-    const real t265 = t263 + t264;
-    const real t266 = H[12] * t240;
-    const real t267 = t265 + t266;
-    const real t268 = H[15] * t253;
-    const real t269 = t267 + t268;
-    const real t270 = W[2] + W[6];
-    const real t271 = 0.5 * t270;
-    const real t272 = t269 - t271;
-    const real t273 = t272 * t174;
-    const real t274 = t272 * t273;
-    const real t275 = t257 - t274;
-    const real t276 = H[1] * t189;
-    const real t277 = H[4] * t201;
-    const real t278 = t276 + t277;
-    const real t279 = H[7] * t214;
-    const real t280 = t278 + t279;
-    const real t281 = H[10] * t227;
-    const real t282 = t280 + t281;
-    const real t283 = H[13] * t240;
-    const real t284 = t282 + t283;
-    const real t285 = H[16] * t253;
-    const real t286 = t284 + t285;
-    const real t287 = W[5] + W[7];
-    const real t288 = 0.5 * t287;
-    const real t289 = t286 - t288;
-    const real t290 = t272 * t175;
-    const real t291 = t289 - t290;
-    const real t292 = 1.0 / t177;
-    const real t293 = t292 * t291;
-    const real t294 = t291 * t293;
-    const real t295 = t275 - t294;
-    const real t296 = t258 < t295;
-    if (!(t296 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t297 = H[6] * H[6];
-    const real t298 = H[0] * H[0];
-    const real t299 = H[3] * H[3];
-    const real t300 = t298 + t299;
-    const real t301 = t297 + t300;
-    const real t302 = 0.0 < floor_[0];
-    const real t303 = S[0] + S[6];
-    const real t304 = S[11] + t303;
-    const real t305 = ((real)1 / (real)300000000000000) * t304;
-    const real t306 = t302 != 0 ? floor_[0] : t305;
-    const real t307 = t301 * t306;
-    const real t308 = H[15] * H[15];
-    const real t309 = H[9] * H[9];
-    const real t310 = H[12] * H[12];
-    const real t311 = t309 + t310;
-    const real t312 = t308 + t311;
-    const real t313 = 0.0 < floor_[1];
-    const real t314 = S[15] + S[18];
-    const real t315 = S[20] + t314;
-    const real t316 = ((real)1 / (real)300000000000000) * t315;
-    const real t317 = t313 != 0 ? floor_[1] : t316;
-    const real t318 = t312 * t317;
-    const real t319 = t307 + t318;
-    const real t320 = t319 < t78;
-    if (!(t320 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t321 = H[7] * H[7];
-    const real t322 = H[1] * H[1];
-    const real t323 = H[4] * H[4];
-    const real t324 = t322 + t323;
-    const real t325 = t321 + t324;
-    const real t326 = t306 * t325;
-    const real t327 = H[16] * H[16];
-    const real t328 = H[10] * H[10];
-    const real t329 = H[13] * H[13];
-    const real t330 = t328 + t329;
-    const real t331 = t327 + t330;
-    const real t332 = t317 * t331;
-    const real t333 = t326 + t332;
-    const real t334 = t333 < t158;
-    if (!(t334 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t335 = H[8] * H[8];
-    const real t336 = H[2] * H[2];
-    const real t337 = H[5] * H[5];
-    const real t338 = t336 + t337;
-    const real t339 = t335 + t338;
-    const real t340 = t306 * t339;
-    const real t341 = H[17] * H[17];
-    const real t342 = H[11] * H[11];
-    const real t343 = H[14] * H[14];
-    const real t344 = t342 + t343;
-    const real t345 = t341 + t344;
-    const real t346 = t317 * t345;
-    const real t347 = t340 + t346;
-    const real t348 = t347 < t257;
-    if (!(t348 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    F[0] = t174;
-    F[1] = 0.0;
-    F[2] = 0.0;
-    F[3] = t175;
-    F[4] = t292;
-    F[5] = 0.0;
-    F[6] = t273;
-    F[7] = t293;
-    const real t349 = 1.0 / t295;
-    F[8] = t349;
-    const real t350 = t10 * t174;
-    const real t351 = t10 * t175;
-    const real t352 = t90 - t351;
-    const real t353 = t292 * t352;
-    const real t354 = t10 * t273;
-    const real t355 = t189 - t354;
-    const real t356 = t293 * t352;
-    const real t357 = t355 - t356;
-    const real t358 = t349 * t357;
-    const real t359 = t293 * t358;
-    const real t360 = t353 - t359;
-    const real t361 = t175 * t360;
-    const real t362 = t350 - t361;
-    const real t363 = t273 * t358;
-    const real t364 = t362 - t363;
-    G[0] = t364;
-    const real t365 = t22 * t174;
-    const real t366 = t22 * t175;
-    const real t367 = t102 - t366;
-    const real t368 = t292 * t367;
-    const real t369 = t22 * t273;
-    const real t370 = t201 - t369;
-    const real t371 = t293 * t367;
-    const real t372 = t370 - t371;
-    const real t373 = t349 * t372;
-    const real t374 = t293 * t373;
-    const real t375 = t368 - t374;
-    const real t376 = t175 * t375;
-    const real t377 = t365 - t376;
-    const real t378 = t273 * t373;
-    const real t379 = t377 - t378;
-    G[1] = t379;
-    const real t380 = t35 * t174;
-    const real t381 = t35 * t175;
-    const real t382 = t115 - t381;
-    const real t383 = t292 * t382;
-    const real t384 = t35 * t273;
-    const real t385 = t214 - t384;
-    const real t386 = t293 * t382;
-    const real t387 = t385 - t386;
-    const real t388 = t349 * t387;
-    const real t389 = t293 * t388;
-    const real t390 = t383 - t389;
-    const real t391 = t175 * t390;
-    const real t392 = t380 - t391;
-    const real t393 = t273 * t388;
-    const real t394 = t392 - t393;
-    G[2] = t394;
-    const real t395 = t48 * t174;
-    const real t396 = t48 * t175;
-    const real t397 = t128 - t396;
-    const real t398 = t292 * t397;
-    const real t399 = t48 * t273;
-    const real t400 = t227 - t399;
-    const real t401 = t293 * t397;
-    const real t402 = t400 - t401;
-    const real t403 = t349 * t402;
-    const real t404 = t293 * t403;
-    const real t405 = t398 - t404;
-    const real t406 = t175 * t405;
-    const real t407 = t395 - t406;
-    const real t408 = t273 * t403;
-    const real t409 = t407 - t408;
-    G[3] = t409;
-    const real t410 = t61 * t174;
-    const real t411 = t61 * t175;
-    const real t412 = t141 - t411;
-    const real t413 = t292 * t412;
-    const real t414 = t61 * t273;
-    const real t415 = t240 - t414;
-    const real t416 = t293 * t412;
-    const real t417 = t415 - t416;
-    const real t418 = t349 * t417;
-    const real t419 = t293 * t418;
-    const real t420 = t413 - t419;
-    const real t421 = t175 * t420;
-    const real t422 = t410 - t421;
-    const real t423 = t273 * t418;
-    const real t424 = t422 - t423;
-    G[4] = t424;
-    const real t425 = t74 * t174;
-    const real t426 = t74 * t175;
-    const real t427 = t154 - t426;
-    const real t428 = t292 * t427;
-    const real t429 = t74 * t273;
-    const real t430 = t253 - t429;
-    const real t431 = t293 * t427;
-    const real t432 = t430 - t431;
-    const real t433 = t349 * t432;
-    const real t434 = t293 * t433;
-    const real t435 = t428 - t434;
-    const real t436 = t175 * t435;
-    const real t437 = t425 - t436;
-    const real t438 = t273 * t433;
-    const real t439 = t437 - t438;
-    G[5] = t439;
-    G[6] = t360;
-    G[7] = t375;
-    G[8] = t390;
-    G[9] = t405;
-    G[10] = t420;
-    G[11] = t435;
-    G[12] = t358;
-    G[13] = t373;
-    G[14] = t388;
-    G[15] = t403;
-    G[16] = t418;
-    G[17] = t433;
-    const real t440 = t10 * t350;
-    const real t441 = t352 * t353;
-    const real t442 = t440 + t441;
-    const real t443 = t357 * t358;
-    const real t444 = t442 + t443;
-    const real t445 = S[0] - t444;
-    const real t446 = Rc[0] * t445;
-    const real t447 = t10 * t365;
-    const real t448 = t352 * t368;
-    const real t449 = t447 + t448;
-    const real t450 = t357 * t373;
-    const real t451 = t449 + t450;
-    const real t452 = S[1] - t451;
-    const real t453 = Rc[1] * t452;
-    const real t454 = t446 + t453;
-    const real t455 = t10 * t380;
-    const real t456 = t352 * t383;
-    const real t457 = t455 + t456;
-    const real t458 = t357 * t388;
-    const real t459 = t457 + t458;
-    const real t460 = S[2] - t459;
-    const real t461 = Rc[2] * t460;
-    const real t462 = t454 + t461;
-    const real t463 = Rc[0] * t462;
-    const real t464 = Rc[0] * t452;
-    const real t465 = t22 * t365;
-    const real t466 = t367 * t368;
-    const real t467 = t465 + t466;
-    const real t468 = t372 * t373;
-    const real t469 = t467 + t468;
-    const real t470 = S[6] - t469;
-    const real t471 = Rc[1] * t470;
-    const real t472 = t464 + t471;
-    const real t473 = t22 * t380;
-    const real t474 = t367 * t383;
-    const real t475 = t473 + t474;
-    const real t476 = t372 * t388;
-    const real t477 = t475 + t476;
-    const real t478 = S[7] - t477;
-    const real t479 = Rc[2] * t478;
-    const real t480 = t472 + t479;
-    const real t481 = Rc[1] * t480;
-    const real t482 = t463 + t481;
-    const real t483 = Rc[0] * t460;
-    const real t484 = Rc[1] * t478;
-    const real t485 = t483 + t484;
-    const real t486 = t35 * t380;
-    const real t487 = t382 * t383;
-    const real t488 = t486 + t487;
-    const real t489 = t387 * t388;
-    const real t490 = t488 + t489;
-    const real t491 = S[11] - t490;
-    const real t492 = Rc[2] * t491;
-    const real t493 = t485 + t492;
-    const real t494 = Rc[2] * t493;
-    const real t495 = t482 + t494;
-    S_I[0] += t495;
-    const real t496 = Rc[3] * t462;
-    const real t497 = Rc[4] * t480;
-    const real t498 = t496 + t497;
-    const real t499 = Rc[5] * t493;
-    const real t500 = t498 + t499;
-    S_I[1] += t500;
-    const real t501 = Rc[6] * t462;
-    const real t502 = Rc[7] * t480;
-    const real t503 = t501 + t502;
-    const real t504 = Rc[8] * t493;
-    const real t505 = t503 + t504;
-    S_I[2] += t505;
-    const real t506 = t10 * t395;
-    const real t507 = t352 * t398;
-    const real t508 = t506 + t507;
-    const real t509 = t357 * t403;
-    const real t510 = t508 + t509;
-    const real t511 = S[3] - t510;
-    const real t512 = Rc[0] * t511;
-    const real t513 = t22 * t395;
-    const real t514 = t367 * t398;
-    const real t515 = t513 + t514;
-    const real t516 = t372 * t403;
-    const real t517 = t515 + t516;
-    const real t518 = S[8] - t517;
-    const real t519 = Rc[1] * t518;
-    const real t520 = t512 + t519;
-    const real t521 = t35 * t395;
-    const real t522 = t382 * t398;
-    const real t523 = t521 + t522;
-    const real t524 = t387 * t403;
-    const real t525 = t523 + t524;
-    const real t526 = S[12] - t525;
-    const real t527 = Rc[2] * t526;
-    const real t528 = t520 + t527;
-    const real t529 = Rc[0] * t528;
-    const real t530 = t10 * t410;
-    const real t531 = t352 * t413;
-    const real t532 = t530 + t531;
-    const real t533 = t357 * t418;
-    const real t534 = t532 + t533;
-    const real t535 = S[4] - t534;
-    const real t536 = Rc[0] * t535;
-    const real t537 = t22 * t410;
-    const real t538 = t367 * t413;
-    const real t539 = t537 + t538;
-    const real t540 = t372 * t418;
-    const real t541 = t539 + t540;
-    const real t542 = S[9] - t541;
-    const real t543 = Rc[1] * t542;
-    const real t544 = t536 + t543;
-    const real t545 = t35 * t410;
-    const real t546 = t382 * t413;
-    const real t547 = t545 + t546;
-    const real t548 = t387 * t418;
-    const real t549 = t547 + t548;
-    const real t550 = S[13] - t549;
-    const real t551 = Rc[2] * t550;
-    const real t552 = t544 + t551;
-    const real t553 = Rc[1] * t552;
-    const real t554 = t529 + t553;
-    const real t555 = t10 * t425;
-    const real t556 = t352 * t428;
-    const real t557 = t555 + t556;
-    const real t558 = t357 * t433;
-    const real t559 = t557 + t558;
-    const real t560 = S[5] - t559;
-    const real t561 = Rc[0] * t560;
-    const real t562 = t22 * t425;
-    const real t563 = t367 * t428;
-    const real t564 = t562 + t563;
-    const real t565 = t372 * t433;
-    const real t566 = t564 + t565;
-    const real t567 = S[10] - t566;
-    const real t568 = Rc[1] * t567;
-    const real t569 = t561 + t568;
-    const real t570 = t35 * t425;
-    const real t571 = t382 * t428;
-    const real t572 = t570 + t571;
-    const real t573 = t387 * t433;
-    const real t574 = t572 + t573;
-    const real t575 = S[14] - t574;
-    const real t576 = Rc[2] * t575;
-    const real t577 = t569 + t576;
-    const real t578 = Rc[2] * t577;
-    const real t579 = t554 + t578;
-    const real t580 = r[1] * t505;
-    const real t581 = r[2] * t500;
-    const real t582 = t580 - t581;
-    const real t583 = t579 + t582;
-    S_I[3] += t583;
-    const real t584 = Rc[3] * t528;
-    const real t585 = Rc[4] * t552;
-    const real t586 = t584 + t585;
-    const real t587 = Rc[5] * t577;
-    const real t588 = t586 + t587;
-    const real t589 = r[2] * t495;
-    const real t590 = r[0] * t505;
-    const real t591 = t589 - t590;
-    const real t592 = t588 + t591;
-    S_I[4] += t592;
-    const real t593 = Rc[6] * t528;
-    const real t594 = Rc[7] * t552;
-    const real t595 = t593 + t594;
-    const real t596 = Rc[8] * t577;
-    const real t597 = t595 + t596;
-    const real t598 = r[0] * t500;
-    const real t599 = r[1] * t495;
-    const real t600 = t598 - t599;
-    const real t601 = t597 + t600;
-    S_I[5] += t601;
-    const real t602 = Rc[3] * t445;
-    const real t603 = Rc[4] * t452;
-    const real t604 = t602 + t603;
-    const real t605 = Rc[5] * t460;
-    const real t606 = t604 + t605;
-    const real t607 = Rc[3] * t606;
-    const real t608 = Rc[3] * t452;
-    const real t609 = Rc[4] * t470;
-    const real t610 = t608 + t609;
-    const real t611 = Rc[5] * t478;
-    const real t612 = t610 + t611;
-    const real t613 = Rc[4] * t612;
-    const real t614 = t607 + t613;
-    const real t615 = Rc[3] * t460;
-    const real t616 = Rc[4] * t478;
-    const real t617 = t615 + t616;
-    const real t618 = Rc[5] * t491;
-    const real t619 = t617 + t618;
-    const real t620 = Rc[5] * t619;
-    const real t621 = t614 + t620;
-    S_I[6] += t621;
-    const real t622 = Rc[6] * t606;
-    const real t623 = Rc[7] * t612;
-    const real t624 = t622 + t623;
-    const real t625 = Rc[8] * t619;
-    const real t626 = t624 + t625;
-    S_I[7] += t626;
-    const real t627 = Rc[3] * t511;
-    const real t628 = Rc[4] * t518;
-    const real t629 = t627 + t628;
-    const real t630 = Rc[5] * t526;
-    const real t631 = t629 + t630;
-    const real t632 = Rc[0] * t631;
-    const real t633 = Rc[3] * t535;
-    const real t634 = Rc[4] * t542;
-    const real t635 = t633 + t634;
-    const real t636 = Rc[5] * t550;
-    const real t637 = t635 + t636;
-    const real t638 = Rc[1] * t637;
-    const real t639 = t632 + t638;
-    const real t640 = Rc[3] * t560;
-    const real t641 = Rc[4] * t567;
-    const real t642 = t640 + t641;
-    const real t643 = Rc[5] * t575;
-    const real t644 = t642 + t643;
-    const real t645 = Rc[2] * t644;
-    const real t646 = t639 + t645;
-    const real t647 = r[1] * t626;
-    const real t648 = r[2] * t621;
-    const real t649 = t647 - t648;
-    const real t650 = t646 + t649;
-    S_I[8] += t650;
-    const real t651 = Rc[3] * t631;
-    const real t652 = Rc[4] * t637;
-    const real t653 = t651 + t652;
-    const real t654 = Rc[5] * t644;
-    const real t655 = t653 + t654;
-    const real t656 = r[0] * t626;
-    const real t657 = t581 - t656;
-    const real t658 = t655 + t657;
-    S_I[9] += t658;
-    const real t659 = Rc[6] * t631;
-    const real t660 = Rc[7] * t637;
-    const real t661 = t659 + t660;
-    const real t662 = Rc[8] * t644;
-    const real t663 = t661 + t662;
-    const real t664 = r[0] * t621;
-    const real t665 = r[1] * t500;
-    const real t666 = t664 - t665;
-    const real t667 = t663 + t666;
-    S_I[10] += t667;
-    const real t668 = Rc[6] * t445;
-    const real t669 = Rc[7] * t452;
-    const real t670 = t668 + t669;
-    const real t671 = Rc[8] * t460;
-    const real t672 = t670 + t671;
-    const real t673 = Rc[6] * t672;
-    const real t674 = Rc[6] * t452;
-    const real t675 = Rc[7] * t470;
-    const real t676 = t674 + t675;
-    const real t677 = Rc[8] * t478;
-    const real t678 = t676 + t677;
-    const real t679 = Rc[7] * t678;
-    const real t680 = t673 + t679;
-    const real t681 = Rc[6] * t460;
-    const real t682 = Rc[7] * t478;
-    const real t683 = t681 + t682;
-    const real t684 = Rc[8] * t491;
-    const real t685 = t683 + t684;
-    const real t686 = Rc[8] * t685;
-    const real t687 = t680 + t686;
-    S_I[11] += t687;
-    const real t688 = Rc[6] * t511;
-    const real t689 = Rc[7] * t518;
-    const real t690 = t688 + t689;
-    const real t691 = Rc[8] * t526;
-    const real t692 = t690 + t691;
-    const real t693 = Rc[0] * t692;
-    const real t694 = Rc[6] * t535;
-    const real t695 = Rc[7] * t542;
-    const real t696 = t694 + t695;
-    const real t697 = Rc[8] * t550;
-    const real t698 = t696 + t697;
-    const real t699 = Rc[1] * t698;
-    const real t700 = t693 + t699;
-    const real t701 = Rc[6] * t560;
-    const real t702 = Rc[7] * t567;
-    const real t703 = t701 + t702;
-    const real t704 = Rc[8] * t575;
-    const real t705 = t703 + t704;
-    const real t706 = Rc[2] * t705;
-    const real t707 = t700 + t706;
-    const real t708 = r[1] * t687;
-    const real t709 = r[2] * t626;
-    const real t710 = t708 - t709;
-    const real t711 = t707 + t710;
-    S_I[12] += t711;
-    const real t712 = Rc[3] * t692;
-    const real t713 = Rc[4] * t698;
-    const real t714 = t712 + t713;
-    const real t715 = Rc[5] * t705;
-    const real t716 = t714 + t715;
-    const real t717 = r[2] * t505;
-    const real t718 = r[0] * t687;
-    const real t719 = t717 - t718;
-    const real t720 = t716 + t719;
-    S_I[13] += t720;
-    const real t721 = Rc[6] * t692;
-    const real t722 = Rc[7] * t698;
-    const real t723 = t721 + t722;
-    const real t724 = Rc[8] * t705;
-    const real t725 = t723 + t724;
-    const real t726 = t656 - t580;
-    const real t727 = t725 + t726;
-    S_I[14] += t727;
-    const real t728 = t48 * t395;
-    const real t729 = t397 * t398;
-    const real t730 = t728 + t729;
-    const real t731 = t402 * t403;
-    const real t732 = t730 + t731;
-    const real t733 = S[15] - t732;
-    const real t734 = Rc[0] * t733;
-    const real t735 = t48 * t410;
-    const real t736 = t397 * t413;
-    const real t737 = t735 + t736;
-    const real t738 = t402 * t418;
-    const real t739 = t737 + t738;
-    const real t740 = S[16] - t739;
-    const real t741 = Rc[1] * t740;
-    const real t742 = t734 + t741;
-    const real t743 = t48 * t425;
-    const real t744 = t397 * t428;
-    const real t745 = t743 + t744;
-    const real t746 = t402 * t433;
-    const real t747 = t745 + t746;
-    const real t748 = S[17] - t747;
-    const real t749 = Rc[2] * t748;
-    const real t750 = t742 + t749;
-    const real t751 = Rc[0] * t750;
-    const real t752 = Rc[0] * t740;
-    const real t753 = t61 * t410;
-    const real t754 = t412 * t413;
-    const real t755 = t753 + t754;
-    const real t756 = t417 * t418;
-    const real t757 = t755 + t756;
-    const real t758 = S[18] - t757;
-    const real t759 = Rc[1] * t758;
-    const real t760 = t752 + t759;
-    const real t761 = t61 * t425;
-    const real t762 = t412 * t428;
-    const real t763 = t761 + t762;
-    const real t764 = t417 * t433;
-    const real t765 = t763 + t764;
-    const real t766 = S[19] - t765;
-    const real t767 = Rc[2] * t766;
-    const real t768 = t760 + t767;
-    const real t769 = Rc[1] * t768;
-    const real t770 = t751 + t769;
-    const real t771 = Rc[0] * t748;
-    const real t772 = Rc[1] * t766;
-    const real t773 = t771 + t772;
-    const real t774 = t74 * t425;
-    const real t775 = t427 * t428;
-    const real t776 = t774 + t775;
-    const real t777 = t432 * t433;
-    const real t778 = t776 + t777;
-    const real t779 = S[20] - t778;
-    const real t780 = Rc[2] * t779;
-    const real t781 = t773 + t780;
-    const real t782 = Rc[2] * t781;
-    const real t783 = t770 + t782;
-    const real t784 = r[1] * t711;
-    const real t785 = r[2] * t650;
-    const real t786 = t784 - t785;
-    const real t787 = r[1] * t707;
-    const real t788 = r[2] * t646;
-    const real t789 = t787 - t788;
-    const real t790 = t786 + t789;
-    const real t791 = t783 + t790;
-    S_I[15] += t791;
-    const real t792 = Rc[3] * t750;
-    const real t793 = Rc[4] * t768;
-    const real t794 = t792 + t793;
-    const real t795 = Rc[5] * t781;
-    const real t796 = t794 + t795;
-    const real t797 = r[1] * t720;
-    const real t798 = r[2] * t658;
-    const real t799 = t797 - t798;
-    const real t800 = r[2] * t579;
-    const real t801 = r[0] * t707;
-    const real t802 = t800 - t801;
-    const real t803 = t799 + t802;
-    const real t804 = t796 + t803;
-    S_I[16] += t804;
-    const real t805 = Rc[6] * t750;
-    const real t806 = Rc[7] * t768;
-    const real t807 = t805 + t806;
-    const real t808 = Rc[8] * t781;
-    const real t809 = t807 + t808;
-    const real t810 = r[1] * t727;
-    const real t811 = r[2] * t667;
-    const real t812 = t810 - t811;
-    const real t813 = r[0] * t646;
-    const real t814 = r[1] * t579;
-    const real t815 = t813 - t814;
-    const real t816 = t812 + t815;
-    const real t817 = t809 + t816;
-    S_I[17] += t817;
-    const real t818 = Rc[3] * t733;
-    const real t819 = Rc[4] * t740;
-    const real t820 = t818 + t819;
-    const real t821 = Rc[5] * t748;
-    const real t822 = t820 + t821;
-    const real t823 = Rc[3] * t822;
-    const real t824 = Rc[3] * t740;
-    const real t825 = Rc[4] * t758;
-    const real t826 = t824 + t825;
-    const real t827 = Rc[5] * t766;
-    const real t828 = t826 + t827;
-    const real t829 = Rc[4] * t828;
-    const real t830 = t823 + t829;
-    const real t831 = Rc[3] * t748;
-    const real t832 = Rc[4] * t766;
-    const real t833 = t831 + t832;
-    const real t834 = Rc[5] * t779;
-    const real t835 = t833 + t834;
-    const real t836 = Rc[5] * t835;
-    const real t837 = t830 + t836;
-    const real t838 = r[2] * t592;
-    const real t839 = r[0] * t720;
-    const real t840 = t838 - t839;
-    const real t841 = r[2] * t588;
-    const real t842 = r[0] * t716;
-    const real t843 = t841 - t842;
-    const real t844 = t840 + t843;
-    const real t845 = t837 + t844;
-    S_I[18] += t845;
-    const real t846 = Rc[6] * t822;
-    const real t847 = Rc[7] * t828;
-    const real t848 = t846 + t847;
-    const real t849 = Rc[8] * t835;
-    const real t850 = t848 + t849;
-    const real t851 = r[2] * t601;
-    const real t852 = r[0] * t727;
-    const real t853 = t851 - t852;
-    const real t854 = r[0] * t655;
-    const real t855 = r[1] * t588;
-    const real t856 = t854 - t855;
-    const real t857 = t853 + t856;
-    const real t858 = t850 + t857;
-    S_I[19] += t858;
-    const real t859 = Rc[6] * t733;
-    const real t860 = Rc[7] * t740;
-    const real t861 = t859 + t860;
-    const real t862 = Rc[8] * t748;
-    const real t863 = t861 + t862;
-    const real t864 = Rc[6] * t863;
-    const real t865 = Rc[6] * t740;
-    const real t866 = Rc[7] * t758;
-    const real t867 = t865 + t866;
-    const real t868 = Rc[8] * t766;
-    const real t869 = t867 + t868;
-    const real t870 = Rc[7] * t869;
-    const real t871 = t864 + t870;
-    const real t872 = Rc[6] * t748;
-    const real t873 = Rc[7] * t766;
-    const real t874 = t872 + t873;
-    const real t875 = Rc[8] * t779;
-    const real t876 = t874 + t875;
-    const real t877 = Rc[8] * t876;
-    const real t878 = t871 + t877;
-    const real t879 = r[0] * t667;
-    const real t880 = r[1] * t601;
-    const real t881 = t879 - t880;
-    const real t882 = r[0] * t663;
-    const real t883 = r[1] * t597;
-    const real t884 = t882 - t883;
-    const real t885 = t881 + t884;
-    const real t886 = t878 + t885;
-    S_I[20] += t886;
-    return 0;
+  real t10 = H[0] * S[0] + H[3] * S[1] + H[6] * S[2] + H[9] * S[3] + H[12] * S[4] + H[15] * S[5];
+  real t22 = H[0] * S[1] + H[3] * S[6] + H[6] * S[7] + H[9] * S[8] + H[12] * S[9] + H[15] * S[10];
+  real t35 = H[0] * S[2] + H[3] * S[7] + H[6] * S[11] + H[9] * S[12] + H[12] * S[13] + H[15] *
+    S[14];
+  real t48 = H[0] * S[3] + H[3] * S[8] + H[6] * S[12] + H[9] * S[15] + H[12] * S[16] + H[15] *
+    S[17];
+  real t61 = H[0] * S[4] + H[3] * S[9] + H[6] * S[13] + H[9] * S[16] + H[12] * S[18] + H[15] *
+    S[19];
+  real t74 = H[0] * S[5] + H[3] * S[10] + H[6] * S[14] + H[9] * S[17] + H[12] * S[19] + H[15] *
+    S[20];
+  real t78 = H[0] * t10 + H[3] * t22 + H[6] * t35 + H[9] * t48 + H[12] * t61 + H[15] * t74 + (J[0] -
+    W[0]);
+  if (!((0.0 < t78))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t90 = H[1] * S[0] + H[4] * S[1] + H[7] * S[2] + H[10] * S[3] + H[13] * S[4] + H[16] * S[5];
+  real t102 = H[1] * S[1] + H[4] * S[6] + H[7] * S[7] + H[10] * S[8] + H[13] * S[9] + H[16] * S[10];
+  real t115 = H[1] * S[2] + H[4] * S[7] + H[7] * S[11] + H[10] * S[12] + H[13] * S[13] + H[16] *
+    S[14];
+  real t128 = H[1] * S[3] + H[4] * S[8] + H[7] * S[12] + H[10] * S[15] + H[13] * S[16] + H[16] *
+    S[17];
+  real t141 = H[1] * S[4] + H[4] * S[9] + H[7] * S[13] + H[10] * S[16] + H[13] * S[18] + H[16] *
+    S[19];
+  real t154 = H[1] * S[5] + H[4] * S[10] + H[7] * S[14] + H[10] * S[17] + H[13] * S[19] + H[16] *
+    S[20];
+  real t158 = H[1] * t90 + H[4] * t102 + H[7] * t115 + H[10] * t128 + H[13] * t141 + H[16] * t154 +
+    (J[1] - W[4]);
+  real t173 = H[0] * t90 + H[3] * t102 + H[6] * t115 + H[9] * t128 + H[12] * t141 + H[15] * t154 -
+    0.5 * (W[1] + W[3]);
+  real t174 = 1.0 / t78;
+  real t175 = t173 * t174;
+  real t177 = t158 - t173 * t175;
+  if (!((t158 * ((real)1 / (real)10000000000000) < t177))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t189 = H[2] * S[0] + H[5] * S[1] + H[8] * S[2] + H[11] * S[3] + H[14] * S[4] + H[17] * S[5];
+  real t201 = H[2] * S[1] + H[5] * S[6] + H[8] * S[7] + H[11] * S[8] + H[14] * S[9] + H[17] * S[10];
+  real t214 = H[2] * S[2] + H[5] * S[7] + H[8] * S[11] + H[11] * S[12] + H[14] * S[13] + H[17] *
+    S[14];
+  real t227 = H[2] * S[3] + H[5] * S[8] + H[8] * S[12] + H[11] * S[15] + H[14] * S[16] + H[17] *
+    S[17];
+  real t240 = H[2] * S[4] + H[5] * S[9] + H[8] * S[13] + H[11] * S[16] + H[14] * S[18] + H[17] *
+    S[19];
+  real t253 = H[2] * S[5] + H[5] * S[10] + H[8] * S[14] + H[11] * S[17] + H[14] * S[19] + H[17] *
+    S[20];
+  real t257 = H[2] * t189 + H[5] * t201 + H[8] * t214 + H[11] * t227 + H[14] * t240 + H[17] * t253 +
+    (J[2] - W[8]);
+  real t272 = H[0] * t189 + H[3] * t201 + H[6] * t214 + H[9] * t227 + H[12] * t240 + H[15] * t253 -
+    0.5 * (W[2] + W[6]);
+  real t273 = t272 * t174;
+  real t291 = H[1] * t189 + H[4] * t201 + H[7] * t214 + H[10] * t227 + H[13] * t240 + H[16] * t253 -
+    0.5 * (W[5] + W[7]) - t272 * t175;
+  real t292 = 1.0 / t177;
+  real t293 = t292 * t291;
+  real t295 = t257 - t272 * t273 - t291 * t293;
+  if (!((t257 * ((real)1 / (real)10000000000000) < t295))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t305 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t306 = (0.0 < floor_[0]) ? floor_[0] : t305;
+  real t316 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t317 = (0.0 < floor_[1]) ? floor_[1] : t316;
+  if (!(((H[6] * H[6] + (H[0] * H[0] + H[3] * H[3])) * t306 + (H[15] * H[15] + (H[9] * H[9] + H[12] * H[12])) * t317 < t78))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t306 * (H[7] * H[7] + (H[1] * H[1] + H[4] * H[4])) + t317 * (H[16] * H[16] + (H[10] * H[10] + H[13] * H[13])) < t158))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t306 * (H[8] * H[8] + (H[2] * H[2] + H[5] * H[5])) + t317 * (H[17] * H[17] + (H[11] * H[11] + H[14] * H[14])) < t257))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  F[0] = t174;
+  F[1] = F[2] = 0.0;
+  F[3] = t175;
+  F[4] = t292;
+  F[5] = 0.0;
+  F[6] = t273;
+  F[7] = t293;
+  real t349 = 1.0 / t295;
+  F[8] = t349;
+  real t350 = t10 * t174;
+  real t352 = t90 - t10 * t175;
+  real t353 = t292 * t352;
+  real t357 = t189 - t10 * t273 - t293 * t352;
+  real t358 = t349 * t357;
+  real t360 = t353 - t293 * t358;
+  G[0] = t350 - t175 * t360 - t273 * t358;
+  real t365 = t22 * t174;
+  real t367 = t102 - t22 * t175;
+  real t368 = t292 * t367;
+  real t372 = t201 - t22 * t273 - t293 * t367;
+  real t373 = t349 * t372;
+  real t375 = t368 - t293 * t373;
+  G[1] = t365 - t175 * t375 - t273 * t373;
+  real t380 = t35 * t174;
+  real t382 = t115 - t35 * t175;
+  real t383 = t292 * t382;
+  real t387 = t214 - t35 * t273 - t293 * t382;
+  real t388 = t349 * t387;
+  real t390 = t383 - t293 * t388;
+  G[2] = t380 - t175 * t390 - t273 * t388;
+  real t395 = t48 * t174;
+  real t397 = t128 - t48 * t175;
+  real t398 = t292 * t397;
+  real t402 = t227 - t48 * t273 - t293 * t397;
+  real t403 = t349 * t402;
+  real t405 = t398 - t293 * t403;
+  G[3] = t395 - t175 * t405 - t273 * t403;
+  real t410 = t61 * t174;
+  real t412 = t141 - t61 * t175;
+  real t413 = t292 * t412;
+  real t417 = t240 - t61 * t273 - t293 * t412;
+  real t418 = t349 * t417;
+  real t420 = t413 - t293 * t418;
+  G[4] = t410 - t175 * t420 - t273 * t418;
+  real t425 = t74 * t174;
+  real t427 = t154 - t74 * t175;
+  real t428 = t292 * t427;
+  real t432 = t253 - t74 * t273 - t293 * t427;
+  real t433 = t349 * t432;
+  real t435 = t428 - t293 * t433;
+  G[5] = t425 - t175 * t435 - t273 * t433;
+  G[6] = t360;
+  G[7] = t375;
+  G[8] = t390;
+  G[9] = t405;
+  G[10] = t420;
+  G[11] = t435;
+  G[12] = t358;
+  G[13] = t373;
+  G[14] = t388;
+  G[15] = t403;
+  G[16] = t418;
+  G[17] = t433;
+  real t445 = S[0] - (t10 * t350 + t352 * t353 + t357 * t358);
+  real t452 = S[1] - (t10 * t365 + t352 * t368 + t357 * t373);
+  real t460 = S[2] - (t10 * t380 + t352 * t383 + t357 * t388);
+  real t462 = Rc[0] * t445 + Rc[1] * t452 + Rc[2] * t460;
+  real t470 = S[6] - (t22 * t365 + t367 * t368 + t372 * t373);
+  real t478 = S[7] - (t22 * t380 + t367 * t383 + t372 * t388);
+  real t480 = Rc[0] * t452 + Rc[1] * t470 + Rc[2] * t478;
+  real t491 = S[11] - (t35 * t380 + t382 * t383 + t387 * t388);
+  real t493 = Rc[0] * t460 + Rc[1] * t478 + Rc[2] * t491;
+  real t495 = Rc[0] * t462 + Rc[1] * t480 + Rc[2] * t493;
+  S_I[0] += t495;
+  real t500 = Rc[3] * t462 + Rc[4] * t480 + Rc[5] * t493;
+  S_I[1] += t500;
+  real t505 = Rc[6] * t462 + Rc[7] * t480 + Rc[8] * t493;
+  S_I[2] += t505;
+  real t511 = S[3] - (t10 * t395 + t352 * t398 + t357 * t403);
+  real t518 = S[8] - (t22 * t395 + t367 * t398 + t372 * t403);
+  real t526 = S[12] - (t35 * t395 + t382 * t398 + t387 * t403);
+  real t528 = Rc[0] * t511 + Rc[1] * t518 + Rc[2] * t526;
+  real t535 = S[4] - (t10 * t410 + t352 * t413 + t357 * t418);
+  real t542 = S[9] - (t22 * t410 + t367 * t413 + t372 * t418);
+  real t550 = S[13] - (t35 * t410 + t382 * t413 + t387 * t418);
+  real t552 = Rc[0] * t535 + Rc[1] * t542 + Rc[2] * t550;
+  real t560 = S[5] - (t10 * t425 + t352 * t428 + t357 * t433);
+  real t567 = S[10] - (t22 * t425 + t367 * t428 + t372 * t433);
+  real t575 = S[14] - (t35 * t425 + t382 * t428 + t387 * t433);
+  real t577 = Rc[0] * t560 + Rc[1] * t567 + Rc[2] * t575;
+  real t579 = Rc[0] * t528 + Rc[1] * t552 + Rc[2] * t577;
+  real t580 = r[1] * t505;
+  real t581 = r[2] * t500;
+  S_I[3] += t579 + (t580 - t581);
+  real t588 = Rc[3] * t528 + Rc[4] * t552 + Rc[5] * t577;
+  real t592 = t588 + (r[2] * t495 - r[0] * t505);
+  S_I[4] += t592;
+  real t597 = Rc[6] * t528 + Rc[7] * t552 + Rc[8] * t577;
+  real t601 = t597 + (r[0] * t500 - r[1] * t495);
+  S_I[5] += t601;
+  real t606 = Rc[3] * t445 + Rc[4] * t452 + Rc[5] * t460;
+  real t612 = Rc[3] * t452 + Rc[4] * t470 + Rc[5] * t478;
+  real t619 = Rc[3] * t460 + Rc[4] * t478 + Rc[5] * t491;
+  real t621 = Rc[3] * t606 + Rc[4] * t612 + Rc[5] * t619;
+  S_I[6] += t621;
+  real t626 = Rc[6] * t606 + Rc[7] * t612 + Rc[8] * t619;
+  S_I[7] += t626;
+  real t631 = Rc[3] * t511 + Rc[4] * t518 + Rc[5] * t526;
+  real t637 = Rc[3] * t535 + Rc[4] * t542 + Rc[5] * t550;
+  real t644 = Rc[3] * t560 + Rc[4] * t567 + Rc[5] * t575;
+  real t646 = Rc[0] * t631 + Rc[1] * t637 + Rc[2] * t644;
+  real t650 = t646 + (r[1] * t626 - r[2] * t621);
+  S_I[8] += t650;
+  real t655 = Rc[3] * t631 + Rc[4] * t637 + Rc[5] * t644;
+  real t656 = r[0] * t626;
+  real t658 = t655 + (t581 - t656);
+  S_I[9] += t658;
+  real t663 = Rc[6] * t631 + Rc[7] * t637 + Rc[8] * t644;
+  real t667 = t663 + (r[0] * t621 - r[1] * t500);
+  S_I[10] += t667;
+  real t687 = Rc[6] * (Rc[6] * t445 + Rc[7] * t452 + Rc[8] * t460) + Rc[7] * (Rc[6] * t452 + Rc[7] *
+    t470 + Rc[8] * t478) + Rc[8] * (Rc[6] * t460 + Rc[7] * t478 + Rc[8] * t491);
+  S_I[11] += t687;
+  real t692 = Rc[6] * t511 + Rc[7] * t518 + Rc[8] * t526;
+  real t698 = Rc[6] * t535 + Rc[7] * t542 + Rc[8] * t550;
+  real t705 = Rc[6] * t560 + Rc[7] * t567 + Rc[8] * t575;
+  real t707 = Rc[0] * t692 + Rc[1] * t698 + Rc[2] * t705;
+  real t711 = t707 + (r[1] * t687 - r[2] * t626);
+  S_I[12] += t711;
+  real t716 = Rc[3] * t692 + Rc[4] * t698 + Rc[5] * t705;
+  real t720 = t716 + (r[2] * t505 - r[0] * t687);
+  S_I[13] += t720;
+  real t727 = Rc[6] * t692 + Rc[7] * t698 + Rc[8] * t705 + (t656 - t580);
+  S_I[14] += t727;
+  real t733 = S[15] - (t48 * t395 + t397 * t398 + t402 * t403);
+  real t740 = S[16] - (t48 * t410 + t397 * t413 + t402 * t418);
+  real t748 = S[17] - (t48 * t425 + t397 * t428 + t402 * t433);
+  real t750 = Rc[0] * t733 + Rc[1] * t740 + Rc[2] * t748;
+  real t758 = S[18] - (t61 * t410 + t412 * t413 + t417 * t418);
+  real t766 = S[19] - (t61 * t425 + t412 * t428 + t417 * t433);
+  real t768 = Rc[0] * t740 + Rc[1] * t758 + Rc[2] * t766;
+  real t779 = S[20] - (t74 * t425 + t427 * t428 + t432 * t433);
+  real t781 = Rc[0] * t748 + Rc[1] * t766 + Rc[2] * t779;
+  S_I[15] += Rc[0] * t750 + Rc[1] * t768 + Rc[2] * t781 + (r[1] * t711 - r[2] * t650 + (r[1] * t707
+    - r[2] * t646));
+  S_I[16] += Rc[3] * t750 + Rc[4] * t768 + Rc[5] * t781 + (r[1] * t720 - r[2] * t658 + (r[2] * t579
+    - r[0] * t707));
+  S_I[17] += Rc[6] * t750 + Rc[7] * t768 + Rc[8] * t781 + (r[1] * t727 - r[2] * t667 + (r[0] * t646
+    - r[1] * t579));
+  real t822 = Rc[3] * t733 + Rc[4] * t740 + Rc[5] * t748;
+  real t828 = Rc[3] * t740 + Rc[4] * t758 + Rc[5] * t766;
+  real t835 = Rc[3] * t748 + Rc[4] * t766 + Rc[5] * t779;
+  S_I[18] += Rc[3] * t822 + Rc[4] * t828 + Rc[5] * t835 + (r[2] * t592 - r[0] * t720 + (r[2] * t588
+    - r[0] * t716));
+  S_I[19] += Rc[6] * t822 + Rc[7] * t828 + Rc[8] * t835 + (r[2] * t601 - r[0] * t727 + (r[0] * t655
+    - r[1] * t588));
+  S_I[20] += Rc[6] * (Rc[6] * t733 + Rc[7] * t740 + Rc[8] * t748) + Rc[7] * (Rc[6] * t740 + Rc[7] *
+    t758 + Rc[8] * t766) + Rc[8] * (Rc[6] * t748 + Rc[7] * t766 + Rc[8] * t779) + (r[0] * t667 -
+    r[1] * t601 + (r[0] * t663 - r[1] * t597));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"W", 9, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_factor_outputs[] = {
-    {"F", 9, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic3_factor_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic3_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the free coordinates
@@ -3022,192 +711,40 @@ static const mstmm_guard mstmm_sweep_generic3_factor_guards[] = {
  * out y[3] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic3_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[3] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[4] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[7] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[10] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[13] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[16] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[5] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[8] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[11] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[14] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[17] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = G[0] * t11;
-    const real t37 = G[6] * t23;
-    const real t38 = t36 + t37;
-    const real t39 = G[12] * t35;
-    const real t40 = t38 + t39;
-    const real t41 = e[0] + t40;
-    const real t42 = Rc[0] * t41;
-    const real t43 = G[1] * t11;
-    const real t44 = G[7] * t23;
-    const real t45 = t43 + t44;
-    const real t46 = G[13] * t35;
-    const real t47 = t45 + t46;
-    const real t48 = e[1] + t47;
-    const real t49 = Rc[1] * t48;
-    const real t50 = t42 + t49;
-    const real t51 = G[2] * t11;
-    const real t52 = G[8] * t23;
-    const real t53 = t51 + t52;
-    const real t54 = G[14] * t35;
-    const real t55 = t53 + t54;
-    const real t56 = e[2] + t55;
-    const real t57 = Rc[2] * t56;
-    const real t58 = t50 + t57;
-    e_I[0] += t58;
-    const real t59 = Rc[3] * t41;
-    const real t60 = Rc[4] * t48;
-    const real t61 = t59 + t60;
-    const real t62 = Rc[5] * t56;
-    const real t63 = t61 + t62;
-    e_I[1] += t63;
-    const real t64 = Rc[6] * t41;
-    const real t65 = Rc[7] * t48;
-    const real t66 = t64 + t65;
-    const real t67 = Rc[8] * t56;
-    const real t68 = t66 + t67;
-    e_I[2] += t68;
-    const real t69 = G[3] * t11;
-    const real t70 = G[9] * t23;
-    const real t71 = t69 + t70;
-    const real t72 = G[15] * t35;
-    const real t73 = t71 + t72;
-    const real t74 = e[3] + t73;
-    const real t75 = Rc[0] * t74;
-    const real t76 = G[4] * t11;
-    const real t77 = G[10] * t23;
-    const real t78 = t76 + t77;
-    const real t79 = G[16] * t35;
-    const real t80 = t78 + t79;
-    const real t81 = e[4] + t80;
-    const real t82 = Rc[1] * t81;
-    const real t83 = t75 + t82;
-    const real t84 = G[5] * t11;
-    const real t85 = G[11] * t23;
-    const real t86 = t84 + t85;
-    const real t87 = G[17] * t35;
-    const real t88 = t86 + t87;
-    const real t89 = e[5] + t88;
-    const real t90 = Rc[2] * t89;
-    const real t91 = t83 + t90;
-    const real t92 = Rc[6] * r[1];
-    const real t93 = Rc[3] * r[2];
-    const real t94 = t92 - t93;
-    const real t95 = t41 * t94;
-    const real t96 = Rc[7] * r[1];
-    const real t97 = Rc[4] * r[2];
-    const real t98 = t96 - t97;
-    const real t99 = t48 * t98;
-    const real t100 = t95 + t99;
-    const real t101 = Rc[8] * r[1];
-    const real t102 = Rc[5] * r[2];
-    const real t103 = t101 - t102;
-    const real t104 = t56 * t103;
-    const real t105 = t100 + t104;
-    const real t106 = t91 + t105;
-    e_I[3] += t106;
-    const real t107 = Rc[3] * t74;
-    const real t108 = Rc[4] * t81;
-    const real t109 = t107 + t108;
-    const real t110 = Rc[5] * t89;
-    const real t111 = t109 + t110;
-    const real t112 = Rc[0] * r[2];
-    const real t113 = Rc[6] * r[0];
-    const real t114 = t112 - t113;
-    const real t115 = t41 * t114;
-    const real t116 = Rc[1] * r[2];
-    const real t117 = Rc[7] * r[0];
-    const real t118 = t116 - t117;
-    const real t119 = t48 * t118;
-    const real t120 = t115 + t119;
-    const real t121 = Rc[2] * r[2];
-    const real t122 = Rc[8] * r[0];
-    const real t123 = t121 - t122;
-    const real t124 = t56 * t123;
-    const real t125 = t120 + t124;
-    const real t126 = t111 + t125;
-    e_I[4] += t126;
-    const real t127 = Rc[6] * t74;
-    const real t128 = Rc[7] * t81;
-    const real t129 = t127 + t128;
-    const real t130 = Rc[8] * t89;
-    const real t131 = t129 + t130;
-    const real t132 = Rc[3] * r[0];
-    const real t133 = Rc[0] * r[1];
-    const real t134 = t132 - t133;
-    const real t135 = t41 * t134;
-    const real t136 = Rc[4] * r[0];
-    const real t137 = Rc[1] * r[1];
-    const real t138 = t136 - t137;
-    const real t139 = t48 * t138;
-    const real t140 = t135 + t139;
-    const real t141 = Rc[5] * r[0];
-    const real t142 = Rc[2] * r[1];
-    const real t143 = t141 - t142;
-    const real t144 = t56 * t143;
-    const real t145 = t140 + t144;
-    const real t146 = t131 + t145;
-    e_I[5] += t146;
-    return 0;
+  real t11 = tau[0] - (H[0] * e[0] + H[3] * e[1] + H[6] * e[2] + H[9] * e[3] + H[12] * e[4] + H[15]
+    * e[5]);
+  y[0] = t11;
+  real t23 = tau[1] - (H[1] * e[0] + H[4] * e[1] + H[7] * e[2] + H[10] * e[3] + H[13] * e[4] + H[16]
+    * e[5]);
+  y[1] = t23;
+  real t35 = tau[2] - (H[2] * e[0] + H[5] * e[1] + H[8] * e[2] + H[11] * e[3] + H[14] * e[4] + H[17]
+    * e[5]);
+  y[2] = t35;
+  real t41 = e[0] + (G[0] * t11 + G[6] * t23 + G[12] * t35);
+  real t48 = e[1] + (G[1] * t11 + G[7] * t23 + G[13] * t35);
+  real t56 = e[2] + (G[2] * t11 + G[8] * t23 + G[14] * t35);
+  e_I[0] += Rc[0] * t41 + Rc[1] * t48 + Rc[2] * t56;
+  e_I[1] += Rc[3] * t41 + Rc[4] * t48 + Rc[5] * t56;
+  e_I[2] += Rc[6] * t41 + Rc[7] * t48 + Rc[8] * t56;
+  real t74 = e[3] + (G[3] * t11 + G[9] * t23 + G[15] * t35);
+  real t81 = e[4] + (G[4] * t11 + G[10] * t23 + G[16] * t35);
+  real t89 = e[5] + (G[5] * t11 + G[11] * t23 + G[17] * t35);
+  e_I[3] += Rc[0] * t74 + Rc[1] * t81 + Rc[2] * t89 + (t41 * (Rc[6] * r[1] - Rc[3] * r[2]) + t48 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t56 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t74 + Rc[4] * t81 + Rc[5] * t89 + (t41 * (Rc[0] * r[2] - Rc[6] * r[0]) + t48 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t56 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t74 + Rc[7] * t81 + Rc[8] * t89 + (t41 * (Rc[3] * r[0] - Rc[0] * r[1]) + t48 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t56 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_column_load_outputs[] = {
-    {"y", 3, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][3] motion subspace of the free coordinates
@@ -3218,175 +755,42 @@ static const mstmm_port mstmm_sweep_generic3_column_load_outputs[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic3_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic3_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[3] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[4] * t2;
-    const real t4 = F[6] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[7] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[8] * t7;
-    const real t9 = F[7] * t8;
-    const real t10 = t3 - t9;
-    const real t11 = F[3] * t10;
-    const real t12 = t0 - t11;
-    const real t13 = F[6] * t8;
-    const real t14 = t12 - t13;
-    const real t15 = r[2] * delta_I[4];
-    const real t16 = r[1] * delta_I[5];
-    const real t17 = t15 - t16;
-    const real t18 = delta_I[0] + t17;
-    const real t19 = Rc[0] * t18;
-    const real t20 = r[0] * delta_I[5];
-    const real t21 = r[2] * delta_I[3];
-    const real t22 = t20 - t21;
-    const real t23 = delta_I[1] + t22;
-    const real t24 = Rc[3] * t23;
-    const real t25 = t19 + t24;
-    const real t26 = r[1] * delta_I[3];
-    const real t27 = r[0] * delta_I[4];
-    const real t28 = t26 - t27;
-    const real t29 = delta_I[2] + t28;
-    const real t30 = Rc[6] * t29;
-    const real t31 = t25 + t30;
-    const real t32 = G[0] * t31;
-    const real t33 = Rc[1] * t18;
-    const real t34 = Rc[4] * t23;
-    const real t35 = t33 + t34;
-    const real t36 = Rc[7] * t29;
-    const real t37 = t35 + t36;
-    const real t38 = G[1] * t37;
-    const real t39 = t32 + t38;
-    const real t40 = Rc[2] * t18;
-    const real t41 = Rc[5] * t23;
-    const real t42 = t40 + t41;
-    const real t43 = Rc[8] * t29;
-    const real t44 = t42 + t43;
-    const real t45 = G[2] * t44;
-    const real t46 = t39 + t45;
-    const real t47 = Rc[0] * delta_I[3];
-    const real t48 = Rc[3] * delta_I[4];
-    const real t49 = t47 + t48;
-    const real t50 = Rc[6] * delta_I[5];
-    const real t51 = t49 + t50;
-    const real t52 = G[3] * t51;
-    const real t53 = t46 + t52;
-    const real t54 = Rc[1] * delta_I[3];
-    const real t55 = Rc[4] * delta_I[4];
-    const real t56 = t54 + t55;
-    const real t57 = Rc[7] * delta_I[5];
-    const real t58 = t56 + t57;
-    const real t59 = G[4] * t58;
-    const real t60 = t53 + t59;
-    const real t61 = Rc[2] * delta_I[3];
-    const real t62 = Rc[5] * delta_I[4];
-    const real t63 = t61 + t62;
-    const real t64 = Rc[8] * delta_I[5];
-    const real t65 = t63 + t64;
-    const real t66 = G[5] * t65;
-    const real t67 = t60 + t66;
-    const real t68 = t14 - t67;
-    udot[0] = t68;
-    const real t69 = G[6] * t31;
-    const real t70 = G[7] * t37;
-    const real t71 = t69 + t70;
-    const real t72 = G[8] * t44;
-    const real t73 = t71 + t72;
-    const real t74 = G[9] * t51;
-    const real t75 = t73 + t74;
-    const real t76 = G[10] * t58;
-    const real t77 = t75 + t76;
-    const real t78 = G[11] * t65;
-    const real t79 = t77 + t78;
-    const real t80 = t10 - t79;
-    udot[1] = t80;
-    const real t81 = G[12] * t31;
-    const real t82 = G[13] * t37;
-    const real t83 = t81 + t82;
-    const real t84 = G[14] * t44;
-    const real t85 = t83 + t84;
-    const real t86 = G[15] * t51;
-    const real t87 = t85 + t86;
-    const real t88 = G[16] * t58;
-    const real t89 = t87 + t88;
-    const real t90 = G[17] * t65;
-    const real t91 = t89 + t90;
-    const real t92 = t8 - t91;
-    udot[2] = t92;
-    const real t93 = H[0] * t68;
-    const real t94 = H[1] * t80;
-    const real t95 = t93 + t94;
-    const real t96 = H[2] * t92;
-    const real t97 = t95 + t96;
-    const real t98 = t31 + t97;
-    delta[0] = t98;
-    const real t99 = H[3] * t68;
-    const real t100 = H[4] * t80;
-    const real t101 = t99 + t100;
-    const real t102 = H[5] * t92;
-    const real t103 = t101 + t102;
-    const real t104 = t37 + t103;
-    delta[1] = t104;
-    const real t105 = H[6] * t68;
-    const real t106 = H[7] * t80;
-    const real t107 = t105 + t106;
-    const real t108 = H[8] * t92;
-    const real t109 = t107 + t108;
-    const real t110 = t44 + t109;
-    delta[2] = t110;
-    const real t111 = H[9] * t68;
-    const real t112 = H[10] * t80;
-    const real t113 = t111 + t112;
-    const real t114 = H[11] * t92;
-    const real t115 = t113 + t114;
-    const real t116 = t51 + t115;
-    delta[3] = t116;
-    const real t117 = H[12] * t68;
-    const real t118 = H[13] * t80;
-    const real t119 = t117 + t118;
-    const real t120 = H[14] * t92;
-    const real t121 = t119 + t120;
-    const real t122 = t58 + t121;
-    delta[4] = t122;
-    const real t123 = H[15] * t68;
-    const real t124 = H[16] * t80;
-    const real t125 = t123 + t124;
-    const real t126 = H[17] * t92;
-    const real t127 = t125 + t126;
-    const real t128 = t65 + t127;
-    delta[5] = t128;
-    return 0;
+  real t2 = y[1] - F[3] * y[0];
+  real t8 = F[8] * (y[2] - F[6] * y[0] - F[7] * t2);
+  real t10 = F[4] * t2 - F[7] * t8;
+  real t18 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t23 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t29 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t31 = Rc[0] * t18 + Rc[3] * t23 + Rc[6] * t29;
+  real t37 = Rc[1] * t18 + Rc[4] * t23 + Rc[7] * t29;
+  real t44 = Rc[2] * t18 + Rc[5] * t23 + Rc[8] * t29;
+  real t51 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t58 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t65 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t68 = F[0] * y[0] - F[3] * t10 - F[6] * t8 - (G[0] * t31 + G[1] * t37 + G[2] * t44 + G[3] *
+    t51 + G[4] * t58 + G[5] * t65);
+  udot[0] = t68;
+  real t80 = t10 - (G[6] * t31 + G[7] * t37 + G[8] * t44 + G[9] * t51 + G[10] * t58 + G[11] * t65);
+  udot[1] = t80;
+  real t92 = t8 - (G[12] * t31 + G[13] * t37 + G[14] * t44 + G[15] * t51 + G[16] * t58 + G[17] *
+    t65);
+  udot[2] = t92;
+  delta[0] = t31 + (H[0] * t68 + H[1] * t80 + H[2] * t92);
+  delta[1] = t37 + (H[3] * t68 + H[4] * t80 + H[5] * t92);
+  delta[2] = t44 + (H[6] * t68 + H[7] * t80 + H[8] * t92);
+  delta[3] = t51 + (H[9] * t68 + H[10] * t80 + H[11] * t92);
+  delta[4] = t58 + (H[12] * t68 + H[13] * t80 + H[14] * t92);
+  delta[5] = t65 + (H[15] * t68 + H[16] * t80 + H[17] * t92);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"F", 9, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"y", 3, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_column_acceleration_outputs[] = {
-    {"udot", 3, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6][3] motion subspace of the free coordinates
@@ -3402,1317 +806,467 @@ static const mstmm_port mstmm_sweep_generic3_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic3_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic3_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    const real t0 = H[6] * H[6];
-    const real t1 = H[0] * H[0];
-    const real t2 = H[3] * H[3];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 0.0 < floor_[0];
-    const real t6 = U[11] * U[11];
-    const real t7 = U[7] * U[7];
-    const real t8 = U[6] * U[6];
-    const real t9 = U[2] * U[2];
-    const real t10 = U[0] * U[0];
-    const real t11 = U[1] * U[1];
-    const real t12 = t10 + t11;
-    const real t13 = t9 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = t7 + t14;
-    const real t16 = t6 + t15;
-    const real t17 = ((real)1 / (real)300000000000000) * t16;
-    const real t18 = t5 != 0 ? floor_[0] : t17;
-    const real t19 = t4 * t18;
-    const real t20 = H[15] * H[15];
-    const real t21 = H[9] * H[9];
-    const real t22 = H[12] * H[12];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    const real t25 = 0.0 < floor_[1];
-    const real t26 = U[20] * U[20];
-    const real t27 = U[19] * U[19];
-    const real t28 = U[18] * U[18];
-    const real t29 = U[17] * U[17];
-    const real t30 = U[16] * U[16];
-    const real t31 = U[15] * U[15];
-    const real t32 = U[14] * U[14];
-    const real t33 = U[13] * U[13];
-    const real t34 = U[12] * U[12];
-    const real t35 = U[10] * U[10];
-    const real t36 = U[9] * U[9];
-    const real t37 = U[8] * U[8];
-    const real t38 = U[5] * U[5];
-    const real t39 = U[3] * U[3];
-    const real t40 = U[4] * U[4];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = t36 + t43;
-    const real t45 = t35 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = t33 + t46;
-    const real t48 = t32 + t47;
-    const real t49 = t31 + t48;
-    const real t50 = t30 + t49;
-    const real t51 = t29 + t50;
-    const real t52 = t28 + t51;
-    const real t53 = t27 + t52;
-    const real t54 = t26 + t53;
-    const real t55 = ((real)1 / (real)300000000000000) * t54;
-    const real t56 = t25 != 0 ? floor_[1] : t55;
-    const real t57 = t24 * t56;
-    const real t58 = t19 + t57;
-    const real t59 = H[15] * U[20];
-    const real t60 = t59 * t59;
-    const real t61 = H[12] * U[18];
-    const real t62 = H[15] * U[19];
-    const real t63 = t61 + t62;
-    const real t64 = t63 * t63;
-    const real t65 = H[9] * U[15];
-    const real t66 = H[12] * U[16];
-    const real t67 = t65 + t66;
-    const real t68 = H[15] * U[17];
-    const real t69 = t67 + t68;
-    const real t70 = t69 * t69;
-    const real t71 = H[6] * U[11];
-    const real t72 = H[9] * U[12];
-    const real t73 = t71 + t72;
-    const real t74 = H[12] * U[13];
-    const real t75 = t73 + t74;
-    const real t76 = H[15] * U[14];
-    const real t77 = t75 + t76;
-    const real t78 = t77 * t77;
-    const real t79 = H[3] * U[6];
-    const real t80 = H[6] * U[7];
-    const real t81 = t79 + t80;
-    const real t82 = H[9] * U[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[12] * U[9];
-    const real t85 = t83 + t84;
-    const real t86 = H[15] * U[10];
-    const real t87 = t85 + t86;
-    const real t88 = t87 * t87;
-    const real t89 = H[0] * U[0];
-    const real t90 = H[3] * U[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[6] * U[2];
-    const real t93 = t91 + t92;
-    const real t94 = H[9] * U[3];
-    const real t95 = t93 + t94;
-    const real t96 = H[12] * U[4];
-    const real t97 = t95 + t96;
-    const real t98 = H[15] * U[5];
-    const real t99 = t97 + t98;
-    const real t100 = t99 * t99;
-    const real t101 = J[0] + t100;
-    const real t102 = t88 + t101;
-    const real t103 = t78 + t102;
-    const real t104 = t70 + t103;
-    const real t105 = t64 + t104;
-    const real t106 = t60 + t105;
-    const real t107 = t58 < t106;
-    if (!(t107 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t108 = H[7] * H[7];
-    const real t109 = H[1] * H[1];
-    const real t110 = H[4] * H[4];
-    const real t111 = t109 + t110;
-    const real t112 = t108 + t111;
-    const real t113 = t18 * t112;
-    const real t114 = H[16] * H[16];
-    const real t115 = H[10] * H[10];
-    const real t116 = H[13] * H[13];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    const real t119 = t56 * t118;
-    const real t120 = t113 + t119;
-    const real t121 = H[16] * U[20];
-    const real t122 = t121 * t121;
-    const real t123 = H[13] * U[18];
-    const real t124 = H[16] * U[19];
-    const real t125 = t123 + t124;
-    const real t126 = t125 * t125;
-    const real t127 = H[10] * U[15];
-    const real t128 = H[13] * U[16];
-    const real t129 = t127 + t128;
-    const real t130 = H[16] * U[17];
-    const real t131 = t129 + t130;
-    const real t132 = t131 * t131;
-    const real t133 = H[7] * U[11];
-    const real t134 = H[10] * U[12];
-    const real t135 = t133 + t134;
-    const real t136 = H[13] * U[13];
-    const real t137 = t135 + t136;
-    const real t138 = H[16] * U[14];
-    const real t139 = t137 + t138;
-    const real t140 = t139 * t139;
-    const real t141 = H[4] * U[6];
-    const real t142 = H[7] * U[7];
-    const real t143 = t141 + t142;
-    const real t144 = H[10] * U[8];
-    const real t145 = t143 + t144;
-    const real t146 = H[13] * U[9];
-    const real t147 = t145 + t146;
-    const real t148 = H[16] * U[10];
-    const real t149 = t147 + t148;
-    const real t150 = t149 * t149;
-    const real t151 = H[1] * U[0];
-    const real t152 = H[4] * U[1];
-    const real t153 = t151 + t152;
-    const real t154 = H[7] * U[2];
-    const real t155 = t153 + t154;
-    const real t156 = H[10] * U[3];
-    const real t157 = t155 + t156;
-    const real t158 = H[13] * U[4];
-    const real t159 = t157 + t158;
-    const real t160 = H[16] * U[5];
-    const real t161 = t159 + t160;
-    const real t162 = t161 * t161;
-    const real t163 = J[1] + t162;
-    const real t164 = t150 + t163;
-    const real t165 = t140 + t164;
-    const real t166 = t132 + t165;
-    const real t167 = t126 + t166;
-    const real t168 = t122 + t167;
-    const real t169 = t120 < t168;
-    if (!(t169 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t170 = H[8] * H[8];
-    const real t171 = H[2] * H[2];
-    const real t172 = H[5] * H[5];
-    const real t173 = t171 + t172;
-    const real t174 = t170 + t173;
-    const real t175 = t18 * t174;
-    const real t176 = H[17] * H[17];
-    const real t177 = H[11] * H[11];
-    const real t178 = H[14] * H[14];
-    const real t179 = t177 + t178;
-    const real t180 = t176 + t179;
-    const real t181 = t56 * t180;
-    const real t182 = t175 + t181;
-    const real t183 = H[17] * U[20];
-    const real t184 = t183 * t183;
-    const real t185 = H[14] * U[18];
-    const real t186 = H[17] * U[19];
-    const real t187 = t185 + t186;
-    const real t188 = t187 * t187;
-    const real t189 = H[11] * U[15];
-    const real t190 = H[14] * U[16];
-    const real t191 = t189 + t190;
-    const real t192 = H[17] * U[17];
-    const real t193 = t191 + t192;
-    const real t194 = t193 * t193;
-    const real t195 = H[8] * U[11];
-    const real t196 = H[11] * U[12];
-    const real t197 = t195 + t196;
-    const real t198 = H[14] * U[13];
-    const real t199 = t197 + t198;
-    const real t200 = H[17] * U[14];
-    const real t201 = t199 + t200;
-    const real t202 = t201 * t201;
-    const real t203 = H[5] * U[6];
-    const real t204 = H[8] * U[7];
-    const real t205 = t203 + t204;
-    const real t206 = H[11] * U[8];
-    const real t207 = t205 + t206;
-    const real t208 = H[14] * U[9];
-    const real t209 = t207 + t208;
-    const real t210 = H[17] * U[10];
-    const real t211 = t209 + t210;
-    const real t212 = t211 * t211;
-    const real t213 = H[2] * U[0];
-    const real t214 = H[5] * U[1];
-    const real t215 = t213 + t214;
-    const real t216 = H[8] * U[2];
-    const real t217 = t215 + t216;
-    const real t218 = H[11] * U[3];
-    const real t219 = t217 + t218;
-    const real t220 = H[14] * U[4];
-    const real t221 = t219 + t220;
-    const real t222 = H[17] * U[5];
-    const real t223 = t221 + t222;
-    const real t224 = t223 * t223;
-    const real t225 = J[2] + t224;
-    const real t226 = t212 + t225;
-    const real t227 = t202 + t226;
-    const real t228 = t194 + t227;
-    const real t229 = t188 + t228;
-    const real t230 = t184 + t229;
-    const real t231 = t182 < t230;
-    if (!(t231 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    const real t232 = 1e-26 * t106;
-    const real t233 = sqrt(J[0]);
-    const real t234 = t233 * t233;
-    const real t235 = t60 + t234;
-    const real t236 = sqrt(t235);
-    const real t237 = t236 * t236;
-    const real t238 = t64 + t237;
-    const real t239 = sqrt(t238);
-    const real t240 = t239 * t239;
-    const real t241 = t70 + t240;
-    const real t242 = sqrt(t241);
-    const real t243 = t242 * t242;
-    const real t244 = t78 + t243;
-    const real t245 = sqrt(t244);
-    const real t246 = t245 * t245;
-    const real t247 = t88 + t246;
-    const real t248 = sqrt(t247);
-    const real t249 = t248 * t248;
-    const real t250 = t100 + t249;
-    const real t251 = sqrt(t250);
-    const real t252 = t251 * t251;
-    const real t253 = t232 < t252;
-    if (!(t253 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t254 = 1e-26 * t168;
-    const real t255 = 0.0 < t248;
-    const real t256 = t255 != 0 ? t248 : 1.0;
-    const real t257 = 1.0 / t256;
-    const real t258 = t87 * t257;
-    const real t259 = t255 != 0 ? t258 : 1.0;
-    const real t260 = t149 * t259;
-    const real t261 = 0.0 < t245;
-    const real t262 = t261 != 0 ? t245 : 1.0;
-    const real t263 = 1.0 / t262;
-    const real t264 = t77 * t263;
-    const real t265 = t261 != 0 ? t264 : 1.0;
-    const real t266 = t139 * t265;
-    const real t267 = 0.0 < t242;
-    const real t268 = t267 != 0 ? t242 : 1.0;
-    const real t269 = 1.0 / t268;
-    const real t270 = t69 * t269;
-    const real t271 = t267 != 0 ? t270 : 1.0;
-    const real t272 = t131 * t271;
-    const real t273 = 0.0 < t239;
-    const real t274 = t273 != 0 ? t239 : 1.0;
-    const real t275 = 1.0 / t274;
-    const real t276 = t63 * t275;
-    const real t277 = t273 != 0 ? t276 : 1.0;
-    const real t278 = t125 * t277;
-    const real t279 = 0.0 < t236;
-    const real t280 = t279 != 0 ? t236 : 1.0;
-    const real t281 = 1.0 / t280;
-    const real t282 = t59 * t281;
-    const real t283 = t279 != 0 ? t282 : 1.0;
-    const real t284 = t121 * t283;
-    const real t285 = t236 * t275;
-    const real t286 = t284 * t285;
-    const real t287 = t278 + t286;
-    const real t288 = t239 * t269;
-    const real t289 = t287 * t288;
-    const real t290 = t272 + t289;
-    const real t291 = t242 * t263;
-    const real t292 = t290 * t291;
-    const real t293 = t266 + t292;
-    const real t294 = t245 * t257;
-    const real t295 = t293 * t294;
-    const real t296 = t260 + t295;
-    const real t297 = 0.0 < t251;
-    const real t298 = t297 != 0 ? t251 : 1.0;
-    const real t299 = 1.0 / t298;
-    const real t300 = t99 * t299;
-    const real t301 = t297 != 0 ? t300 : 1.0;
-    const real t302 = t296 * t301;
-    const real t303 = t248 * t299;
-    const real t304 = t161 * t303;
-    const real t305 = t302 - t304;
-    const real t306 = t305 * t305;
-    const real t307 = t293 * t259;
-    const real t308 = t149 * t294;
-    const real t309 = t307 - t308;
-    const real t310 = t309 * t309;
-    const real t311 = t290 * t265;
-    const real t312 = t139 * t291;
-    const real t313 = t311 - t312;
-    const real t314 = t313 * t313;
-    const real t315 = t287 * t271;
-    const real t316 = t131 * t288;
-    const real t317 = t315 - t316;
-    const real t318 = t317 * t317;
-    const real t319 = t284 * t277;
-    const real t320 = t125 * t285;
-    const real t321 = t319 - t320;
-    const real t322 = t321 * t321;
-    const real t323 = t233 * t281;
-    const real t324 = t121 * t323;
-    const real t325 = t324 * t324;
-    const real t326 = sqrt(J[1]);
-    const real t327 = t326 * t326;
-    const real t328 = t325 + t327;
-    const real t329 = sqrt(t328);
-    const real t330 = t329 * t329;
-    const real t331 = t322 + t330;
-    const real t332 = sqrt(t331);
-    const real t333 = t332 * t332;
-    const real t334 = t318 + t333;
-    const real t335 = sqrt(t334);
-    const real t336 = t335 * t335;
-    const real t337 = t314 + t336;
-    const real t338 = sqrt(t337);
-    const real t339 = t338 * t338;
-    const real t340 = t310 + t339;
-    const real t341 = sqrt(t340);
-    const real t342 = t341 * t341;
-    const real t343 = t306 + t342;
-    const real t344 = sqrt(t343);
-    const real t345 = t344 * t344;
-    const real t346 = t254 < t345;
-    if (!(t346 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t347 = 1e-26 * t230;
-    const real t348 = t201 * t265;
-    const real t349 = t193 * t271;
-    const real t350 = t187 * t277;
-    const real t351 = t183 * t283;
-    const real t352 = t351 * t285;
-    const real t353 = t350 + t352;
-    const real t354 = t353 * t288;
-    const real t355 = t349 + t354;
-    const real t356 = t355 * t291;
-    const real t357 = t348 + t356;
-    const real t358 = t357 * t259;
-    const real t359 = t211 * t294;
-    const real t360 = t358 - t359;
-    const real t361 = 0.0 < t341;
-    const real t362 = t361 != 0 ? t341 : 1.0;
-    const real t363 = 1.0 / t362;
-    const real t364 = t309 * t363;
-    const real t365 = t361 != 0 ? t364 : 1.0;
-    const real t366 = t360 * t365;
-    const real t367 = t355 * t265;
-    const real t368 = t201 * t291;
-    const real t369 = t367 - t368;
-    const real t370 = 0.0 < t338;
-    const real t371 = t370 != 0 ? t338 : 1.0;
-    const real t372 = 1.0 / t371;
-    const real t373 = t313 * t372;
-    const real t374 = t370 != 0 ? t373 : 1.0;
-    const real t375 = t369 * t374;
-    const real t376 = t353 * t271;
-    const real t377 = t193 * t288;
-    const real t378 = t376 - t377;
-    const real t379 = 0.0 < t335;
-    const real t380 = t379 != 0 ? t335 : 1.0;
-    const real t381 = 1.0 / t380;
-    const real t382 = t317 * t381;
-    const real t383 = t379 != 0 ? t382 : 1.0;
-    const real t384 = t378 * t383;
-    const real t385 = t351 * t277;
-    const real t386 = t187 * t285;
-    const real t387 = t385 - t386;
-    const real t388 = 0.0 < t332;
-    const real t389 = t388 != 0 ? t332 : 1.0;
-    const real t390 = 1.0 / t389;
-    const real t391 = t321 * t390;
-    const real t392 = t388 != 0 ? t391 : 1.0;
-    const real t393 = t387 * t392;
-    const real t394 = t183 * t323;
-    const real t395 = 0.0 < t329;
-    const real t396 = t395 != 0 ? t329 : 1.0;
-    const real t397 = 1.0 / t396;
-    const real t398 = t324 * t397;
-    const real t399 = -t398;
-    const real t400 = t395 != 0 ? t399 : 1.0;
-    const real t401 = t394 * t400;
-    const real t402 = t329 * t390;
-    const real t403 = t401 * t402;
-    const real t404 = t393 - t403;
-    const real t405 = t332 * t381;
-    const real t406 = t404 * t405;
-    const real t407 = t384 + t406;
-    const real t408 = t335 * t372;
-    const real t409 = t407 * t408;
-    const real t410 = t375 + t409;
-    const real t411 = t338 * t363;
-    const real t412 = t410 * t411;
-    const real t413 = t366 + t412;
-    const real t414 = 0.0 < t344;
-    const real t415 = t414 != 0 ? t344 : 1.0;
-    const real t416 = 1.0 / t415;
-    const real t417 = t305 * t416;
-    const real t418 = t414 != 0 ? t417 : 1.0;
-    const real t419 = t413 * t418;
-    const real t420 = t211 * t259;
-    const real t421 = t357 * t294;
-    const real t422 = t420 + t421;
-    const real t423 = t422 * t301;
-    const real t424 = t223 * t303;
-    const real t425 = t423 - t424;
-    const real t426 = t341 * t416;
-    const real t427 = t425 * t426;
-    const real t428 = t419 - t427;
-    const real t429 = t428 * t428;
-    const real t430 = t410 * t365;
-    const real t431 = t360 * t411;
-    const real t432 = t430 - t431;
-    const real t433 = t432 * t432;
-    const real t434 = t407 * t374;
-    const real t435 = t369 * t408;
-    const real t436 = t434 - t435;
-    const real t437 = t436 * t436;
-    const real t438 = t404 * t383;
-    const real t439 = t378 * t405;
-    const real t440 = t438 - t439;
-    const real t441 = t440 * t440;
-    const real t442 = t401 * t392;
-    const real t443 = t387 * t402;
-    const real t444 = t442 + t443;
-    const real t445 = t444 * t444;
-    const real t446 = t326 * t397;
-    const real t447 = t394 * t446;
-    const real t448 = t447 * t447;
-    const real t449 = sqrt(J[2]);
-    const real t450 = t449 * t449;
-    const real t451 = t448 + t450;
-    const real t452 = sqrt(t451);
-    const real t453 = t452 * t452;
-    const real t454 = t445 + t453;
-    const real t455 = sqrt(t454);
-    const real t456 = t455 * t455;
-    const real t457 = t441 + t456;
-    const real t458 = sqrt(t457);
-    const real t459 = t458 * t458;
-    const real t460 = t437 + t459;
-    const real t461 = sqrt(t460);
-    const real t462 = t461 * t461;
-    const real t463 = t433 + t462;
-    const real t464 = sqrt(t463);
-    const real t465 = t464 * t464;
-    const real t466 = t429 + t465;
-    const real t467 = sqrt(t466);
-    const real t468 = t467 * t467;
-    const real t469 = t347 < t468;
-    if (!(t469 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t470 = U[0] * t301;
-    const real t471 = 1.0 / t251;
-    const real t472 = t470 * t471;
-    const real t473 = t161 * t301;
-    const real t474 = t296 * t303;
-    const real t475 = t473 + t474;
-    const real t476 = t475 * t471;
-    const real t477 = U[0] * t303;
-    const real t478 = t477 * t418;
-    const real t479 = 1.0 / t344;
-    const real t480 = t478 * t479;
-    const real t481 = t425 * t418;
-    const real t482 = t413 * t426;
-    const real t483 = t481 + t482;
-    const real t484 = t483 * t479;
-    const real t485 = t477 * t426;
-    const real t486 = 0.0 < t467;
-    const real t487 = t486 != 0 ? t467 : 1.0;
-    const real t488 = 1.0 / t487;
-    const real t489 = t428 * t488;
-    const real t490 = t486 != 0 ? t489 : 1.0;
-    const real t491 = t485 * t490;
-    const real t492 = 1.0 / t467;
-    const real t493 = t491 * t492;
-    const real t494 = t484 * t493;
-    const real t495 = t480 + t494;
-    const real t496 = t476 * t495;
-    const real t497 = t472 + t496;
-    const real t498 = t223 * t301;
-    const real t499 = t422 * t303;
-    const real t500 = t498 + t499;
-    const real t501 = t500 * t471;
-    const real t502 = t501 * t493;
-    const real t503 = t497 - t502;
-    G[0] = t503;
-    const real t504 = U[1] * t301;
-    const real t505 = U[6] * t259;
-    const real t506 = t505 * t303;
-    const real t507 = t504 + t506;
-    const real t508 = t507 * t471;
-    const real t509 = t505 * t301;
-    const real t510 = U[1] * t303;
-    const real t511 = t509 - t510;
-    const real t512 = t511 * t418;
-    const real t513 = U[6] * t294;
-    const real t514 = t513 * t365;
-    const real t515 = t514 * t426;
-    const real t516 = t512 - t515;
-    const real t517 = t516 * t479;
-    const real t518 = t513 * t411;
-    const real t519 = 0.0 < t464;
-    const real t520 = t519 != 0 ? t464 : 1.0;
-    const real t521 = 1.0 / t520;
-    const real t522 = t432 * t521;
-    const real t523 = t519 != 0 ? t522 : 1.0;
-    const real t524 = t518 * t523;
-    const real t525 = t464 * t488;
-    const real t526 = t524 * t525;
-    const real t527 = t514 * t418;
-    const real t528 = t511 * t426;
-    const real t529 = t527 + t528;
-    const real t530 = t529 * t490;
-    const real t531 = t526 - t530;
-    const real t532 = t531 * t492;
-    const real t533 = t484 * t532;
-    const real t534 = t517 - t533;
-    const real t535 = t476 * t534;
-    const real t536 = t508 - t535;
-    const real t537 = t501 * t532;
-    const real t538 = t536 - t537;
-    G[1] = t538;
-    const real t539 = U[2] * t301;
-    const real t540 = U[7] * t259;
-    const real t541 = U[11] * t265;
-    const real t542 = t541 * t294;
-    const real t543 = t540 + t542;
-    const real t544 = t543 * t303;
-    const real t545 = t539 + t544;
-    const real t546 = t545 * t471;
-    const real t547 = t543 * t301;
-    const real t548 = U[2] * t303;
-    const real t549 = t547 - t548;
-    const real t550 = t549 * t418;
-    const real t551 = t541 * t259;
-    const real t552 = U[7] * t294;
-    const real t553 = t551 - t552;
-    const real t554 = t553 * t365;
-    const real t555 = U[11] * t291;
-    const real t556 = t555 * t374;
-    const real t557 = t556 * t411;
-    const real t558 = t554 - t557;
-    const real t559 = t558 * t426;
-    const real t560 = t550 + t559;
-    const real t561 = t560 * t479;
-    const real t562 = t558 * t418;
-    const real t563 = t549 * t426;
-    const real t564 = t562 - t563;
-    const real t565 = t564 * t490;
-    const real t566 = t555 * t408;
-    const real t567 = 0.0 < t461;
-    const real t568 = t567 != 0 ? t461 : 1.0;
-    const real t569 = 1.0 / t568;
-    const real t570 = t436 * t569;
-    const real t571 = t567 != 0 ? t570 : 1.0;
-    const real t572 = t566 * t571;
-    const real t573 = t461 * t521;
-    const real t574 = t572 * t573;
-    const real t575 = t556 * t365;
-    const real t576 = t553 * t411;
-    const real t577 = t575 + t576;
-    const real t578 = t577 * t523;
-    const real t579 = t574 - t578;
-    const real t580 = t579 * t525;
-    const real t581 = t565 + t580;
-    const real t582 = t581 * t492;
-    const real t583 = t484 * t582;
-    const real t584 = t561 - t583;
-    const real t585 = t476 * t584;
-    const real t586 = t546 - t585;
-    const real t587 = t501 * t582;
-    const real t588 = t586 - t587;
-    G[2] = t588;
-    const real t589 = U[3] * t301;
-    const real t590 = U[8] * t259;
-    const real t591 = U[12] * t265;
-    const real t592 = U[15] * t271;
-    const real t593 = t592 * t291;
-    const real t594 = t591 + t593;
-    const real t595 = t594 * t294;
-    const real t596 = t590 + t595;
-    const real t597 = t596 * t303;
-    const real t598 = t589 + t597;
-    const real t599 = t598 * t471;
-    const real t600 = t596 * t301;
-    const real t601 = U[3] * t303;
-    const real t602 = t600 - t601;
-    const real t603 = t602 * t418;
-    const real t604 = t594 * t259;
-    const real t605 = U[8] * t294;
-    const real t606 = t604 - t605;
-    const real t607 = t606 * t365;
-    const real t608 = t592 * t265;
-    const real t609 = U[12] * t291;
-    const real t610 = t608 - t609;
-    const real t611 = t610 * t374;
-    const real t612 = U[15] * t288;
-    const real t613 = t612 * t383;
-    const real t614 = t613 * t408;
-    const real t615 = t611 - t614;
-    const real t616 = t615 * t411;
-    const real t617 = t607 + t616;
-    const real t618 = t617 * t426;
-    const real t619 = t603 + t618;
-    const real t620 = t619 * t479;
-    const real t621 = t617 * t418;
-    const real t622 = t602 * t426;
-    const real t623 = t621 - t622;
-    const real t624 = t623 * t490;
-    const real t625 = t615 * t365;
-    const real t626 = t606 * t411;
-    const real t627 = t625 - t626;
-    const real t628 = t627 * t523;
-    const real t629 = t612 * t405;
-    const real t630 = 0.0 < t458;
-    const real t631 = t630 != 0 ? t458 : 1.0;
-    const real t632 = 1.0 / t631;
-    const real t633 = t440 * t632;
-    const real t634 = t630 != 0 ? t633 : 1.0;
-    const real t635 = t629 * t634;
-    const real t636 = t458 * t569;
-    const real t637 = t635 * t636;
-    const real t638 = t613 * t374;
-    const real t639 = t610 * t408;
-    const real t640 = t638 + t639;
-    const real t641 = t640 * t571;
-    const real t642 = t637 - t641;
-    const real t643 = t642 * t573;
-    const real t644 = t628 + t643;
-    const real t645 = t644 * t525;
-    const real t646 = t624 + t645;
-    const real t647 = t646 * t492;
-    const real t648 = t484 * t647;
-    const real t649 = t620 - t648;
-    const real t650 = t476 * t649;
-    const real t651 = t599 - t650;
-    const real t652 = t501 * t647;
-    const real t653 = t651 - t652;
-    G[3] = t653;
-    const real t654 = U[4] * t301;
-    const real t655 = U[9] * t259;
-    const real t656 = U[13] * t265;
-    const real t657 = U[16] * t271;
-    const real t658 = U[18] * t277;
-    const real t659 = t658 * t288;
-    const real t660 = t657 + t659;
-    const real t661 = t660 * t291;
-    const real t662 = t656 + t661;
-    const real t663 = t662 * t294;
-    const real t664 = t655 + t663;
-    const real t665 = t664 * t303;
-    const real t666 = t654 + t665;
-    const real t667 = t666 * t471;
-    const real t668 = t664 * t301;
-    const real t669 = U[4] * t303;
-    const real t670 = t668 - t669;
-    const real t671 = t670 * t418;
-    const real t672 = t662 * t259;
-    const real t673 = U[9] * t294;
-    const real t674 = t672 - t673;
-    const real t675 = t674 * t365;
-    const real t676 = t660 * t265;
-    const real t677 = U[13] * t291;
-    const real t678 = t676 - t677;
-    const real t679 = t678 * t374;
-    const real t680 = t658 * t271;
-    const real t681 = U[16] * t288;
-    const real t682 = t680 - t681;
-    const real t683 = t682 * t383;
-    const real t684 = U[18] * t285;
-    const real t685 = t684 * t392;
-    const real t686 = t685 * t405;
-    const real t687 = t683 - t686;
-    const real t688 = t687 * t408;
-    const real t689 = t679 + t688;
-    const real t690 = t689 * t411;
-    const real t691 = t675 + t690;
-    const real t692 = t691 * t426;
-    const real t693 = t671 + t692;
-    const real t694 = t693 * t479;
-    const real t695 = t691 * t418;
-    const real t696 = t670 * t426;
-    const real t697 = t695 - t696;
-    const real t698 = t697 * t490;
-    const real t699 = t689 * t365;
-    const real t700 = t674 * t411;
-    const real t701 = t699 - t700;
-    const real t702 = t701 * t523;
-    const real t703 = t687 * t374;
-    const real t704 = t678 * t408;
-    const real t705 = t703 - t704;
-    const real t706 = t705 * t571;
-    const real t707 = t684 * t402;
-    const real t708 = 0.0 < t455;
-    const real t709 = t708 != 0 ? t455 : 1.0;
-    const real t710 = 1.0 / t709;
-    const real t711 = t444 * t710;
-    const real t712 = -t711;
-    const real t713 = t708 != 0 ? t712 : 1.0;
-    const real t714 = t707 * t713;
-    const real t715 = t455 * t632;
-    const real t716 = t714 * t715;
-    const real t717 = t685 * t383;
-    const real t718 = t682 * t405;
-    const real t719 = t717 + t718;
-    const real t720 = t719 * t634;
-    const real t721 = t716 - t720;
-    const real t722 = t721 * t636;
-    const real t723 = t706 + t722;
-    const real t724 = t723 * t573;
-    const real t725 = t702 + t724;
-    const real t726 = t725 * t525;
-    const real t727 = t698 + t726;
-    const real t728 = t727 * t492;
-    const real t729 = t484 * t728;
-    const real t730 = t694 - t729;
-    const real t731 = t476 * t730;
-    const real t732 = t667 - t731;
-    const real t733 = t501 * t728;
-    const real t734 = t732 - t733;
-    G[4] = t734;
-    const real t735 = U[5] * t301;
-    const real t736 = U[10] * t259;
-    const real t737 = U[14] * t265;
-    const real t738 = U[17] * t271;
-    const real t739 = U[19] * t277;
-    const real t740 = U[20] * t283;
-    const real t741 = t740 * t285;
-    const real t742 = t739 + t741;
-    const real t743 = t742 * t288;
-    const real t744 = t738 + t743;
-    const real t745 = t744 * t291;
-    const real t746 = t737 + t745;
-    const real t747 = t746 * t294;
-    const real t748 = t736 + t747;
-    const real t749 = t748 * t303;
-    const real t750 = t735 + t749;
-    const real t751 = t750 * t471;
-    const real t752 = t748 * t301;
-    const real t753 = U[5] * t303;
-    const real t754 = t752 - t753;
-    const real t755 = t754 * t418;
-    const real t756 = t746 * t259;
-    const real t757 = U[10] * t294;
-    const real t758 = t756 - t757;
-    const real t759 = t758 * t365;
-    const real t760 = t744 * t265;
-    const real t761 = U[14] * t291;
-    const real t762 = t760 - t761;
-    const real t763 = t762 * t374;
-    const real t764 = t742 * t271;
-    const real t765 = U[17] * t288;
-    const real t766 = t764 - t765;
-    const real t767 = t766 * t383;
-    const real t768 = t740 * t277;
-    const real t769 = U[19] * t285;
-    const real t770 = t768 - t769;
-    const real t771 = t770 * t392;
-    const real t772 = U[20] * t323;
-    const real t773 = t772 * t400;
-    const real t774 = t773 * t402;
-    const real t775 = t771 - t774;
-    const real t776 = t775 * t405;
-    const real t777 = t767 + t776;
-    const real t778 = t777 * t408;
-    const real t779 = t763 + t778;
-    const real t780 = t779 * t411;
-    const real t781 = t759 + t780;
-    const real t782 = t781 * t426;
-    const real t783 = t755 + t782;
-    const real t784 = t783 * t479;
-    const real t785 = t781 * t418;
-    const real t786 = t754 * t426;
-    const real t787 = t785 - t786;
-    const real t788 = t787 * t490;
-    const real t789 = t779 * t365;
-    const real t790 = t758 * t411;
-    const real t791 = t789 - t790;
-    const real t792 = t791 * t523;
-    const real t793 = t777 * t374;
-    const real t794 = t762 * t408;
-    const real t795 = t793 - t794;
-    const real t796 = t795 * t571;
-    const real t797 = t775 * t383;
-    const real t798 = t766 * t405;
-    const real t799 = t797 - t798;
-    const real t800 = t799 * t634;
-    const real t801 = t772 * t446;
-    const real t802 = 0.0 < t452;
-    const real t803 = t802 != 0 ? t452 : 1.0;
-    const real t804 = 1.0 / t803;
-    const real t805 = t447 * t804;
-    const real t806 = t802 != 0 ? t805 : 1.0;
-    const real t807 = t801 * t806;
-    const real t808 = t452 * t710;
-    const real t809 = t807 * t808;
-    const real t810 = t773 * t392;
-    const real t811 = t770 * t402;
-    const real t812 = t810 + t811;
-    const real t813 = t812 * t713;
-    const real t814 = t809 - t813;
-    const real t815 = t814 * t715;
-    const real t816 = t800 + t815;
-    const real t817 = t816 * t636;
-    const real t818 = t796 + t817;
-    const real t819 = t818 * t573;
-    const real t820 = t792 + t819;
-    const real t821 = t820 * t525;
-    const real t822 = t788 + t821;
-    const real t823 = t822 * t492;
-    const real t824 = t484 * t823;
-    const real t825 = t784 - t824;
-    const real t826 = t476 * t825;
-    const real t827 = t751 - t826;
-    const real t828 = t501 * t823;
-    const real t829 = t827 - t828;
-    G[5] = t829;
-    const real t830 = -t495;
-    G[6] = t830;
-    G[7] = t534;
-    G[8] = t584;
-    G[9] = t649;
-    G[10] = t730;
-    G[11] = t825;
-    G[12] = t493;
-    G[13] = t532;
-    G[14] = t582;
-    G[15] = t647;
-    G[16] = t728;
-    G[17] = t823;
-    const real t831 = t10 * 1e-26;
-    const real t832 = t831 < t10;
-    const real t833 = t832 != 0 ? 0.0 : e[0];
-    const real t834 = H[0] * t833;
-    const real t835 = t8 + t11;
-    const real t836 = 1e-26 * t835;
-    const real t837 = t836 < t8;
-    const real t838 = 1.0 / U[0];
-    const real t839 = e[0] * t838;
-    const real t840 = t832 != 0 ? t839 : 0.0;
-    const real t841 = U[1] * t840;
-    const real t842 = e[1] - t841;
-    const real t843 = t837 != 0 ? 0.0 : t842;
-    const real t844 = H[3] * t843;
-    const real t845 = t834 + t844;
-    const real t846 = t9 + t7;
-    const real t847 = t6 + t846;
-    const real t848 = 1e-26 * t847;
-    const real t849 = t848 < t6;
-    const real t850 = U[2] * t840;
-    const real t851 = 1.0 / U[6];
-    const real t852 = t842 * t851;
-    const real t853 = t837 != 0 ? t852 : 0.0;
-    const real t854 = U[7] * t853;
-    const real t855 = t850 + t854;
-    const real t856 = e[2] - t855;
-    const real t857 = t849 != 0 ? 0.0 : t856;
-    const real t858 = H[6] * t857;
-    const real t859 = t845 + t858;
-    const real t860 = t39 + t37;
-    const real t861 = t34 + t860;
-    const real t862 = t31 + t861;
-    const real t863 = 1e-26 * t862;
-    const real t864 = t863 < t31;
-    const real t865 = 1.0 / U[11];
-    const real t866 = t856 * t865;
-    const real t867 = t849 != 0 ? t866 : 0.0;
-    const real t868 = U[12] * t867;
-    const real t869 = U[3] * t840;
-    const real t870 = U[8] * t853;
-    const real t871 = t869 + t870;
-    const real t872 = t868 + t871;
-    const real t873 = e[3] - t872;
-    const real t874 = t864 != 0 ? 0.0 : t873;
-    const real t875 = H[9] * t874;
-    const real t876 = t859 + t875;
-    const real t877 = t40 + t36;
-    const real t878 = t33 + t877;
-    const real t879 = t30 + t878;
-    const real t880 = t28 + t879;
-    const real t881 = 1e-26 * t880;
-    const real t882 = t881 < t28;
-    const real t883 = 1.0 / U[15];
-    const real t884 = t873 * t883;
-    const real t885 = t864 != 0 ? t884 : 0.0;
-    const real t886 = U[16] * t885;
-    const real t887 = U[13] * t867;
-    const real t888 = U[4] * t840;
-    const real t889 = U[9] * t853;
-    const real t890 = t888 + t889;
-    const real t891 = t887 + t890;
-    const real t892 = t886 + t891;
-    const real t893 = e[4] - t892;
-    const real t894 = t882 != 0 ? 0.0 : t893;
-    const real t895 = H[12] * t894;
-    const real t896 = t876 + t895;
-    const real t897 = t38 + t35;
-    const real t898 = t32 + t897;
-    const real t899 = t29 + t898;
-    const real t900 = t27 + t899;
-    const real t901 = t26 + t900;
-    const real t902 = 1e-26 * t901;
-    const real t903 = t902 < t26;
-    const real t904 = 1.0 / U[18];
-    const real t905 = t893 * t904;
-    const real t906 = t882 != 0 ? t905 : 0.0;
-    const real t907 = U[19] * t906;
-    const real t908 = U[17] * t885;
-    const real t909 = U[14] * t867;
-    const real t910 = U[5] * t840;
-    const real t911 = U[10] * t853;
-    const real t912 = t910 + t911;
-    const real t913 = t909 + t912;
-    const real t914 = t908 + t913;
-    const real t915 = t907 + t914;
-    const real t916 = e[5] - t915;
-    const real t917 = t903 != 0 ? 0.0 : t916;
-    const real t918 = H[15] * t917;
-    const real t919 = t896 + t918;
-    const real t920 = tau[0] - t919;
-    const real t921 = t920 * t471;
-    const real t922 = d[0] + t840;
-    const real t923 = t922 * t301;
-    const real t924 = d[1] + t853;
-    const real t925 = t924 * t259;
-    const real t926 = d[2] + t867;
-    const real t927 = t926 * t265;
-    const real t928 = d[3] + t885;
-    const real t929 = t928 * t271;
-    const real t930 = d[4] + t906;
-    const real t931 = t930 * t277;
-    const real t932 = 1.0 / U[20];
-    const real t933 = t916 * t932;
-    const real t934 = t903 != 0 ? t933 : 0.0;
-    const real t935 = d[5] + t934;
-    const real t936 = t935 * t283;
-    const real t937 = t936 * t285;
-    const real t938 = t931 + t937;
-    const real t939 = t938 * t288;
-    const real t940 = t929 + t939;
-    const real t941 = t940 * t291;
-    const real t942 = t927 + t941;
-    const real t943 = t942 * t294;
-    const real t944 = t925 + t943;
-    const real t945 = t944 * t303;
-    const real t946 = t923 + t945;
-    const real t947 = t921 - t946;
-    const real t948 = t471 * t947;
-    const real t949 = H[1] * t833;
-    const real t950 = H[4] * t843;
-    const real t951 = t949 + t950;
-    const real t952 = H[7] * t857;
-    const real t953 = t951 + t952;
-    const real t954 = H[10] * t874;
-    const real t955 = t953 + t954;
-    const real t956 = H[13] * t894;
-    const real t957 = t955 + t956;
-    const real t958 = H[16] * t917;
-    const real t959 = t957 + t958;
-    const real t960 = tau[1] - t959;
-    const real t961 = t920 * t476;
-    const real t962 = t960 - t961;
-    const real t963 = t479 * t962;
-    const real t964 = t944 * t301;
-    const real t965 = t922 * t303;
-    const real t966 = t964 - t965;
-    const real t967 = t966 * t418;
-    const real t968 = t942 * t259;
-    const real t969 = t924 * t294;
-    const real t970 = t968 - t969;
-    const real t971 = t970 * t365;
-    const real t972 = t940 * t265;
-    const real t973 = t926 * t291;
-    const real t974 = t972 - t973;
-    const real t975 = t974 * t374;
-    const real t976 = t938 * t271;
-    const real t977 = t928 * t288;
-    const real t978 = t976 - t977;
-    const real t979 = t978 * t383;
-    const real t980 = t936 * t277;
-    const real t981 = t930 * t285;
-    const real t982 = t980 - t981;
-    const real t983 = t982 * t392;
-    const real t984 = t935 * t323;
-    const real t985 = t984 * t400;
-    const real t986 = t985 * t402;
-    const real t987 = t983 - t986;
-    const real t988 = t987 * t405;
-    const real t989 = t979 + t988;
-    const real t990 = t989 * t408;
-    const real t991 = t975 + t990;
-    const real t992 = t991 * t411;
-    const real t993 = t971 + t992;
-    const real t994 = t993 * t426;
-    const real t995 = t967 + t994;
-    const real t996 = t963 - t995;
-    const real t997 = t479 * t996;
-    const real t998 = H[2] * t833;
-    const real t999 = H[5] * t843;
-    const real t1000 = t998 + t999;
-    const real t1001 = H[8] * t857;
-    const real t1002 = t1000 + t1001;
-    const real t1003 = H[11] * t874;
-    const real t1004 = t1002 + t1003;
-    const real t1005 = H[14] * t894;
-    const real t1006 = t1004 + t1005;
-    const real t1007 = H[17] * t917;
-    const real t1008 = t1006 + t1007;
-    const real t1009 = tau[2] - t1008;
-    const real t1010 = t920 * t501;
-    const real t1011 = t1009 - t1010;
-    const real t1012 = t484 * t962;
-    const real t1013 = t1011 - t1012;
-    const real t1014 = t492 * t1013;
-    const real t1015 = t993 * t418;
-    const real t1016 = t966 * t426;
-    const real t1017 = t1015 - t1016;
-    const real t1018 = t1017 * t490;
-    const real t1019 = t991 * t365;
-    const real t1020 = t970 * t411;
-    const real t1021 = t1019 - t1020;
-    const real t1022 = t1021 * t523;
-    const real t1023 = t989 * t374;
-    const real t1024 = t974 * t408;
-    const real t1025 = t1023 - t1024;
-    const real t1026 = t1025 * t571;
-    const real t1027 = t987 * t383;
-    const real t1028 = t978 * t405;
-    const real t1029 = t1027 - t1028;
-    const real t1030 = t1029 * t634;
-    const real t1031 = t984 * t446;
-    const real t1032 = t1031 * t806;
-    const real t1033 = t1032 * t808;
-    const real t1034 = t985 * t392;
-    const real t1035 = t982 * t402;
-    const real t1036 = t1034 + t1035;
-    const real t1037 = t1036 * t713;
-    const real t1038 = t1033 - t1037;
-    const real t1039 = t1038 * t715;
-    const real t1040 = t1030 + t1039;
-    const real t1041 = t1040 * t636;
-    const real t1042 = t1026 + t1041;
-    const real t1043 = t1042 * t573;
-    const real t1044 = t1022 + t1043;
-    const real t1045 = t1044 * t525;
-    const real t1046 = t1018 + t1045;
-    const real t1047 = t1014 - t1046;
-    const real t1048 = t492 * t1047;
-    const real t1049 = t484 * t1048;
-    const real t1050 = t997 - t1049;
-    const real t1051 = t476 * t1050;
-    const real t1052 = t948 - t1051;
-    const real t1053 = t501 * t1048;
-    const real t1054 = t1052 - t1053;
-    g[0] = t1054;
-    g[1] = t1050;
-    g[2] = t1048;
-    const real t1055 = t485 * t525;
-    const real t1056 = -t1055;
-    const real t1057 = t1056 < 0.0;
-    const real t1058 = t1057 != 0 ? (-1.0) : 1.0;
-    const real t1059 = t1055 * t1058;
-    const real t1060 = -t1059;
-    V[0] = t1060;
-    const real t1061 = t524 * t490;
-    const real t1062 = t529 * t525;
-    const real t1063 = t1061 + t1062;
-    const real t1064 = t1063 * t1058;
-    V[1] = t1064;
-    const real t1065 = t579 * t490;
-    const real t1066 = t564 * t525;
-    const real t1067 = t1065 - t1066;
-    const real t1068 = t1067 * t1058;
-    V[2] = t1068;
-    const real t1069 = t644 * t490;
-    const real t1070 = t623 * t525;
-    const real t1071 = t1069 - t1070;
-    const real t1072 = t1071 * t1058;
-    V[3] = t1072;
-    const real t1073 = t725 * t490;
-    const real t1074 = t697 * t525;
-    const real t1075 = t1073 - t1074;
-    const real t1076 = t1075 * t1058;
-    V[4] = t1076;
-    const real t1077 = t820 * t490;
-    const real t1078 = t787 * t525;
-    const real t1079 = t1077 - t1078;
-    const real t1080 = t1079 * t1058;
-    V[5] = t1080;
-    const real t1081 = t518 * t573;
-    const real t1082 = -t1081;
-    const real t1083 = t1082 < 0.0;
-    const real t1084 = t1083 != 0 ? (-1.0) : 1.0;
-    const real t1085 = t1081 * t1084;
-    const real t1086 = -t1085;
-    V[6] = t1086;
-    const real t1087 = t572 * t523;
-    const real t1088 = t577 * t573;
-    const real t1089 = t1087 + t1088;
-    const real t1090 = t1089 * t1084;
-    V[7] = t1090;
-    const real t1091 = t642 * t523;
-    const real t1092 = t627 * t573;
-    const real t1093 = t1091 - t1092;
-    const real t1094 = t1093 * t1084;
-    V[8] = t1094;
-    const real t1095 = t723 * t523;
-    const real t1096 = t701 * t573;
-    const real t1097 = t1095 - t1096;
-    const real t1098 = t1097 * t1084;
-    V[9] = t1098;
-    const real t1099 = t818 * t523;
-    const real t1100 = t791 * t573;
-    const real t1101 = t1099 - t1100;
-    const real t1102 = t1101 * t1084;
-    V[10] = t1102;
-    const real t1103 = t566 * t636;
-    const real t1104 = -t1103;
-    const real t1105 = t1104 < 0.0;
-    const real t1106 = t1105 != 0 ? (-1.0) : 1.0;
-    const real t1107 = t1103 * t1106;
-    const real t1108 = -t1107;
-    V[11] = t1108;
-    const real t1109 = t635 * t571;
-    const real t1110 = t640 * t636;
-    const real t1111 = t1109 + t1110;
-    const real t1112 = t1111 * t1106;
-    V[12] = t1112;
-    const real t1113 = t721 * t571;
-    const real t1114 = t705 * t636;
-    const real t1115 = t1113 - t1114;
-    const real t1116 = t1115 * t1106;
-    V[13] = t1116;
-    const real t1117 = t816 * t571;
-    const real t1118 = t795 * t636;
-    const real t1119 = t1117 - t1118;
-    const real t1120 = t1119 * t1106;
-    V[14] = t1120;
-    const real t1121 = t629 * t715;
-    const real t1122 = -t1121;
-    const real t1123 = t1122 < 0.0;
-    const real t1124 = t1123 != 0 ? (-1.0) : 1.0;
-    const real t1125 = t1121 * t1124;
-    const real t1126 = -t1125;
-    V[15] = t1126;
-    const real t1127 = t714 * t634;
-    const real t1128 = t719 * t715;
-    const real t1129 = t1127 + t1128;
-    const real t1130 = t1129 * t1124;
-    V[16] = t1130;
-    const real t1131 = t814 * t634;
-    const real t1132 = t799 * t715;
-    const real t1133 = t1131 - t1132;
-    const real t1134 = t1133 * t1124;
-    V[17] = t1134;
-    const real t1135 = t707 * t808;
-    const real t1136 = -t1135;
-    const real t1137 = t1136 < 0.0;
-    const real t1138 = t1137 != 0 ? (-1.0) : 1.0;
-    const real t1139 = t1135 * t1138;
-    const real t1140 = -t1139;
-    V[18] = t1140;
-    const real t1141 = t807 * t713;
-    const real t1142 = t812 * t808;
-    const real t1143 = t1141 + t1142;
-    const real t1144 = t1143 * t1138;
-    V[19] = t1144;
-    const real t1145 = t449 * t804;
-    const real t1146 = t801 * t1145;
-    const real t1147 = -t1146;
-    const real t1148 = t1147 < 0.0;
-    const real t1149 = t1148 != 0 ? (-1.0) : 1.0;
-    const real t1150 = t1146 * t1149;
-    const real t1151 = -t1150;
-    V[20] = t1151;
-    const real t1152 = t1044 * t490;
-    const real t1153 = t1017 * t525;
-    const real t1154 = t1152 - t1153;
-    const real t1155 = t1154 * t1058;
-    d_V[0] = t1155;
-    const real t1156 = t1042 * t523;
-    const real t1157 = t1021 * t573;
-    const real t1158 = t1156 - t1157;
-    const real t1159 = t1158 * t1084;
-    d_V[1] = t1159;
-    const real t1160 = t1040 * t571;
-    const real t1161 = t1025 * t636;
-    const real t1162 = t1160 - t1161;
-    const real t1163 = t1162 * t1106;
-    d_V[2] = t1163;
-    const real t1164 = t1038 * t634;
-    const real t1165 = t1029 * t715;
-    const real t1166 = t1164 - t1165;
-    const real t1167 = t1166 * t1124;
-    d_V[3] = t1167;
-    const real t1168 = t1032 * t713;
-    const real t1169 = t1036 * t808;
-    const real t1170 = t1168 + t1169;
-    const real t1171 = t1170 * t1138;
-    d_V[4] = t1171;
-    const real t1172 = t1031 * t1145;
-    const real t1173 = t1172 * t1149;
-    const real t1174 = -t1173;
-    d_V[5] = t1174;
-    const real t1175 = t920 * t503;
-    const real t1176 = t960 * t495;
-    const real t1177 = t1175 - t1176;
-    const real t1178 = t1009 * t493;
-    const real t1179 = t1177 + t1178;
-    const real t1180 = t833 + t1179;
-    e_Q[0] = t1180;
-    const real t1181 = t920 * t538;
-    const real t1182 = t960 * t534;
-    const real t1183 = t1181 + t1182;
-    const real t1184 = t1009 * t532;
-    const real t1185 = t1183 + t1184;
-    const real t1186 = t843 + t1185;
-    e_Q[1] = t1186;
-    const real t1187 = t920 * t588;
-    const real t1188 = t960 * t584;
-    const real t1189 = t1187 + t1188;
-    const real t1190 = t1009 * t582;
-    const real t1191 = t1189 + t1190;
-    const real t1192 = t857 + t1191;
-    e_Q[2] = t1192;
-    const real t1193 = t920 * t653;
-    const real t1194 = t960 * t649;
-    const real t1195 = t1193 + t1194;
-    const real t1196 = t1009 * t647;
-    const real t1197 = t1195 + t1196;
-    const real t1198 = t874 + t1197;
-    e_Q[3] = t1198;
-    const real t1199 = t920 * t734;
-    const real t1200 = t960 * t730;
-    const real t1201 = t1199 + t1200;
-    const real t1202 = t1009 * t728;
-    const real t1203 = t1201 + t1202;
-    const real t1204 = t894 + t1203;
-    e_Q[4] = t1204;
-    const real t1205 = t920 * t829;
-    const real t1206 = t960 * t825;
-    const real t1207 = t1205 + t1206;
-    const real t1208 = t1009 * t823;
-    const real t1209 = t1207 + t1208;
-    const real t1210 = t917 + t1209;
-    e_Q[5] = t1210;
-    return 0;
+  real t6 = U[11] * U[11];
+  real t7 = U[7] * U[7];
+  real t8 = U[6] * U[6];
+  real t9 = U[2] * U[2];
+  real t10 = U[0] * U[0];
+  real t11 = U[1] * U[1];
+  real t17 = ((real)1 / (real)300000000000000) * (t6 + (t7 + (t8 + (t9 + (t10 + t11)))));
+  real t18 = (0.0 < floor_[0]) ? floor_[0] : t17;
+  real t26 = U[20] * U[20];
+  real t27 = U[19] * U[19];
+  real t28 = U[18] * U[18];
+  real t29 = U[17] * U[17];
+  real t30 = U[16] * U[16];
+  real t31 = U[15] * U[15];
+  real t32 = U[14] * U[14];
+  real t33 = U[13] * U[13];
+  real t34 = U[12] * U[12];
+  real t35 = U[10] * U[10];
+  real t36 = U[9] * U[9];
+  real t37 = U[8] * U[8];
+  real t38 = U[5] * U[5];
+  real t39 = U[3] * U[3];
+  real t40 = U[4] * U[4];
+  real t55 = ((real)1 / (real)300000000000000) * (t26 + (t27 + (t28 + (t29 + (t30 + (t31 + (t32 +
+    (t33 + (t34 + (t35 + (t36 + (t37 + (t38 + (t39 + t40))))))))))))));
+  real t56 = (0.0 < floor_[1]) ? floor_[1] : t55;
+  real t59 = H[15] * U[20];
+  real t60 = t59 * t59;
+  real t63 = H[12] * U[18] + H[15] * U[19];
+  real t64 = t63 * t63;
+  real t69 = H[9] * U[15] + H[12] * U[16] + H[15] * U[17];
+  real t70 = t69 * t69;
+  real t77 = H[6] * U[11] + H[9] * U[12] + H[12] * U[13] + H[15] * U[14];
+  real t78 = t77 * t77;
+  real t87 = H[3] * U[6] + H[6] * U[7] + H[9] * U[8] + H[12] * U[9] + H[15] * U[10];
+  real t88 = t87 * t87;
+  real t99 = H[0] * U[0] + H[3] * U[1] + H[6] * U[2] + H[9] * U[3] + H[12] * U[4] + H[15] * U[5];
+  real t100 = t99 * t99;
+  real t106 = t60 + (t64 + (t70 + (t78 + (t88 + (J[0] + t100)))));
+  if (!(((H[6] * H[6] + (H[0] * H[0] + H[3] * H[3])) * t18 + (H[15] * H[15] + (H[9] * H[9] + H[12] * H[12])) * t56 < t106))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  real t121 = H[16] * U[20];
+  real t125 = H[13] * U[18] + H[16] * U[19];
+  real t131 = H[10] * U[15] + H[13] * U[16] + H[16] * U[17];
+  real t139 = H[7] * U[11] + H[10] * U[12] + H[13] * U[13] + H[16] * U[14];
+  real t149 = H[4] * U[6] + H[7] * U[7] + H[10] * U[8] + H[13] * U[9] + H[16] * U[10];
+  real t161 = H[1] * U[0] + H[4] * U[1] + H[7] * U[2] + H[10] * U[3] + H[13] * U[4] + H[16] * U[5];
+  real t168 = t121 * t121 + (t125 * t125 + (t131 * t131 + (t139 * t139 + (t149 * t149 + (J[1] + t161
+    * t161)))));
+  if (!((t18 * (H[7] * H[7] + (H[1] * H[1] + H[4] * H[4])) + t56 * (H[16] * H[16] + (H[10] * H[10] + H[13] * H[13])) < t168))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  real t183 = H[17] * U[20];
+  real t187 = H[14] * U[18] + H[17] * U[19];
+  real t193 = H[11] * U[15] + H[14] * U[16] + H[17] * U[17];
+  real t201 = H[8] * U[11] + H[11] * U[12] + H[14] * U[13] + H[17] * U[14];
+  real t211 = H[5] * U[6] + H[8] * U[7] + H[11] * U[8] + H[14] * U[9] + H[17] * U[10];
+  real t223 = H[2] * U[0] + H[5] * U[1] + H[8] * U[2] + H[11] * U[3] + H[14] * U[4] + H[17] * U[5];
+  real t230 = t183 * t183 + (t187 * t187 + (t193 * t193 + (t201 * t201 + (t211 * t211 + (J[2] + t223
+    * t223)))));
+  if (!((t18 * (H[8] * H[8] + (H[2] * H[2] + H[5] * H[5])) + t56 * (H[17] * H[17] + (H[11] * H[11] + H[14] * H[14])) < t230))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  real t233 = sqrt(J[0]);
+  real t236 = sqrt(t60 + t233 * t233);
+  real t239 = sqrt(t64 + t236 * t236);
+  real t242 = sqrt(t70 + t239 * t239);
+  real t245 = sqrt(t78 + t242 * t242);
+  real t248 = sqrt(t88 + t245 * t245);
+  real t251 = sqrt(t100 + t248 * t248);
+  if (!((1e-26 * t106 < t251 * t251))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t255 = 0.0 < t248;
+  real t257 = 1.0 / (t255 != 0 ? t248 : 1.0);
+  real t258 = t87 * t257;
+  real t259 = t255 != 0 ? t258 : 1.0;
+  real t261 = 0.0 < t245;
+  real t263 = 1.0 / (t261 != 0 ? t245 : 1.0);
+  real t264 = t77 * t263;
+  real t265 = t261 != 0 ? t264 : 1.0;
+  real t267 = 0.0 < t242;
+  real t269 = 1.0 / (t267 != 0 ? t242 : 1.0);
+  real t270 = t69 * t269;
+  real t271 = t267 != 0 ? t270 : 1.0;
+  real t273 = 0.0 < t239;
+  real t275 = 1.0 / (t273 != 0 ? t239 : 1.0);
+  real t276 = t63 * t275;
+  real t277 = t273 != 0 ? t276 : 1.0;
+  real t279 = 0.0 < t236;
+  real t281 = 1.0 / (t279 != 0 ? t236 : 1.0);
+  real t282 = t59 * t281;
+  real t283 = t279 != 0 ? t282 : 1.0;
+  real t284 = t121 * t283;
+  real t285 = t236 * t275;
+  real t287 = t125 * t277 + t284 * t285;
+  real t288 = t239 * t269;
+  real t290 = t131 * t271 + t287 * t288;
+  real t291 = t242 * t263;
+  real t293 = t139 * t265 + t290 * t291;
+  real t294 = t245 * t257;
+  real t296 = t149 * t259 + t293 * t294;
+  real t297 = 0.0 < t251;
+  real t299 = 1.0 / (t297 != 0 ? t251 : 1.0);
+  real t300 = t99 * t299;
+  real t301 = t297 != 0 ? t300 : 1.0;
+  real t303 = t248 * t299;
+  real t305 = t296 * t301 - t161 * t303;
+  real t309 = t293 * t259 - t149 * t294;
+  real t313 = t290 * t265 - t139 * t291;
+  real t317 = t287 * t271 - t131 * t288;
+  real t321 = t284 * t277 - t125 * t285;
+  real t323 = t233 * t281;
+  real t324 = t121 * t323;
+  real t326 = sqrt(J[1]);
+  real t329 = sqrt(t324 * t324 + t326 * t326);
+  real t332 = sqrt(t321 * t321 + t329 * t329);
+  real t335 = sqrt(t317 * t317 + t332 * t332);
+  real t338 = sqrt(t313 * t313 + t335 * t335);
+  real t341 = sqrt(t309 * t309 + t338 * t338);
+  real t344 = sqrt(t305 * t305 + t341 * t341);
+  if (!((1e-26 * t168 < t344 * t344))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t351 = t183 * t283;
+  real t353 = t187 * t277 + t351 * t285;
+  real t355 = t193 * t271 + t353 * t288;
+  real t357 = t201 * t265 + t355 * t291;
+  real t360 = t357 * t259 - t211 * t294;
+  real t361 = 0.0 < t341;
+  real t363 = 1.0 / (t361 != 0 ? t341 : 1.0);
+  real t364 = t309 * t363;
+  real t365 = t361 != 0 ? t364 : 1.0;
+  real t369 = t355 * t265 - t201 * t291;
+  real t370 = 0.0 < t338;
+  real t372 = 1.0 / (t370 != 0 ? t338 : 1.0);
+  real t373 = t313 * t372;
+  real t374 = t370 != 0 ? t373 : 1.0;
+  real t378 = t353 * t271 - t193 * t288;
+  real t379 = 0.0 < t335;
+  real t381 = 1.0 / (t379 != 0 ? t335 : 1.0);
+  real t382 = t317 * t381;
+  real t383 = t379 != 0 ? t382 : 1.0;
+  real t387 = t351 * t277 - t187 * t285;
+  real t388 = 0.0 < t332;
+  real t390 = 1.0 / (t388 != 0 ? t332 : 1.0);
+  real t391 = t321 * t390;
+  real t392 = t388 != 0 ? t391 : 1.0;
+  real t394 = t183 * t323;
+  real t395 = 0.0 < t329;
+  real t397 = 1.0 / (t395 != 0 ? t329 : 1.0);
+  real t399 = -(t324 * t397);
+  real t400 = t395 != 0 ? t399 : 1.0;
+  real t401 = t394 * t400;
+  real t402 = t329 * t390;
+  real t404 = t387 * t392 - t401 * t402;
+  real t405 = t332 * t381;
+  real t407 = t378 * t383 + t404 * t405;
+  real t408 = t335 * t372;
+  real t410 = t369 * t374 + t407 * t408;
+  real t411 = t338 * t363;
+  real t413 = t360 * t365 + t410 * t411;
+  real t414 = 0.0 < t344;
+  real t416 = 1.0 / (t414 != 0 ? t344 : 1.0);
+  real t417 = t305 * t416;
+  real t418 = t414 != 0 ? t417 : 1.0;
+  real t422 = t211 * t259 + t357 * t294;
+  real t425 = t422 * t301 - t223 * t303;
+  real t426 = t341 * t416;
+  real t428 = t413 * t418 - t425 * t426;
+  real t432 = t410 * t365 - t360 * t411;
+  real t436 = t407 * t374 - t369 * t408;
+  real t440 = t404 * t383 - t378 * t405;
+  real t444 = t401 * t392 + t387 * t402;
+  real t446 = t326 * t397;
+  real t447 = t394 * t446;
+  real t449 = sqrt(J[2]);
+  real t452 = sqrt(t447 * t447 + t449 * t449);
+  real t455 = sqrt(t444 * t444 + t452 * t452);
+  real t458 = sqrt(t440 * t440 + t455 * t455);
+  real t461 = sqrt(t436 * t436 + t458 * t458);
+  real t464 = sqrt(t432 * t432 + t461 * t461);
+  real t467 = sqrt(t428 * t428 + t464 * t464);
+  if (!((1e-26 * t230 < t467 * t467))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t471 = 1.0 / t251;
+  real t476 = (t161 * t301 + t296 * t303) * t471;
+  real t477 = U[0] * t303;
+  real t479 = 1.0 / t344;
+  real t484 = (t425 * t418 + t413 * t426) * t479;
+  real t485 = t477 * t426;
+  real t486 = 0.0 < t467;
+  real t488 = 1.0 / (t486 != 0 ? t467 : 1.0);
+  real t489 = t428 * t488;
+  real t490 = t486 != 0 ? t489 : 1.0;
+  real t492 = 1.0 / t467;
+  real t493 = t485 * t490 * t492;
+  real t495 = t477 * t418 * t479 + t484 * t493;
+  real t501 = (t223 * t301 + t422 * t303) * t471;
+  real t503 = U[0] * t301 * t471 + t476 * t495 - t501 * t493;
+  G[0] = t503;
+  real t505 = U[6] * t259;
+  real t511 = t505 * t301 - U[1] * t303;
+  real t513 = U[6] * t294;
+  real t514 = t513 * t365;
+  real t518 = t513 * t411;
+  real t519 = 0.0 < t464;
+  real t521 = 1.0 / (t519 != 0 ? t464 : 1.0);
+  real t522 = t432 * t521;
+  real t523 = t519 != 0 ? t522 : 1.0;
+  real t524 = t518 * t523;
+  real t525 = t464 * t488;
+  real t529 = t514 * t418 + t511 * t426;
+  real t532 = (t524 * t525 - t529 * t490) * t492;
+  real t534 = (t511 * t418 - t514 * t426) * t479 - t484 * t532;
+  real t538 = (U[1] * t301 + t505 * t303) * t471 - t476 * t534 - t501 * t532;
+  G[1] = t538;
+  real t541 = U[11] * t265;
+  real t543 = U[7] * t259 + t541 * t294;
+  real t549 = t543 * t301 - U[2] * t303;
+  real t553 = t541 * t259 - U[7] * t294;
+  real t555 = U[11] * t291;
+  real t556 = t555 * t374;
+  real t558 = t553 * t365 - t556 * t411;
+  real t564 = t558 * t418 - t549 * t426;
+  real t566 = t555 * t408;
+  real t567 = 0.0 < t461;
+  real t569 = 1.0 / (t567 != 0 ? t461 : 1.0);
+  real t570 = t436 * t569;
+  real t571 = t567 != 0 ? t570 : 1.0;
+  real t572 = t566 * t571;
+  real t573 = t461 * t521;
+  real t577 = t556 * t365 + t553 * t411;
+  real t579 = t572 * t573 - t577 * t523;
+  real t582 = (t564 * t490 + t579 * t525) * t492;
+  real t584 = (t549 * t418 + t558 * t426) * t479 - t484 * t582;
+  real t588 = (U[2] * t301 + t543 * t303) * t471 - t476 * t584 - t501 * t582;
+  G[2] = t588;
+  real t592 = U[15] * t271;
+  real t594 = U[12] * t265 + t592 * t291;
+  real t596 = U[8] * t259 + t594 * t294;
+  real t602 = t596 * t301 - U[3] * t303;
+  real t606 = t594 * t259 - U[8] * t294;
+  real t610 = t592 * t265 - U[12] * t291;
+  real t612 = U[15] * t288;
+  real t613 = t612 * t383;
+  real t615 = t610 * t374 - t613 * t408;
+  real t617 = t606 * t365 + t615 * t411;
+  real t623 = t617 * t418 - t602 * t426;
+  real t627 = t615 * t365 - t606 * t411;
+  real t629 = t612 * t405;
+  real t630 = 0.0 < t458;
+  real t632 = 1.0 / (t630 != 0 ? t458 : 1.0);
+  real t633 = t440 * t632;
+  real t634 = t630 != 0 ? t633 : 1.0;
+  real t635 = t629 * t634;
+  real t636 = t458 * t569;
+  real t640 = t613 * t374 + t610 * t408;
+  real t642 = t635 * t636 - t640 * t571;
+  real t644 = t627 * t523 + t642 * t573;
+  real t647 = (t623 * t490 + t644 * t525) * t492;
+  real t649 = (t602 * t418 + t617 * t426) * t479 - t484 * t647;
+  real t653 = (U[3] * t301 + t596 * t303) * t471 - t476 * t649 - t501 * t647;
+  G[3] = t653;
+  real t658 = U[18] * t277;
+  real t660 = U[16] * t271 + t658 * t288;
+  real t662 = U[13] * t265 + t660 * t291;
+  real t664 = U[9] * t259 + t662 * t294;
+  real t670 = t664 * t301 - U[4] * t303;
+  real t674 = t662 * t259 - U[9] * t294;
+  real t678 = t660 * t265 - U[13] * t291;
+  real t682 = t658 * t271 - U[16] * t288;
+  real t684 = U[18] * t285;
+  real t685 = t684 * t392;
+  real t687 = t682 * t383 - t685 * t405;
+  real t689 = t678 * t374 + t687 * t408;
+  real t691 = t674 * t365 + t689 * t411;
+  real t697 = t691 * t418 - t670 * t426;
+  real t701 = t689 * t365 - t674 * t411;
+  real t705 = t687 * t374 - t678 * t408;
+  real t707 = t684 * t402;
+  real t708 = 0.0 < t455;
+  real t710 = 1.0 / (t708 != 0 ? t455 : 1.0);
+  real t712 = -(t444 * t710);
+  real t713 = t708 != 0 ? t712 : 1.0;
+  real t714 = t707 * t713;
+  real t715 = t455 * t632;
+  real t719 = t685 * t383 + t682 * t405;
+  real t721 = t714 * t715 - t719 * t634;
+  real t723 = t705 * t571 + t721 * t636;
+  real t725 = t701 * t523 + t723 * t573;
+  real t728 = (t697 * t490 + t725 * t525) * t492;
+  real t730 = (t670 * t418 + t691 * t426) * t479 - t484 * t728;
+  real t734 = (U[4] * t301 + t664 * t303) * t471 - t476 * t730 - t501 * t728;
+  G[4] = t734;
+  real t740 = U[20] * t283;
+  real t742 = U[19] * t277 + t740 * t285;
+  real t744 = U[17] * t271 + t742 * t288;
+  real t746 = U[14] * t265 + t744 * t291;
+  real t748 = U[10] * t259 + t746 * t294;
+  real t754 = t748 * t301 - U[5] * t303;
+  real t758 = t746 * t259 - U[10] * t294;
+  real t762 = t744 * t265 - U[14] * t291;
+  real t766 = t742 * t271 - U[17] * t288;
+  real t770 = t740 * t277 - U[19] * t285;
+  real t772 = U[20] * t323;
+  real t773 = t772 * t400;
+  real t775 = t770 * t392 - t773 * t402;
+  real t777 = t766 * t383 + t775 * t405;
+  real t779 = t762 * t374 + t777 * t408;
+  real t781 = t758 * t365 + t779 * t411;
+  real t787 = t781 * t418 - t754 * t426;
+  real t791 = t779 * t365 - t758 * t411;
+  real t795 = t777 * t374 - t762 * t408;
+  real t799 = t775 * t383 - t766 * t405;
+  real t801 = t772 * t446;
+  real t802 = 0.0 < t452;
+  real t804 = 1.0 / (t802 != 0 ? t452 : 1.0);
+  real t805 = t447 * t804;
+  real t806 = t802 != 0 ? t805 : 1.0;
+  real t807 = t801 * t806;
+  real t808 = t452 * t710;
+  real t812 = t773 * t392 + t770 * t402;
+  real t814 = t807 * t808 - t812 * t713;
+  real t816 = t799 * t634 + t814 * t715;
+  real t818 = t795 * t571 + t816 * t636;
+  real t820 = t791 * t523 + t818 * t573;
+  real t823 = (t787 * t490 + t820 * t525) * t492;
+  real t825 = (t754 * t418 + t781 * t426) * t479 - t484 * t823;
+  real t829 = (U[5] * t301 + t748 * t303) * t471 - t476 * t825 - t501 * t823;
+  G[5] = t829;
+  G[6] = -t495;
+  G[7] = t534;
+  G[8] = t584;
+  G[9] = t649;
+  G[10] = t730;
+  G[11] = t825;
+  G[12] = t493;
+  G[13] = t532;
+  G[14] = t582;
+  G[15] = t647;
+  G[16] = t728;
+  G[17] = t823;
+  real t832 = t10 * 1e-26 < t10;
+  real t833 = t832 != 0 ? 0.0 : e[0];
+  real t837 = 1e-26 * (t8 + t11) < t8;
+  real t839 = e[0] * (1.0 / U[0]);
+  real t840 = t832 != 0 ? t839 : 0.0;
+  real t842 = e[1] - U[1] * t840;
+  real t843 = t837 != 0 ? 0.0 : t842;
+  real t849 = 1e-26 * (t6 + (t9 + t7)) < t6;
+  real t852 = t842 * (1.0 / U[6]);
+  real t853 = t837 != 0 ? t852 : 0.0;
+  real t856 = e[2] - (U[2] * t840 + U[7] * t853);
+  real t857 = t849 != 0 ? 0.0 : t856;
+  real t864 = 1e-26 * (t31 + (t34 + (t39 + t37))) < t31;
+  real t866 = t856 * (1.0 / U[11]);
+  real t867 = t849 != 0 ? t866 : 0.0;
+  real t873 = e[3] - (U[12] * t867 + (U[3] * t840 + U[8] * t853));
+  real t874 = t864 != 0 ? 0.0 : t873;
+  real t882 = 1e-26 * (t28 + (t30 + (t33 + (t40 + t36)))) < t28;
+  real t884 = t873 * (1.0 / U[15]);
+  real t885 = t864 != 0 ? t884 : 0.0;
+  real t893 = e[4] - (U[16] * t885 + (U[13] * t867 + (U[4] * t840 + U[9] * t853)));
+  real t894 = t882 != 0 ? 0.0 : t893;
+  real t903 = 1e-26 * (t26 + (t27 + (t29 + (t32 + (t38 + t35))))) < t26;
+  real t905 = t893 * (1.0 / U[18]);
+  real t906 = t882 != 0 ? t905 : 0.0;
+  real t916 = e[5] - (U[19] * t906 + (U[17] * t885 + (U[14] * t867 + (U[5] * t840 + U[10] *
+    t853))));
+  real t917 = t903 != 0 ? 0.0 : t916;
+  real t920 = tau[0] - (H[0] * t833 + H[3] * t843 + H[6] * t857 + H[9] * t874 + H[12] * t894 + H[15]
+    * t917);
+  real t922 = d[0] + t840;
+  real t924 = d[1] + t853;
+  real t926 = d[2] + t867;
+  real t928 = d[3] + t885;
+  real t930 = d[4] + t906;
+  real t933 = t916 * (1.0 / U[20]);
+  real t935 = d[5] + (t903 != 0 ? t933 : 0.0);
+  real t936 = t935 * t283;
+  real t938 = t930 * t277 + t936 * t285;
+  real t940 = t928 * t271 + t938 * t288;
+  real t942 = t926 * t265 + t940 * t291;
+  real t944 = t924 * t259 + t942 * t294;
+  real t960 = tau[1] - (H[1] * t833 + H[4] * t843 + H[7] * t857 + H[10] * t874 + H[13] * t894 +
+    H[16] * t917);
+  real t962 = t960 - t920 * t476;
+  real t966 = t944 * t301 - t922 * t303;
+  real t970 = t942 * t259 - t924 * t294;
+  real t974 = t940 * t265 - t926 * t291;
+  real t978 = t938 * t271 - t928 * t288;
+  real t982 = t936 * t277 - t930 * t285;
+  real t984 = t935 * t323;
+  real t985 = t984 * t400;
+  real t987 = t982 * t392 - t985 * t402;
+  real t989 = t978 * t383 + t987 * t405;
+  real t991 = t974 * t374 + t989 * t408;
+  real t993 = t970 * t365 + t991 * t411;
+  real t1009 = tau[2] - (H[2] * t833 + H[5] * t843 + H[8] * t857 + H[11] * t874 + H[14] * t894 +
+    H[17] * t917);
+  real t1017 = t993 * t418 - t966 * t426;
+  real t1021 = t991 * t365 - t970 * t411;
+  real t1025 = t989 * t374 - t974 * t408;
+  real t1029 = t987 * t383 - t978 * t405;
+  real t1031 = t984 * t446;
+  real t1032 = t1031 * t806;
+  real t1036 = t985 * t392 + t982 * t402;
+  real t1038 = t1032 * t808 - t1036 * t713;
+  real t1040 = t1029 * t634 + t1038 * t715;
+  real t1042 = t1025 * t571 + t1040 * t636;
+  real t1044 = t1021 * t523 + t1042 * t573;
+  real t1048 = t492 * (t492 * (t1009 - t920 * t501 - t484 * t962) - (t1017 * t490 + t1044 * t525));
+  real t1050 = t479 * (t479 * t962 - (t966 * t418 + t993 * t426)) - t484 * t1048;
+  g[0] = t471 * (t920 * t471 - (t922 * t301 + t944 * t303)) - t476 * t1050 - t501 * t1048;
+  g[1] = t1050;
+  g[2] = t1048;
+  real t1055 = t485 * t525;
+  real t1058 = (-t1055 < 0.0) ? (-1.0) : 1.0;
+  V[0] = -(t1055 * t1058);
+  V[1] = (t524 * t490 + t529 * t525) * t1058;
+  V[2] = (t579 * t490 - t564 * t525) * t1058;
+  V[3] = (t644 * t490 - t623 * t525) * t1058;
+  V[4] = (t725 * t490 - t697 * t525) * t1058;
+  V[5] = (t820 * t490 - t787 * t525) * t1058;
+  real t1081 = t518 * t573;
+  real t1084 = (-t1081 < 0.0) ? (-1.0) : 1.0;
+  V[6] = -(t1081 * t1084);
+  V[7] = (t572 * t523 + t577 * t573) * t1084;
+  V[8] = (t642 * t523 - t627 * t573) * t1084;
+  V[9] = (t723 * t523 - t701 * t573) * t1084;
+  V[10] = (t818 * t523 - t791 * t573) * t1084;
+  real t1103 = t566 * t636;
+  real t1106 = (-t1103 < 0.0) ? (-1.0) : 1.0;
+  V[11] = -(t1103 * t1106);
+  V[12] = (t635 * t571 + t640 * t636) * t1106;
+  V[13] = (t721 * t571 - t705 * t636) * t1106;
+  V[14] = (t816 * t571 - t795 * t636) * t1106;
+  real t1121 = t629 * t715;
+  real t1124 = (-t1121 < 0.0) ? (-1.0) : 1.0;
+  V[15] = -(t1121 * t1124);
+  V[16] = (t714 * t634 + t719 * t715) * t1124;
+  V[17] = (t814 * t634 - t799 * t715) * t1124;
+  real t1135 = t707 * t808;
+  real t1138 = (-t1135 < 0.0) ? (-1.0) : 1.0;
+  V[18] = -(t1135 * t1138);
+  V[19] = (t807 * t713 + t812 * t808) * t1138;
+  real t1145 = t449 * t804;
+  real t1146 = t801 * t1145;
+  real t1149 = (-t1146 < 0.0) ? (-1.0) : 1.0;
+  V[20] = -(t1146 * t1149);
+  d_V[0] = (t1044 * t490 - t1017 * t525) * t1058;
+  d_V[1] = (t1042 * t523 - t1021 * t573) * t1084;
+  d_V[2] = (t1040 * t571 - t1025 * t636) * t1106;
+  d_V[3] = (t1038 * t634 - t1029 * t715) * t1124;
+  d_V[4] = (t1032 * t713 + t1036 * t808) * t1138;
+  d_V[5] = -(t1031 * t1145 * t1149);
+  e_Q[0] = t833 + (t920 * t503 - t960 * t495 + t1009 * t493);
+  e_Q[1] = t843 + (t920 * t538 + t960 * t534 + t1009 * t532);
+  e_Q[2] = t857 + (t920 * t588 + t960 * t584 + t1009 * t582);
+  e_Q[3] = t874 + (t920 * t653 + t960 * t649 + t1009 * t647);
+  e_Q[4] = t894 + (t920 * t734 + t960 * t730 + t1009 * t728);
+  e_Q[5] = t917 + (t920 * t829 + t960 * t825 + t1009 * t823);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_qr_eliminate_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_qr_eliminate_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic3_qr_eliminate_guards[] = {
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic3_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 3 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4725,115 +1279,30 @@ static const mstmm_guard mstmm_sweep_generic3_qr_eliminate_guards[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic3_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic3_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = H[9] * s[0];
-    const real t7 = H[10] * s[1];
-    const real t8 = t6 + t7;
-    const real t9 = H[11] * s[2];
-    const real t10 = t8 + t9;
-    const real t11 = c[3] + t10;
-    const real t12 = t5 - t11;
-    const real t13 = motion[3] + t12;
-    Q[3] = t13;
-    const real t14 = w[2] * t0;
-    const real t15 = w[0] * t2;
-    const real t16 = t14 - t15;
-    const real t17 = H[12] * s[0];
-    const real t18 = H[13] * s[1];
-    const real t19 = t17 + t18;
-    const real t20 = H[14] * s[2];
-    const real t21 = t19 + t20;
-    const real t22 = c[4] + t21;
-    const real t23 = t16 - t22;
-    const real t24 = motion[4] + t23;
-    Q[4] = t24;
-    const real t25 = w[0] * t1;
-    const real t26 = w[1] * t0;
-    const real t27 = t25 - t26;
-    const real t28 = H[15] * s[0];
-    const real t29 = H[16] * s[1];
-    const real t30 = t28 + t29;
-    const real t31 = H[17] * s[2];
-    const real t32 = t30 + t31;
-    const real t33 = c[5] + t32;
-    const real t34 = t27 - t33;
-    const real t35 = motion[5] + t34;
-    Q[5] = t35;
-    const real t36 = v[1] * t2;
-    const real t37 = t36 * 2.0;
-    const real t38 = v[2] * t1;
-    const real t39 = 2.0 * t38;
-    const real t40 = t37 - t39;
-    const real t41 = H[0] * s[0];
-    const real t42 = H[1] * s[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[2] * s[2];
-    const real t45 = t43 + t44;
-    const real t46 = c[0] + t45;
-    const real t47 = t40 - t46;
-    const real t48 = motion[6] + t47;
-    Q[6] = t48;
-    const real t49 = v[2] * t0;
-    const real t50 = 2.0 * t49;
-    const real t51 = v[0] * t2;
-    const real t52 = 2.0 * t51;
-    const real t53 = t50 - t52;
-    const real t54 = H[3] * s[0];
-    const real t55 = H[4] * s[1];
-    const real t56 = t54 + t55;
-    const real t57 = H[5] * s[2];
-    const real t58 = t56 + t57;
-    const real t59 = c[1] + t58;
-    const real t60 = t53 - t59;
-    const real t61 = motion[7] + t60;
-    Q[7] = t61;
-    const real t62 = v[0] * t1;
-    const real t63 = 2.0 * t62;
-    const real t64 = v[1] * t0;
-    const real t65 = 2.0 * t64;
-    const real t66 = t63 - t65;
-    const real t67 = H[6] * s[0];
-    const real t68 = H[7] * s[1];
-    const real t69 = t67 + t68;
-    const real t70 = H[8] * s[2];
-    const real t71 = t69 + t70;
-    const real t72 = c[2] + t71;
-    const real t73 = t66 - t72;
-    const real t74 = motion[8] + t73;
-    Q[8] = t74;
-    return 0;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - (c[3] + (H[9] * s[0] + H[10] * s[1] + H[11] * s[2])));
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - (c[4] + (H[12] * s[0] + H[13] * s[1] + H[14] *
+    s[2])));
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - (c[5] + (H[15] * s[0] + H[16] * s[1] + H[17] *
+    s[2])));
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - (c[0] + (H[0] * s[0] + H[1] * s[1] +
+    H[2] * s[2])));
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - (c[1] + (H[3] * s[0] + H[4] * s[1] +
+    H[5] * s[2])));
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - (c[2] + (H[6] * s[0] + H[7] * s[1] +
+    H[8] * s[2])));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_carrier_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 3 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4857,333 +1326,60 @@ static const mstmm_port mstmm_sweep_generic3_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic3_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic3_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = H[9] * d_s[0];
-    const real t16 = H[10] * d_s[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[11] * d_s[2];
-    const real t19 = t17 + t18;
-    const real t20 = s[0] * d_H[9];
-    const real t21 = s[1] * d_H[10];
-    const real t22 = t20 + t21;
-    const real t23 = s[2] * d_H[11];
-    const real t24 = t22 + t23;
-    const real t25 = t19 + t24;
-    const real t26 = d_c[3] + t25;
-    const real t27 = theta[2] * Q[4];
-    const real t28 = Q[1] * d_w[2];
-    const real t29 = Q[2] * d_w[1];
-    const real t30 = t28 - t29;
-    const real t31 = t27 + t30;
-    const real t32 = theta[1] * Q[5];
-    const real t33 = t31 - t32;
-    const real t34 = t26 + t33;
-    const real t35 = t14 + t34;
-    B[3] = t35;
-    const real t36 = w[0] * t10;
-    const real t37 = w[2] * t2;
-    const real t38 = t36 - t37;
-    const real t39 = H[12] * d_s[0];
-    const real t40 = H[13] * d_s[1];
-    const real t41 = t39 + t40;
-    const real t42 = H[14] * d_s[2];
-    const real t43 = t41 + t42;
-    const real t44 = s[0] * d_H[12];
-    const real t45 = s[1] * d_H[13];
-    const real t46 = t44 + t45;
-    const real t47 = s[2] * d_H[14];
-    const real t48 = t46 + t47;
-    const real t49 = t43 + t48;
-    const real t50 = d_c[4] + t49;
-    const real t51 = theta[0] * Q[5];
-    const real t52 = Q[2] * d_w[0];
-    const real t53 = Q[0] * d_w[2];
-    const real t54 = t52 - t53;
-    const real t55 = theta[2] * Q[3];
-    const real t56 = t54 - t55;
-    const real t57 = t51 + t56;
-    const real t58 = t50 + t57;
-    const real t59 = t38 + t58;
-    B[4] = t59;
-    const real t60 = w[1] * t2;
-    const real t61 = w[0] * t6;
-    const real t62 = t60 - t61;
-    const real t63 = H[15] * d_s[0];
-    const real t64 = H[16] * d_s[1];
-    const real t65 = t63 + t64;
-    const real t66 = H[17] * d_s[2];
-    const real t67 = t65 + t66;
-    const real t68 = s[0] * d_H[15];
-    const real t69 = s[1] * d_H[16];
-    const real t70 = t68 + t69;
-    const real t71 = s[2] * d_H[17];
-    const real t72 = t70 + t71;
-    const real t73 = t67 + t72;
-    const real t74 = d_c[5] + t73;
-    const real t75 = theta[1] * Q[3];
-    const real t76 = Q[0] * d_w[1];
-    const real t77 = Q[1] * d_w[0];
-    const real t78 = t76 - t77;
-    const real t79 = t75 + t78;
-    const real t80 = theta[0] * Q[4];
-    const real t81 = t79 - t80;
-    const real t82 = t74 + t81;
-    const real t83 = t62 + t82;
-    B[5] = t83;
-    const real t84 = v[2] * 2.0;
-    const real t85 = t6 * t84;
-    const real t86 = v[1] * 2.0;
-    const real t87 = t10 * t86;
-    const real t88 = t85 - t87;
-    const real t89 = H[0] * d_s[0];
-    const real t90 = H[1] * d_s[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[2] * d_s[2];
-    const real t93 = t91 + t92;
-    const real t94 = s[0] * d_H[0];
-    const real t95 = s[1] * d_H[1];
-    const real t96 = t94 + t95;
-    const real t97 = s[2] * d_H[2];
-    const real t98 = t96 + t97;
-    const real t99 = t93 + t98;
-    const real t100 = d_c[0] + t99;
-    const real t101 = theta[2] * Q[7];
-    const real t102 = x[2] * Q[4];
-    const real t103 = Q[1] * d_v[2];
-    const real t104 = 2.0 * t103;
-    const real t105 = x[1] * Q[0];
-    const real t106 = x[0] * Q[1];
-    const real t107 = t105 - t106;
-    const real t108 = Q[1] * t107;
-    const real t109 = x[0] * Q[2];
-    const real t110 = x[2] * Q[0];
-    const real t111 = t109 - t110;
-    const real t112 = Q[2] * t111;
-    const real t113 = t108 - t112;
-    const real t114 = t104 + t113;
-    const real t115 = Q[2] * d_v[1];
-    const real t116 = 2.0 * t115;
-    const real t117 = t114 - t116;
-    const real t118 = t102 + t117;
-    const real t119 = x[1] * Q[5];
-    const real t120 = t118 - t119;
-    const real t121 = t101 + t120;
-    const real t122 = theta[1] * Q[8];
-    const real t123 = t121 - t122;
-    const real t124 = t100 + t123;
-    const real t125 = t88 + t124;
-    B[6] = t125;
-    const real t126 = v[0] * 2.0;
-    const real t127 = t10 * t126;
-    const real t128 = t2 * t84;
-    const real t129 = t127 - t128;
-    const real t130 = H[3] * d_s[0];
-    const real t131 = H[4] * d_s[1];
-    const real t132 = t130 + t131;
-    const real t133 = H[5] * d_s[2];
-    const real t134 = t132 + t133;
-    const real t135 = s[0] * d_H[3];
-    const real t136 = s[1] * d_H[4];
-    const real t137 = t135 + t136;
-    const real t138 = s[2] * d_H[5];
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = d_c[1] + t140;
-    const real t142 = theta[0] * Q[8];
-    const real t143 = x[0] * Q[5];
-    const real t144 = Q[2] * d_v[0];
-    const real t145 = 2.0 * t144;
-    const real t146 = x[2] * Q[1];
-    const real t147 = x[1] * Q[2];
-    const real t148 = t146 - t147;
-    const real t149 = Q[2] * t148;
-    const real t150 = Q[0] * t107;
-    const real t151 = t149 - t150;
-    const real t152 = Q[0] * d_v[2];
-    const real t153 = 2.0 * t152;
-    const real t154 = t151 - t153;
-    const real t155 = t145 + t154;
-    const real t156 = x[2] * Q[3];
-    const real t157 = t155 - t156;
-    const real t158 = t143 + t157;
-    const real t159 = theta[2] * Q[6];
-    const real t160 = t158 - t159;
-    const real t161 = t142 + t160;
-    const real t162 = t141 + t161;
-    const real t163 = t129 + t162;
-    B[7] = t163;
-    const real t164 = t2 * t86;
-    const real t165 = t6 * t126;
-    const real t166 = t164 - t165;
-    const real t167 = H[6] * d_s[0];
-    const real t168 = H[7] * d_s[1];
-    const real t169 = t167 + t168;
-    const real t170 = H[8] * d_s[2];
-    const real t171 = t169 + t170;
-    const real t172 = s[0] * d_H[6];
-    const real t173 = s[1] * d_H[7];
-    const real t174 = t172 + t173;
-    const real t175 = s[2] * d_H[8];
-    const real t176 = t174 + t175;
-    const real t177 = t171 + t176;
-    const real t178 = d_c[2] + t177;
-    const real t179 = theta[1] * Q[6];
-    const real t180 = x[1] * Q[3];
-    const real t181 = Q[0] * d_v[1];
-    const real t182 = 2.0 * t181;
-    const real t183 = Q[0] * t111;
-    const real t184 = Q[1] * t148;
-    const real t185 = t183 - t184;
-    const real t186 = t182 + t185;
-    const real t187 = Q[1] * d_v[0];
-    const real t188 = 2.0 * t187;
-    const real t189 = t186 - t188;
-    const real t190 = t180 + t189;
-    const real t191 = x[0] * Q[4];
-    const real t192 = t190 - t191;
-    const real t193 = t179 + t192;
-    const real t194 = theta[0] * Q[7];
-    const real t195 = t193 - t194;
-    const real t196 = t178 + t195;
-    const real t197 = t166 + t196;
-    B[8] = t197;
-    const real t198 = theta[1] * f[2];
-    const real t199 = theta[2] * f[1];
-    const real t200 = t198 - t199;
-    G[0] = t200;
-    const real t201 = theta[2] * f[0];
-    const real t202 = theta[0] * f[2];
-    const real t203 = t201 - t202;
-    G[1] = t203;
-    const real t204 = theta[0] * f[1];
-    const real t205 = theta[1] * f[0];
-    const real t206 = t204 - t205;
-    G[2] = t206;
-    const real t207 = theta[1] * f[5];
-    const real t208 = x[1] * f[2];
-    const real t209 = x[2] * f[1];
-    const real t210 = t208 - t209;
-    const real t211 = theta[2] * f[4];
-    const real t212 = t210 - t211;
-    const real t213 = t207 + t212;
-    G[3] = t213;
-    const real t214 = theta[2] * f[3];
-    const real t215 = x[2] * f[0];
-    const real t216 = x[0] * f[2];
-    const real t217 = t215 - t216;
-    const real t218 = t214 + t217;
-    const real t219 = theta[0] * f[5];
-    const real t220 = t218 - t219;
-    G[4] = t220;
-    const real t221 = theta[0] * f[4];
-    const real t222 = x[0] * f[1];
-    const real t223 = x[1] * f[0];
-    const real t224 = t222 - t223;
-    const real t225 = theta[1] * f[3];
-    const real t226 = t224 - t225;
-    const real t227 = t221 + t226;
-    G[5] = t227;
-    const real t228 = d_s[0] * J[0];
-    const real t229 = f[0] * d_H[0];
-    const real t230 = f[1] * d_H[3];
-    const real t231 = t229 + t230;
-    const real t232 = f[2] * d_H[6];
-    const real t233 = t231 + t232;
-    const real t234 = f[3] * d_H[9];
-    const real t235 = t233 + t234;
-    const real t236 = f[4] * d_H[12];
-    const real t237 = t235 + t236;
-    const real t238 = f[5] * d_H[15];
-    const real t239 = t237 + t238;
-    const real t240 = t239 - laws[0];
-    const real t241 = t228 + t240;
-    row[0] = t241;
-    const real t242 = d_s[1] * J[1];
-    const real t243 = f[0] * d_H[1];
-    const real t244 = f[1] * d_H[4];
-    const real t245 = t243 + t244;
-    const real t246 = f[2] * d_H[7];
-    const real t247 = t245 + t246;
-    const real t248 = f[3] * d_H[10];
-    const real t249 = t247 + t248;
-    const real t250 = f[4] * d_H[13];
-    const real t251 = t249 + t250;
-    const real t252 = f[5] * d_H[16];
-    const real t253 = t251 + t252;
-    const real t254 = t253 - laws[1];
-    const real t255 = t242 + t254;
-    row[1] = t255;
-    const real t256 = d_s[2] * J[2];
-    const real t257 = f[0] * d_H[2];
-    const real t258 = f[1] * d_H[5];
-    const real t259 = t257 + t258;
-    const real t260 = f[2] * d_H[8];
-    const real t261 = t259 + t260;
-    const real t262 = f[3] * d_H[11];
-    const real t263 = t261 + t262;
-    const real t264 = f[4] * d_H[14];
-    const real t265 = t263 + t264;
-    const real t266 = f[5] * d_H[17];
-    const real t267 = t265 + t266;
-    const real t268 = t267 - laws[2];
-    const real t269 = t256 + t268;
-    row[2] = t269;
-    return 0;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (H[9] * d_s[0] + H[10] * d_s[1] + H[11] * d_s[2] + (s[0]
+    * d_H[9] + s[1] * d_H[10] + s[2] * d_H[11])) + (theta[2] * Q[4] + (Q[1] * d_w[2] - Q[2] *
+    d_w[1]) - theta[1] * Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] +
+    (s[0] * d_H[12] + s[1] * d_H[13] + s[2] * d_H[14])) + (theta[0] * Q[5] + (Q[2] * d_w[0] - Q[0] *
+    d_w[2] - theta[2] * Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (H[15] * d_s[0] + H[16] * d_s[1] + H[17] * d_s[2] + (s[0]
+    * d_H[15] + s[1] * d_H[16] + s[2] * d_H[17])) + (theta[1] * Q[3] + (Q[0] * d_w[1] - Q[1] *
+    d_w[0]) - theta[0] * Q[4]));
+  real t84 = v[2] * 2.0;
+  real t86 = v[1] * 2.0;
+  real t107 = x[1] * Q[0] - x[0] * Q[1];
+  real t111 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t84 - t10 * t86 + (d_c[0] + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + (s[0] *
+    d_H[0] + s[1] * d_H[1] + s[2] * d_H[2])) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] *
+    d_v[2]) + (Q[1] * t107 - Q[2] * t111) - 2.0 * (Q[2] * d_v[1])) - x[1] * Q[5]) - theta[1] *
+    Q[8]));
+  real t126 = v[0] * 2.0;
+  real t148 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t126 - t2 * t84 + (d_c[1] + (H[3] * d_s[0] + H[4] * d_s[1] + H[5] * d_s[2] + (s[0] *
+    d_H[3] + s[1] * d_H[4] + s[2] * d_H[5])) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] *
+    d_v[0]) + (Q[2] * t148 - Q[0] * t107 - 2.0 * (Q[0] * d_v[2])) - x[2] * Q[3]) - theta[2] *
+    Q[6])));
+  B[8] = t2 * t86 - t6 * t126 + (d_c[2] + (H[6] * d_s[0] + H[7] * d_s[1] + H[8] * d_s[2] + (s[0] *
+    d_H[6] + s[1] * d_H[7] + s[2] * d_H[8])) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] *
+    d_v[1]) + (Q[0] * t111 - Q[1] * t148) - 2.0 * (Q[1] * d_v[0])) - x[0] * Q[4]) - theta[0] *
+    Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] + (f[0] * d_H[0] + f[1] * d_H[3] + f[2] * d_H[6] + f[3] * d_H[9] + f[4] *
+    d_H[12] + f[5] * d_H[15] - laws[0]);
+  row[1] = d_s[1] * J[1] + (f[0] * d_H[1] + f[1] * d_H[4] + f[2] * d_H[7] + f[3] * d_H[10] + f[4] *
+    d_H[13] + f[5] * d_H[16] - laws[1]);
+  row[2] = d_s[2] * J[2] + (f[0] * d_H[2] + f[1] * d_H[5] + f[2] * d_H[8] + f[3] * d_H[11] + f[4] *
+    d_H[14] + f[5] * d_H[17] - laws[2]);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 18, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 3, "", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"laws", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* rotation and displacement along coordinates of a hinge with 3 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5193,63 +1389,18 @@ static const mstmm_port mstmm_sweep_generic3_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic3_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x)
+int mstmm_sweep_generic3_tangent_coordinate_change(in_t H, in_t d_q, out_t theta, out_t x)
 {
-    const real t0 = H[9] * d_q[0];
-    const real t1 = H[10] * d_q[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[11] * d_q[2];
-    const real t4 = t2 + t3;
-    theta[0] = t4;
-    const real t5 = H[12] * d_q[0];
-    const real t6 = H[13] * d_q[1];
-    const real t7 = t5 + t6;
-    const real t8 = H[14] * d_q[2];
-    const real t9 = t7 + t8;
-    theta[1] = t9;
-    const real t10 = H[15] * d_q[0];
-    const real t11 = H[16] * d_q[1];
-    const real t12 = t10 + t11;
-    const real t13 = H[17] * d_q[2];
-    const real t14 = t12 + t13;
-    theta[2] = t14;
-    const real t15 = H[0] * d_q[0];
-    const real t16 = H[1] * d_q[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[2] * d_q[2];
-    const real t19 = t17 + t18;
-    x[0] = t19;
-    const real t20 = H[3] * d_q[0];
-    const real t21 = H[4] * d_q[1];
-    const real t22 = t20 + t21;
-    const real t23 = H[5] * d_q[2];
-    const real t24 = t22 + t23;
-    x[1] = t24;
-    const real t25 = H[6] * d_q[0];
-    const real t26 = H[7] * d_q[1];
-    const real t27 = t25 + t26;
-    const real t28 = H[8] * d_q[2];
-    const real t29 = t27 + t28;
-    x[2] = t29;
-    return 0;
+  theta[0] = H[9] * d_q[0] + H[10] * d_q[1] + H[11] * d_q[2];
+  theta[1] = H[12] * d_q[0] + H[13] * d_q[1] + H[14] * d_q[2];
+  theta[2] = H[15] * d_q[0] + H[16] * d_q[1] + H[17] * d_q[2];
+  x[0] = H[0] * d_q[0] + H[1] * d_q[1] + H[2] * d_q[2];
+  x[1] = H[3] * d_q[0] + H[4] * d_q[1] + H[5] * d_q[2];
+  x[2] = H[6] * d_q[0] + H[7] * d_q[1] + H[8] * d_q[2];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_coordinate_change_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"d_q", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_coordinate_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_coordinate_change, (in[0], in[1], out[0], out[1]))
 
 /* a direction of a hinge with 3 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5269,304 +1420,56 @@ static const mstmm_port mstmm_sweep_generic3_tangent_coordinate_change_outputs[]
  * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic3_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row)
+int mstmm_sweep_generic3_tangent_steady(in_t theta, in_t x, in_t H, in_t v, in_t w, in_t Q, in_t f,
+    in_t d_u, in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[9] * d_u[0];
-    const real t1 = H[10] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[11] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = theta[2] * Q[1];
-    const real t6 = theta[1] * Q[2];
-    const real t7 = t5 - t6;
-    const real t8 = t4 + t7;
-    B[0] = t8;
-    const real t9 = H[12] * d_u[0];
-    const real t10 = H[13] * d_u[1];
-    const real t11 = t9 + t10;
-    const real t12 = H[14] * d_u[2];
-    const real t13 = t11 + t12;
-    const real t14 = theta[0] * Q[2];
-    const real t15 = theta[2] * Q[0];
-    const real t16 = t14 - t15;
-    const real t17 = t13 + t16;
-    B[1] = t17;
-    const real t18 = H[15] * d_u[0];
-    const real t19 = H[16] * d_u[1];
-    const real t20 = t18 + t19;
-    const real t21 = H[17] * d_u[2];
-    const real t22 = t20 + t21;
-    const real t23 = theta[1] * Q[0];
-    const real t24 = theta[0] * Q[1];
-    const real t25 = t23 - t24;
-    const real t26 = t22 + t25;
-    B[2] = t26;
-    const real t27 = w[2] * t16;
-    const real t28 = w[1] * t25;
-    const real t29 = t27 - t28;
-    const real t30 = H[9] * d_s[0];
-    const real t31 = H[10] * d_s[1];
-    const real t32 = t30 + t31;
-    const real t33 = H[11] * d_s[2];
-    const real t34 = t32 + t33;
-    const real t35 = theta[2] * Q[4];
-    const real t36 = Q[1] * t22;
-    const real t37 = Q[2] * t13;
-    const real t38 = t36 - t37;
-    const real t39 = t35 + t38;
-    const real t40 = theta[1] * Q[5];
-    const real t41 = t39 - t40;
-    const real t42 = t34 + t41;
-    const real t43 = t29 + t42;
-    B[3] = t43;
-    const real t44 = w[0] * t25;
-    const real t45 = w[2] * t7;
-    const real t46 = t44 - t45;
-    const real t47 = H[12] * d_s[0];
-    const real t48 = H[13] * d_s[1];
-    const real t49 = t47 + t48;
-    const real t50 = H[14] * d_s[2];
-    const real t51 = t49 + t50;
-    const real t52 = theta[0] * Q[5];
-    const real t53 = Q[2] * t4;
-    const real t54 = Q[0] * t22;
-    const real t55 = t53 - t54;
-    const real t56 = theta[2] * Q[3];
-    const real t57 = t55 - t56;
-    const real t58 = t52 + t57;
-    const real t59 = t51 + t58;
-    const real t60 = t46 + t59;
-    B[4] = t60;
-    const real t61 = w[1] * t7;
-    const real t62 = w[0] * t16;
-    const real t63 = t61 - t62;
-    const real t64 = H[15] * d_s[0];
-    const real t65 = H[16] * d_s[1];
-    const real t66 = t64 + t65;
-    const real t67 = H[17] * d_s[2];
-    const real t68 = t66 + t67;
-    const real t69 = theta[1] * Q[3];
-    const real t70 = Q[0] * t13;
-    const real t71 = Q[1] * t4;
-    const real t72 = t70 - t71;
-    const real t73 = t69 + t72;
-    const real t74 = theta[0] * Q[4];
-    const real t75 = t73 - t74;
-    const real t76 = t68 + t75;
-    const real t77 = t63 + t76;
-    B[5] = t77;
-    const real t78 = v[2] * 2.0;
-    const real t79 = t16 * t78;
-    const real t80 = v[1] * 2.0;
-    const real t81 = t25 * t80;
-    const real t82 = t79 - t81;
-    const real t83 = H[0] * d_s[0];
-    const real t84 = H[1] * d_s[1];
-    const real t85 = t83 + t84;
-    const real t86 = H[2] * d_s[2];
-    const real t87 = t85 + t86;
-    const real t88 = v[2] * t13;
-    const real t89 = H[6] * d_u[0];
-    const real t90 = H[7] * d_u[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[8] * d_u[2];
-    const real t93 = t91 + t92;
-    const real t94 = w[1] * t93;
-    const real t95 = H[3] * d_u[0];
-    const real t96 = H[4] * d_u[1];
-    const real t97 = t95 + t96;
-    const real t98 = H[5] * d_u[2];
-    const real t99 = t97 + t98;
-    const real t100 = w[2] * t99;
-    const real t101 = t94 - t100;
-    const real t102 = t88 + t101;
-    const real t103 = v[1] * t22;
-    const real t104 = t102 - t103;
-    const real t105 = t87 + t104;
-    const real t106 = theta[2] * Q[7];
-    const real t107 = x[2] * Q[4];
-    const real t108 = Q[1] * t93;
-    const real t109 = 2.0 * t108;
-    const real t110 = x[1] * Q[0];
-    const real t111 = x[0] * Q[1];
-    const real t112 = t110 - t111;
-    const real t113 = Q[1] * t112;
-    const real t114 = x[0] * Q[2];
-    const real t115 = x[2] * Q[0];
-    const real t116 = t114 - t115;
-    const real t117 = Q[2] * t116;
-    const real t118 = t113 - t117;
-    const real t119 = t109 + t118;
-    const real t120 = Q[2] * t99;
-    const real t121 = 2.0 * t120;
-    const real t122 = t119 - t121;
-    const real t123 = t107 + t122;
-    const real t124 = x[1] * Q[5];
-    const real t125 = t123 - t124;
-    const real t126 = t106 + t125;
-    const real t127 = theta[1] * Q[8];
-    const real t128 = t126 - t127;
-    const real t129 = t105 + t128;
-    const real t130 = t82 + t129;
-    B[6] = t130;
-    const real t131 = v[0] * 2.0;
-    const real t132 = t25 * t131;
-    const real t133 = t7 * t78;
-    const real t134 = t132 - t133;
-    const real t135 = H[3] * d_s[0];
-    const real t136 = H[4] * d_s[1];
-    const real t137 = t135 + t136;
-    const real t138 = H[5] * d_s[2];
-    const real t139 = t137 + t138;
-    const real t140 = v[0] * t22;
-    const real t141 = H[0] * d_u[0];
-    const real t142 = H[1] * d_u[1];
-    const real t143 = t141 + t142;
-    const real t144 = H[2] * d_u[2];
-    const real t145 = t143 + t144;
-    const real t146 = w[2] * t145;
-    const real t147 = w[0] * t93;
-    const real t148 = t146 - t147;
-    const real t149 = v[2] * t4;
-    const real t150 = t148 - t149;
-    const real t151 = t140 + t150;
-    const real t152 = t139 + t151;
-    const real t153 = theta[0] * Q[8];
-    const real t154 = x[0] * Q[5];
-    const real t155 = Q[2] * t145;
-    const real t156 = 2.0 * t155;
-    const real t157 = x[2] * Q[1];
-    const real t158 = x[1] * Q[2];
-    const real t159 = t157 - t158;
-    const real t160 = Q[2] * t159;
-    const real t161 = Q[0] * t112;
-    const real t162 = t160 - t161;
-    const real t163 = Q[0] * t93;
-    const real t164 = 2.0 * t163;
-    const real t165 = t162 - t164;
-    const real t166 = t156 + t165;
-    const real t167 = x[2] * Q[3];
-    const real t168 = t166 - t167;
-    const real t169 = t154 + t168;
-    const real t170 = theta[2] * Q[6];
-    const real t171 = t169 - t170;
-    const real t172 = t153 + t171;
-    const real t173 = t152 + t172;
-    const real t174 = t134 + t173;
-    B[7] = t174;
-    const real t175 = t7 * t80;
-    const real t176 = t16 * t131;
-    const real t177 = t175 - t176;
-    const real t178 = H[6] * d_s[0];
-    const real t179 = H[7] * d_s[1];
-    const real t180 = t178 + t179;
-    const real t181 = H[8] * d_s[2];
-    const real t182 = t180 + t181;
-    const real t183 = v[1] * t4;
-    const real t184 = w[0] * t99;
-    const real t185 = w[1] * t145;
-    const real t186 = t184 - t185;
-    const real t187 = t183 + t186;
-    const real t188 = v[0] * t13;
-    const real t189 = t187 - t188;
-    const real t190 = t182 + t189;
-    const real t191 = theta[1] * Q[6];
-    const real t192 = x[1] * Q[3];
-    const real t193 = Q[0] * t99;
-    const real t194 = 2.0 * t193;
-    const real t195 = Q[0] * t116;
-    const real t196 = Q[1] * t159;
-    const real t197 = t195 - t196;
-    const real t198 = t194 + t197;
-    const real t199 = Q[1] * t145;
-    const real t200 = 2.0 * t199;
-    const real t201 = t198 - t200;
-    const real t202 = t192 + t201;
-    const real t203 = x[0] * Q[4];
-    const real t204 = t202 - t203;
-    const real t205 = t191 + t204;
-    const real t206 = theta[0] * Q[7];
-    const real t207 = t205 - t206;
-    const real t208 = t190 + t207;
-    const real t209 = t177 + t208;
-    B[8] = t209;
-    const real t210 = theta[1] * f[2];
-    const real t211 = theta[2] * f[1];
-    const real t212 = t210 - t211;
-    G[0] = t212;
-    const real t213 = theta[2] * f[0];
-    const real t214 = theta[0] * f[2];
-    const real t215 = t213 - t214;
-    G[1] = t215;
-    const real t216 = theta[0] * f[1];
-    const real t217 = theta[1] * f[0];
-    const real t218 = t216 - t217;
-    G[2] = t218;
-    const real t219 = theta[1] * f[5];
-    const real t220 = x[1] * f[2];
-    const real t221 = x[2] * f[1];
-    const real t222 = t220 - t221;
-    const real t223 = theta[2] * f[4];
-    const real t224 = t222 - t223;
-    const real t225 = t219 + t224;
-    G[3] = t225;
-    const real t226 = theta[2] * f[3];
-    const real t227 = x[2] * f[0];
-    const real t228 = x[0] * f[2];
-    const real t229 = t227 - t228;
-    const real t230 = t226 + t229;
-    const real t231 = theta[0] * f[5];
-    const real t232 = t230 - t231;
-    G[4] = t232;
-    const real t233 = theta[0] * f[4];
-    const real t234 = x[0] * f[1];
-    const real t235 = x[1] * f[0];
-    const real t236 = t234 - t235;
-    const real t237 = theta[1] * f[3];
-    const real t238 = t236 - t237;
-    const real t239 = t233 + t238;
-    G[5] = t239;
-    const real t240 = d_s[0] * J[0];
-    const real t241 = t240 - laws[0];
-    row[0] = t241;
-    const real t242 = d_s[1] * J[1];
-    const real t243 = t242 - laws[1];
-    row[1] = t243;
-    const real t244 = d_s[2] * J[2];
-    const real t245 = t244 - laws[2];
-    row[2] = t245;
-    return 0;
+  real t4 = H[9] * d_u[0] + H[10] * d_u[1] + H[11] * d_u[2];
+  real t7 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t4 + t7;
+  real t13 = H[12] * d_u[0] + H[13] * d_u[1] + H[14] * d_u[2];
+  real t16 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t13 + t16;
+  real t22 = H[15] * d_u[0] + H[16] * d_u[1] + H[17] * d_u[2];
+  real t25 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t22 + t25;
+  B[3] = w[2] * t16 - w[1] * t25 + (H[9] * d_s[0] + H[10] * d_s[1] + H[11] * d_s[2] + (theta[2] *
+    Q[4] + (Q[1] * t22 - Q[2] * t13) - theta[1] * Q[5]));
+  B[4] = w[0] * t25 - w[2] * t7 + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] + (theta[0] *
+    Q[5] + (Q[2] * t4 - Q[0] * t22 - theta[2] * Q[3])));
+  B[5] = w[1] * t7 - w[0] * t16 + (H[15] * d_s[0] + H[16] * d_s[1] + H[17] * d_s[2] + (theta[1] *
+    Q[3] + (Q[0] * t13 - Q[1] * t4) - theta[0] * Q[4]));
+  real t78 = v[2] * 2.0;
+  real t80 = v[1] * 2.0;
+  real t93 = H[6] * d_u[0] + H[7] * d_u[1] + H[8] * d_u[2];
+  real t99 = H[3] * d_u[0] + H[4] * d_u[1] + H[5] * d_u[2];
+  real t112 = x[1] * Q[0] - x[0] * Q[1];
+  real t116 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t16 * t78 - t25 * t80 + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + (v[2] * t13 +
+    (w[1] * t93 - w[2] * t99) - v[1] * t22) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * t93)
+    + (Q[1] * t112 - Q[2] * t116) - 2.0 * (Q[2] * t99)) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t131 = v[0] * 2.0;
+  real t145 = H[0] * d_u[0] + H[1] * d_u[1] + H[2] * d_u[2];
+  real t159 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t25 * t131 - t7 * t78 + (H[3] * d_s[0] + H[4] * d_s[1] + H[5] * d_s[2] + (v[0] * t22 +
+    (w[2] * t145 - w[0] * t93 - v[2] * t4)) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * t145)
+    + (Q[2] * t159 - Q[0] * t112 - 2.0 * (Q[0] * t93)) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t7 * t80 - t16 * t131 + (H[6] * d_s[0] + H[7] * d_s[1] + H[8] * d_s[2] + (v[1] * t4 + (w[0]
+    * t99 - w[1] * t145) - v[0] * t13) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * t99) +
+    (Q[0] * t116 - Q[1] * t159) - 2.0 * (Q[1] * t145)) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_steady_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_steady_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 3, "", 0, 0},
-    {"d_s", 3, "", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"laws", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_steady_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_steady, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], out[0], out[1], out[2]))
 
 /* a direction of a hinge with 3 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5584,166 +1487,41 @@ static const mstmm_port mstmm_sweep_generic3_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[3] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic3_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+int mstmm_sweep_generic3_tangent_rotational(in_t theta, in_t H, in_t w, in_t Q, in_t f, in_t d_u,
+    in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[9] * d_u[0];
-    const real t1 = H[10] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[11] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = theta[2] * Q[1];
-    const real t6 = theta[1] * Q[2];
-    const real t7 = t5 - t6;
-    const real t8 = t4 + t7;
-    B[0] = t8;
-    const real t9 = H[12] * d_u[0];
-    const real t10 = H[13] * d_u[1];
-    const real t11 = t9 + t10;
-    const real t12 = H[14] * d_u[2];
-    const real t13 = t11 + t12;
-    const real t14 = theta[0] * Q[2];
-    const real t15 = theta[2] * Q[0];
-    const real t16 = t14 - t15;
-    const real t17 = t13 + t16;
-    B[1] = t17;
-    const real t18 = H[15] * d_u[0];
-    const real t19 = H[16] * d_u[1];
-    const real t20 = t18 + t19;
-    const real t21 = H[17] * d_u[2];
-    const real t22 = t20 + t21;
-    const real t23 = theta[1] * Q[0];
-    const real t24 = theta[0] * Q[1];
-    const real t25 = t23 - t24;
-    const real t26 = t22 + t25;
-    B[2] = t26;
-    const real t27 = w[2] * t16;
-    const real t28 = w[1] * t25;
-    const real t29 = t27 - t28;
-    const real t30 = H[9] * d_s[0];
-    const real t31 = H[10] * d_s[1];
-    const real t32 = t30 + t31;
-    const real t33 = H[11] * d_s[2];
-    const real t34 = t32 + t33;
-    const real t35 = theta[2] * Q[4];
-    const real t36 = Q[1] * t22;
-    const real t37 = Q[2] * t13;
-    const real t38 = t36 - t37;
-    const real t39 = t35 + t38;
-    const real t40 = theta[1] * Q[5];
-    const real t41 = t39 - t40;
-    const real t42 = t34 + t41;
-    const real t43 = t29 + t42;
-    B[3] = t43;
-    const real t44 = w[0] * t25;
-    const real t45 = w[2] * t7;
-    const real t46 = t44 - t45;
-    const real t47 = H[12] * d_s[0];
-    const real t48 = H[13] * d_s[1];
-    const real t49 = t47 + t48;
-    const real t50 = H[14] * d_s[2];
-    const real t51 = t49 + t50;
-    const real t52 = theta[0] * Q[5];
-    const real t53 = Q[2] * t4;
-    const real t54 = Q[0] * t22;
-    const real t55 = t53 - t54;
-    const real t56 = theta[2] * Q[3];
-    const real t57 = t55 - t56;
-    const real t58 = t52 + t57;
-    const real t59 = t51 + t58;
-    const real t60 = t46 + t59;
-    B[4] = t60;
-    const real t61 = w[1] * t7;
-    const real t62 = w[0] * t16;
-    const real t63 = t61 - t62;
-    const real t64 = H[15] * d_s[0];
-    const real t65 = H[16] * d_s[1];
-    const real t66 = t64 + t65;
-    const real t67 = H[17] * d_s[2];
-    const real t68 = t66 + t67;
-    const real t69 = theta[1] * Q[3];
-    const real t70 = Q[0] * t13;
-    const real t71 = Q[1] * t4;
-    const real t72 = t70 - t71;
-    const real t73 = t69 + t72;
-    const real t74 = theta[0] * Q[4];
-    const real t75 = t73 - t74;
-    const real t76 = t68 + t75;
-    const real t77 = t63 + t76;
-    B[5] = t77;
-    const real t78 = theta[2] * Q[7];
-    const real t79 = theta[1] * Q[8];
-    const real t80 = t78 - t79;
-    B[6] = t80;
-    const real t81 = theta[0] * Q[8];
-    const real t82 = theta[2] * Q[6];
-    const real t83 = t81 - t82;
-    B[7] = t83;
-    const real t84 = theta[1] * Q[6];
-    const real t85 = theta[0] * Q[7];
-    const real t86 = t84 - t85;
-    B[8] = t86;
-    const real t87 = theta[1] * f[2];
-    const real t88 = theta[2] * f[1];
-    const real t89 = t87 - t88;
-    G[0] = t89;
-    const real t90 = theta[2] * f[0];
-    const real t91 = theta[0] * f[2];
-    const real t92 = t90 - t91;
-    G[1] = t92;
-    const real t93 = theta[0] * f[1];
-    const real t94 = theta[1] * f[0];
-    const real t95 = t93 - t94;
-    G[2] = t95;
-    const real t96 = theta[1] * f[5];
-    const real t97 = theta[2] * f[4];
-    const real t98 = t96 - t97;
-    G[3] = t98;
-    const real t99 = theta[2] * f[3];
-    const real t100 = theta[0] * f[5];
-    const real t101 = t99 - t100;
-    G[4] = t101;
-    const real t102 = theta[0] * f[4];
-    const real t103 = theta[1] * f[3];
-    const real t104 = t102 - t103;
-    G[5] = t104;
-    const real t105 = d_s[0] * J[0];
-    const real t106 = t105 - laws[0];
-    row[0] = t106;
-    const real t107 = d_s[1] * J[1];
-    const real t108 = t107 - laws[1];
-    row[1] = t108;
-    const real t109 = d_s[2] * J[2];
-    const real t110 = t109 - laws[2];
-    row[2] = t110;
-    return 0;
+  real t4 = H[9] * d_u[0] + H[10] * d_u[1] + H[11] * d_u[2];
+  real t7 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t4 + t7;
+  real t13 = H[12] * d_u[0] + H[13] * d_u[1] + H[14] * d_u[2];
+  real t16 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t13 + t16;
+  real t22 = H[15] * d_u[0] + H[16] * d_u[1] + H[17] * d_u[2];
+  real t25 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t22 + t25;
+  B[3] = w[2] * t16 - w[1] * t25 + (H[9] * d_s[0] + H[10] * d_s[1] + H[11] * d_s[2] + (theta[2] *
+    Q[4] + (Q[1] * t22 - Q[2] * t13) - theta[1] * Q[5]));
+  B[4] = w[0] * t25 - w[2] * t7 + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] + (theta[0] *
+    Q[5] + (Q[2] * t4 - Q[0] * t22 - theta[2] * Q[3])));
+  B[5] = w[1] * t7 - w[0] * t16 + (H[15] * d_s[0] + H[16] * d_s[1] + H[17] * d_s[2] + (theta[1] *
+    Q[3] + (Q[0] * t13 - Q[1] * t4) - theta[0] * Q[4]));
+  B[6] = theta[2] * Q[7] - theta[1] * Q[8];
+  B[7] = theta[0] * Q[8] - theta[2] * Q[6];
+  B[8] = theta[1] * Q[6] - theta[0] * Q[7];
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] - theta[2] * f[4];
+  G[4] = theta[2] * f[3] - theta[0] * f[5];
+  G[5] = theta[0] * f[4] - theta[1] * f[3];
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_rotational_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_rotational_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 3, "", 0, 0},
-    {"d_s", 3, "", 0, 0},
-    {"J", 3, "kg*m2 or kg", 0, 0},
-    {"laws", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_rotational_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_rotational, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2]))
 
 /* rows of a hinge with 3 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5757,267 +1535,159 @@ static const mstmm_port mstmm_sweep_generic3_tangent_rotational_outputs[] = {
  * out D[3][3] rows by unknowns
  * out one[3][3] unit matrix
  */
-int mstmm_sweep_generic3_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one)
+int mstmm_sweep_generic3_tangent_rows(in_t H, in_t B, in_t W, in_t S, out_t K, out_t right, out_t D,
+    out_t one)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = B[0] * v0;
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = B[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = B[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = B[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = B[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = B[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = B[6] * v17;
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = B[7] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = B[8] * v23;
-        const two_t v25 = v22 + v24;
-        const two_t v26 = B[9] * v0;
-        const two_t v27 = B[10] * v2;
-        const two_t v28 = v26 + v27;
-        const two_t v29 = B[11] * v5;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = B[12] * v8;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = B[13] * v11;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = B[14] * v14;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = B[15] * v17;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = B[16] * v20;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = B[17] * v23;
-        const two_t v42 = v40 + v41;
-        const two_t v43 = B[18] * v0;
-        const two_t v44 = B[19] * v2;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = B[20] * v5;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = B[21] * v8;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = B[22] * v11;
-        const two_t v51 = v49 + v50;
-        const two_t v52 = B[23] * v14;
-        const two_t v53 = v51 + v52;
-        const two_t v54 = B[24] * v17;
-        const two_t v55 = v53 + v54;
-        const two_t v56 = B[25] * v20;
-        const two_t v57 = v55 + v56;
-        const two_t v58 = B[26] * v23;
-        const two_t v59 = v57 + v58;
-        *(two_free_t *)(K + 0 + k) = v25;
-        *(two_free_t *)(K + 6 + k) = v42;
-        *(two_free_t *)(K + 12 + k) = v59;
-    }
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
-        const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
-        const two_t v3 = H[3] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
-        const two_t v6 = H[6] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
-        const two_t v9 = H[9] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
-        const two_t v12 = H[12] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
-        const two_t v15 = H[15] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = H[1] * v0;
-        const two_t v18 = H[4] * v2;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = H[7] * v5;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = H[10] * v8;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = H[13] * v11;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = H[16] * v14;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = H[2] * v0;
-        const two_t v29 = H[5] * v2;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = H[8] * v5;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = H[11] * v8;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = H[14] * v11;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = H[17] * v14;
-        const two_t v38 = v36 + v37;
-        *(two_free_t *)(right + 0 + k) = v16;
-        *(two_free_t *)(right + 9 + k) = v27;
-        *(two_free_t *)(right + 18 + k) = v38;
-    }
-    const real t603 = H[0] * K[0];
-    const real t604 = H[3] * K[1];
-    const real t605 = t603 + t604;
-    const real t606 = H[6] * K[2];
-    const real t607 = t605 + t606;
-    const real t608 = H[9] * K[3];
-    const real t609 = t607 + t608;
-    const real t610 = H[12] * K[4];
-    const real t611 = t609 + t610;
-    const real t612 = H[15] * K[5];
-    const real t613 = t611 + t612;
-    const real t614 = W[0] + t613;
-    D[0] = t614;
-    const real t615 = H[0] * K[6];
-    const real t616 = H[3] * K[7];
-    const real t617 = t615 + t616;
-    const real t618 = H[6] * K[8];
-    const real t619 = t617 + t618;
-    const real t620 = H[9] * K[9];
-    const real t621 = t619 + t620;
-    const real t622 = H[12] * K[10];
-    const real t623 = t621 + t622;
-    const real t624 = H[15] * K[11];
-    const real t625 = t623 + t624;
-    const real t626 = W[3] + t625;
-    D[1] = t626;
-    const real t627 = H[0] * K[12];
-    const real t628 = H[3] * K[13];
-    const real t629 = t627 + t628;
-    const real t630 = H[6] * K[14];
-    const real t631 = t629 + t630;
-    const real t632 = H[9] * K[15];
-    const real t633 = t631 + t632;
-    const real t634 = H[12] * K[16];
-    const real t635 = t633 + t634;
-    const real t636 = H[15] * K[17];
-    const real t637 = t635 + t636;
-    const real t638 = W[6] + t637;
-    D[2] = t638;
-    const real t639 = H[1] * K[0];
-    const real t640 = H[4] * K[1];
-    const real t641 = t639 + t640;
-    const real t642 = H[7] * K[2];
-    const real t643 = t641 + t642;
-    const real t644 = H[10] * K[3];
-    const real t645 = t643 + t644;
-    const real t646 = H[13] * K[4];
-    const real t647 = t645 + t646;
-    const real t648 = H[16] * K[5];
-    const real t649 = t647 + t648;
-    const real t650 = W[1] + t649;
-    D[3] = t650;
-    const real t651 = H[1] * K[6];
-    const real t652 = H[4] * K[7];
-    const real t653 = t651 + t652;
-    const real t654 = H[7] * K[8];
-    const real t655 = t653 + t654;
-    const real t656 = H[10] * K[9];
-    const real t657 = t655 + t656;
-    const real t658 = H[13] * K[10];
-    const real t659 = t657 + t658;
-    const real t660 = H[16] * K[11];
-    const real t661 = t659 + t660;
-    const real t662 = W[4] + t661;
-    D[4] = t662;
-    const real t663 = H[1] * K[12];
-    const real t664 = H[4] * K[13];
-    const real t665 = t663 + t664;
-    const real t666 = H[7] * K[14];
-    const real t667 = t665 + t666;
-    const real t668 = H[10] * K[15];
-    const real t669 = t667 + t668;
-    const real t670 = H[13] * K[16];
-    const real t671 = t669 + t670;
-    const real t672 = H[16] * K[17];
-    const real t673 = t671 + t672;
-    const real t674 = W[7] + t673;
-    D[5] = t674;
-    const real t675 = H[2] * K[0];
-    const real t676 = H[5] * K[1];
-    const real t677 = t675 + t676;
-    const real t678 = H[8] * K[2];
-    const real t679 = t677 + t678;
-    const real t680 = H[11] * K[3];
-    const real t681 = t679 + t680;
-    const real t682 = H[14] * K[4];
-    const real t683 = t681 + t682;
-    const real t684 = H[17] * K[5];
-    const real t685 = t683 + t684;
-    const real t686 = W[2] + t685;
-    D[6] = t686;
-    const real t687 = H[2] * K[6];
-    const real t688 = H[5] * K[7];
-    const real t689 = t687 + t688;
-    const real t690 = H[8] * K[8];
-    const real t691 = t689 + t690;
-    const real t692 = H[11] * K[9];
-    const real t693 = t691 + t692;
-    const real t694 = H[14] * K[10];
-    const real t695 = t693 + t694;
-    const real t696 = H[17] * K[11];
-    const real t697 = t695 + t696;
-    const real t698 = W[5] + t697;
-    D[7] = t698;
-    const real t699 = H[2] * K[12];
-    const real t700 = H[5] * K[13];
-    const real t701 = t699 + t700;
-    const real t702 = H[8] * K[14];
-    const real t703 = t701 + t702;
-    const real t704 = H[11] * K[15];
-    const real t705 = t703 + t704;
-    const real t706 = H[14] * K[16];
-    const real t707 = t705 + t706;
-    const real t708 = H[17] * K[17];
-    const real t709 = t707 + t708;
-    const real t710 = W[8] + t709;
-    D[8] = t710;
-    one[0] = 1.0;
-    one[1] = 0.0;
-    one[2] = 0.0;
-    one[3] = 0.0;
-    one[4] = 1.0;
-    one[5] = 0.0;
-    one[6] = 0.0;
-    one[7] = 0.0;
-    one[8] = 1.0;
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = B[0] * v0;
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = B[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = B[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = B[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = B[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = B[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = B[6] * v17;
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = B[7] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = B[8] * v23;
+    const two_t v25 = v22 + v24;
+    const two_t v26 = B[9] * v0;
+    const two_t v27 = B[10] * v2;
+    const two_t v28 = v26 + v27;
+    const two_t v29 = B[11] * v5;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = B[12] * v8;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = B[13] * v11;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = B[14] * v14;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = B[15] * v17;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = B[16] * v20;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = B[17] * v23;
+    const two_t v42 = v40 + v41;
+    const two_t v43 = B[18] * v0;
+    const two_t v44 = B[19] * v2;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = B[20] * v5;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = B[21] * v8;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = B[22] * v11;
+    const two_t v51 = v49 + v50;
+    const two_t v52 = B[23] * v14;
+    const two_t v53 = v51 + v52;
+    const two_t v54 = B[24] * v17;
+    const two_t v55 = v53 + v54;
+    const two_t v56 = B[25] * v20;
+    const two_t v57 = v55 + v56;
+    const two_t v58 = B[26] * v23;
+    const two_t v59 = v57 + v58;
+    *(two_free_t *)(K + 0 + k) = v25;
+    *(two_free_t *)(K + 6 + k) = v42;
+    *(two_free_t *)(K + 12 + k) = v59;
+  }
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
+    const two_t v1 = H[0] * v0;
+    const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
+    const two_t v3 = H[3] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
+    const two_t v6 = H[6] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
+    const two_t v9 = H[9] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
+    const two_t v12 = H[12] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
+    const two_t v15 = H[15] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = H[1] * v0;
+    const two_t v18 = H[4] * v2;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = H[7] * v5;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = H[10] * v8;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = H[13] * v11;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = H[16] * v14;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = H[2] * v0;
+    const two_t v29 = H[5] * v2;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = H[8] * v5;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = H[11] * v8;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = H[14] * v11;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = H[17] * v14;
+    const two_t v38 = v36 + v37;
+    *(two_free_t *)(right + 0 + k) = v16;
+    *(two_free_t *)(right + 9 + k) = v27;
+    *(two_free_t *)(right + 18 + k) = v38;
+  }
+  real t614 = W[0] + (H[0] * K[0] + H[3] * K[1] + H[6] * K[2] + H[9] * K[3] + H[12] * K[4] + H[15] *
+    K[5]);
+  D[0] = t614;
+  real t626 = W[3] + (H[0] * K[6] + H[3] * K[7] + H[6] * K[8] + H[9] * K[9] + H[12] * K[10] + H[15]
+    * K[11]);
+  D[1] = t626;
+  real t638 = W[6] + (H[0] * K[12] + H[3] * K[13] + H[6] * K[14] + H[9] * K[15] + H[12] * K[16] +
+    H[15] * K[17]);
+  D[2] = t638;
+  real t650 = W[1] + (H[1] * K[0] + H[4] * K[1] + H[7] * K[2] + H[10] * K[3] + H[13] * K[4] + H[16]
+    * K[5]);
+  D[3] = t650;
+  real t662 = W[4] + (H[1] * K[6] + H[4] * K[7] + H[7] * K[8] + H[10] * K[9] + H[13] * K[10] + H[16]
+    * K[11]);
+  D[4] = t662;
+  real t674 = W[7] + (H[1] * K[12] + H[4] * K[13] + H[7] * K[14] + H[10] * K[15] + H[13] * K[16] +
+    H[16] * K[17]);
+  D[5] = t674;
+  real t686 = W[2] + (H[2] * K[0] + H[5] * K[1] + H[8] * K[2] + H[11] * K[3] + H[14] * K[4] + H[17]
+    * K[5]);
+  D[6] = t686;
+  real t698 = W[5] + (H[2] * K[6] + H[5] * K[7] + H[8] * K[8] + H[11] * K[9] + H[14] * K[10] + H[17]
+    * K[11]);
+  D[7] = t698;
+  real t710 = W[8] + (H[2] * K[12] + H[5] * K[13] + H[8] * K[14] + H[11] * K[15] + H[14] * K[16] +
+    H[17] * K[17]);
+  D[8] = t710;
+  one[0] = 1.0;
+  one[1] = 0.0;
+  one[2] = 0.0;
+  one[3] = 0.0;
+  one[4] = 1.0;
+  one[5] = 0.0;
+  one[6] = 0.0;
+  one[7] = 0.0;
+  one[8] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_rows_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_rows_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"B", 27, "", 0, 0},
-    {"W", 9, "", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_rows_outputs[] = {
-    {"K", 18, "", 0, 0},
-    {"right", 27, "", 0, 0},
-    {"D", 9, "", 0, 0},
-    {"one", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_rows, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3]))
 
 /* S without the unknowns of a hinge with 3 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6030,127 +1700,110 @@ static const mstmm_port mstmm_sweep_generic3_tangent_rows_outputs[] = {
  * out V[3][6] K + G, one row per direction
  * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
-int mstmm_sweep_generic3_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S)
+int mstmm_sweep_generic3_tangent_reduce(in_t inverse, in_t right, in_t K, in_t G, out_t gain,
+    out_t V, out_t S)
 {
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_beside(right + 0 + k);
-        const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_beside(right + 9 + k);
-        const two_t v3 = inverse[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(right + 18 + k);
-        const two_t v6 = inverse[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = inverse[3] * v0;
-        const two_t v9 = inverse[4] * v2;
-        const two_t v10 = v8 + v9;
-        const two_t v11 = inverse[5] * v5;
-        const two_t v12 = v10 + v11;
-        const two_t v13 = inverse[6] * v0;
-        const two_t v14 = inverse[7] * v2;
-        const two_t v15 = v13 + v14;
-        const two_t v16 = inverse[8] * v5;
-        const two_t v17 = v15 + v16;
-        *(two_free_t *)(gain + 0 + k) = v7;
-        *(two_free_t *)(gain + 9 + k) = v12;
-        *(two_free_t *)(gain + 18 + k) = v17;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(K + 0 + k);
-        const two_t v1 = mstmm_beside(G + 0 + k);
-        const two_t v2 = v0 + v1;
-        const two_t v3 = mstmm_beside(K + 6 + k);
-        const two_t v4 = mstmm_beside(G + 6 + k);
-        const two_t v5 = v3 + v4;
-        const two_t v6 = mstmm_beside(K + 12 + k);
-        const two_t v7 = mstmm_beside(G + 12 + k);
-        const two_t v8 = v6 + v7;
-        *(two_free_t *)(V + 0 + k) = v2;
-        *(two_free_t *)(V + 6 + k) = v5;
-        *(two_free_t *)(V + 12 + k) = v8;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(V + 0 + k);
-        const two_t v1 = gain[0] * v0;
-        const two_t v2 = mstmm_beside(V + 6 + k);
-        const two_t v3 = gain[9] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(V + 12 + k);
-        const two_t v6 = gain[18] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v9 = gain[1] * v0;
-        const two_t v10 = gain[10] * v2;
-        const two_t v11 = v9 + v10;
-        const two_t v12 = gain[19] * v5;
-        const two_t v13 = v11 + v12;
-        const two_t v15 = gain[2] * v0;
-        const two_t v16 = gain[11] * v2;
-        const two_t v17 = v15 + v16;
-        const two_t v18 = gain[20] * v5;
-        const two_t v19 = v17 + v18;
-        const two_t v21 = gain[3] * v0;
-        const two_t v22 = gain[12] * v2;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = gain[21] * v5;
-        const two_t v25 = v23 + v24;
-        const two_t v27 = gain[4] * v0;
-        const two_t v28 = gain[13] * v2;
-        const two_t v29 = v27 + v28;
-        const two_t v30 = gain[22] * v5;
-        const two_t v31 = v29 + v30;
-        const two_t v33 = gain[5] * v0;
-        const two_t v34 = gain[14] * v2;
-        const two_t v35 = v33 + v34;
-        const two_t v36 = gain[23] * v5;
-        const two_t v37 = v35 + v36;
-        const two_t v39 = gain[6] * v0;
-        const two_t v40 = gain[15] * v2;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = gain[24] * v5;
-        const two_t v43 = v41 + v42;
-        const two_t v45 = gain[7] * v0;
-        const two_t v46 = gain[16] * v2;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = gain[25] * v5;
-        const two_t v49 = v47 + v48;
-        const two_t v51 = gain[8] * v0;
-        const two_t v52 = gain[17] * v2;
-        const two_t v53 = v51 + v52;
-        const two_t v54 = gain[26] * v5;
-        const two_t v55 = v53 + v54;
-        *(two_free_t *)(S + 0 + k) -= v7;
-        *(two_free_t *)(S + 6 + k) -= v13;
-        *(two_free_t *)(S + 12 + k) -= v19;
-        *(two_free_t *)(S + 18 + k) -= v25;
-        *(two_free_t *)(S + 24 + k) -= v31;
-        *(two_free_t *)(S + 30 + k) -= v37;
-        *(two_free_t *)(S + 36 + k) -= v43;
-        *(two_free_t *)(S + 42 + k) -= v49;
-        *(two_free_t *)(S + 48 + k) -= v55;
-    }
-    return 0;
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_beside(right + 0 + k);
+    const two_t v1 = inverse[0] * v0;
+    const two_t v2 = mstmm_beside(right + 9 + k);
+    const two_t v3 = inverse[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(right + 18 + k);
+    const two_t v6 = inverse[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = inverse[3] * v0;
+    const two_t v9 = inverse[4] * v2;
+    const two_t v10 = v8 + v9;
+    const two_t v11 = inverse[5] * v5;
+    const two_t v12 = v10 + v11;
+    const two_t v13 = inverse[6] * v0;
+    const two_t v14 = inverse[7] * v2;
+    const two_t v15 = v13 + v14;
+    const two_t v16 = inverse[8] * v5;
+    const two_t v17 = v15 + v16;
+    *(two_free_t *)(gain + 0 + k) = v7;
+    *(two_free_t *)(gain + 9 + k) = v12;
+    *(two_free_t *)(gain + 18 + k) = v17;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(K + 0 + k);
+    const two_t v1 = mstmm_beside(G + 0 + k);
+    const two_t v2 = v0 + v1;
+    const two_t v3 = mstmm_beside(K + 6 + k);
+    const two_t v4 = mstmm_beside(G + 6 + k);
+    const two_t v5 = v3 + v4;
+    const two_t v6 = mstmm_beside(K + 12 + k);
+    const two_t v7 = mstmm_beside(G + 12 + k);
+    const two_t v8 = v6 + v7;
+    *(two_free_t *)(V + 0 + k) = v2;
+    *(two_free_t *)(V + 6 + k) = v5;
+    *(two_free_t *)(V + 12 + k) = v8;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(V + 0 + k);
+    const two_t v1 = gain[0] * v0;
+    const two_t v2 = mstmm_beside(V + 6 + k);
+    const two_t v3 = gain[9] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(V + 12 + k);
+    const two_t v6 = gain[18] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v9 = gain[1] * v0;
+    const two_t v10 = gain[10] * v2;
+    const two_t v11 = v9 + v10;
+    const two_t v12 = gain[19] * v5;
+    const two_t v13 = v11 + v12;
+    const two_t v15 = gain[2] * v0;
+    const two_t v16 = gain[11] * v2;
+    const two_t v17 = v15 + v16;
+    const two_t v18 = gain[20] * v5;
+    const two_t v19 = v17 + v18;
+    const two_t v21 = gain[3] * v0;
+    const two_t v22 = gain[12] * v2;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = gain[21] * v5;
+    const two_t v25 = v23 + v24;
+    const two_t v27 = gain[4] * v0;
+    const two_t v28 = gain[13] * v2;
+    const two_t v29 = v27 + v28;
+    const two_t v30 = gain[22] * v5;
+    const two_t v31 = v29 + v30;
+    const two_t v33 = gain[5] * v0;
+    const two_t v34 = gain[14] * v2;
+    const two_t v35 = v33 + v34;
+    const two_t v36 = gain[23] * v5;
+    const two_t v37 = v35 + v36;
+    const two_t v39 = gain[6] * v0;
+    const two_t v40 = gain[15] * v2;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = gain[24] * v5;
+    const two_t v43 = v41 + v42;
+    const two_t v45 = gain[7] * v0;
+    const two_t v46 = gain[16] * v2;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = gain[25] * v5;
+    const two_t v49 = v47 + v48;
+    const two_t v51 = gain[8] * v0;
+    const two_t v52 = gain[17] * v2;
+    const two_t v53 = v51 + v52;
+    const two_t v54 = gain[26] * v5;
+    const two_t v55 = v53 + v54;
+    *(two_free_t *)(S + 0 + k) -= v7;
+    *(two_free_t *)(S + 6 + k) -= v13;
+    *(two_free_t *)(S + 12 + k) -= v19;
+    *(two_free_t *)(S + 18 + k) -= v25;
+    *(two_free_t *)(S + 24 + k) -= v31;
+    *(two_free_t *)(S + 30 + k) -= v37;
+    *(two_free_t *)(S + 36 + k) -= v43;
+    *(two_free_t *)(S + 42 + k) -= v49;
+    *(two_free_t *)(S + 48 + k) -= v55;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_reduce_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_reduce_inputs[] = {
-    {"inverse", 9, "", 0, 0},
-    {"right", 27, "", 0, 0},
-    {"K", 18, "", 0, 0},
-    {"G", 18, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_reduce_outputs[] = {
-    {"gain", 27, "", 0, 0},
-    {"V", 18, "", 0, 0},
-    {"S", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_reduce, (in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* a right-hand side carried across a hinge with 3 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6165,207 +1818,41 @@ static const mstmm_port mstmm_sweep_generic3_tangent_reduce_outputs[] = {
  * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic3_tangent_load(in_t Rc, in_t r, in_t H, in_t V, in_t inverse, in_t e,
+    in_t e_f, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[3] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[4] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[7] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[10] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[13] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[16] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[5] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[8] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[11] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[14] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[17] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = -t40;
-    y[0] = t41;
-    const real t42 = inverse[3] * t11;
-    const real t43 = inverse[4] * t24;
-    const real t44 = t42 + t43;
-    const real t45 = inverse[5] * t38;
-    const real t46 = t44 + t45;
-    const real t47 = -t46;
-    y[1] = t47;
-    const real t48 = inverse[6] * t11;
-    const real t49 = inverse[7] * t24;
-    const real t50 = t48 + t49;
-    const real t51 = inverse[8] * t38;
-    const real t52 = t50 + t51;
-    const real t53 = -t52;
-    y[2] = t53;
-    const real t54 = V[0] * t40;
-    const real t55 = V[6] * t46;
-    const real t56 = t54 + t55;
-    const real t57 = V[12] * t52;
-    const real t58 = t56 + t57;
-    const real t59 = e[0] - t58;
-    const real t60 = Rc[0] * t59;
-    const real t61 = V[1] * t40;
-    const real t62 = V[7] * t46;
-    const real t63 = t61 + t62;
-    const real t64 = V[13] * t52;
-    const real t65 = t63 + t64;
-    const real t66 = e[1] - t65;
-    const real t67 = Rc[1] * t66;
-    const real t68 = t60 + t67;
-    const real t69 = V[2] * t40;
-    const real t70 = V[8] * t46;
-    const real t71 = t69 + t70;
-    const real t72 = V[14] * t52;
-    const real t73 = t71 + t72;
-    const real t74 = e[2] - t73;
-    const real t75 = Rc[2] * t74;
-    const real t76 = t68 + t75;
-    e_I[0] += t76;
-    const real t77 = Rc[3] * t59;
-    const real t78 = Rc[4] * t66;
-    const real t79 = t77 + t78;
-    const real t80 = Rc[5] * t74;
-    const real t81 = t79 + t80;
-    e_I[1] += t81;
-    const real t82 = Rc[6] * t59;
-    const real t83 = Rc[7] * t66;
-    const real t84 = t82 + t83;
-    const real t85 = Rc[8] * t74;
-    const real t86 = t84 + t85;
-    e_I[2] += t86;
-    const real t87 = V[3] * t40;
-    const real t88 = V[9] * t46;
-    const real t89 = t87 + t88;
-    const real t90 = V[15] * t52;
-    const real t91 = t89 + t90;
-    const real t92 = e[3] - t91;
-    const real t93 = Rc[0] * t92;
-    const real t94 = V[4] * t40;
-    const real t95 = V[10] * t46;
-    const real t96 = t94 + t95;
-    const real t97 = V[16] * t52;
-    const real t98 = t96 + t97;
-    const real t99 = e[4] - t98;
-    const real t100 = Rc[1] * t99;
-    const real t101 = t93 + t100;
-    const real t102 = V[5] * t40;
-    const real t103 = V[11] * t46;
-    const real t104 = t102 + t103;
-    const real t105 = V[17] * t52;
-    const real t106 = t104 + t105;
-    const real t107 = e[5] - t106;
-    const real t108 = Rc[2] * t107;
-    const real t109 = t101 + t108;
-    const real t110 = Rc[6] * r[1];
-    const real t111 = Rc[3] * r[2];
-    const real t112 = t110 - t111;
-    const real t113 = t59 * t112;
-    const real t114 = Rc[7] * r[1];
-    const real t115 = Rc[4] * r[2];
-    const real t116 = t114 - t115;
-    const real t117 = t66 * t116;
-    const real t118 = t113 + t117;
-    const real t119 = Rc[8] * r[1];
-    const real t120 = Rc[5] * r[2];
-    const real t121 = t119 - t120;
-    const real t122 = t74 * t121;
-    const real t123 = t118 + t122;
-    const real t124 = t109 + t123;
-    e_I[3] += t124;
-    const real t125 = Rc[3] * t92;
-    const real t126 = Rc[4] * t99;
-    const real t127 = t125 + t126;
-    const real t128 = Rc[5] * t107;
-    const real t129 = t127 + t128;
-    const real t130 = Rc[0] * r[2];
-    const real t131 = Rc[6] * r[0];
-    const real t132 = t130 - t131;
-    const real t133 = t59 * t132;
-    const real t134 = Rc[1] * r[2];
-    const real t135 = Rc[7] * r[0];
-    const real t136 = t134 - t135;
-    const real t137 = t66 * t136;
-    const real t138 = t133 + t137;
-    const real t139 = Rc[2] * r[2];
-    const real t140 = Rc[8] * r[0];
-    const real t141 = t139 - t140;
-    const real t142 = t74 * t141;
-    const real t143 = t138 + t142;
-    const real t144 = t129 + t143;
-    e_I[4] += t144;
-    const real t145 = Rc[6] * t92;
-    const real t146 = Rc[7] * t99;
-    const real t147 = t145 + t146;
-    const real t148 = Rc[8] * t107;
-    const real t149 = t147 + t148;
-    const real t150 = Rc[3] * r[0];
-    const real t151 = Rc[0] * r[1];
-    const real t152 = t150 - t151;
-    const real t153 = t59 * t152;
-    const real t154 = Rc[4] * r[0];
-    const real t155 = Rc[1] * r[1];
-    const real t156 = t154 - t155;
-    const real t157 = t66 * t156;
-    const real t158 = t153 + t157;
-    const real t159 = Rc[5] * r[0];
-    const real t160 = Rc[2] * r[1];
-    const real t161 = t159 - t160;
-    const real t162 = t74 * t161;
-    const real t163 = t158 + t162;
-    const real t164 = t149 + t163;
-    e_I[5] += t164;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[3] * e[1] + H[6] * e[2] + H[9] * e[3] + H[12] * e[4] + H[15]
+    * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[4] * e[1] + H[7] * e[2] + H[10] * e[3] + H[13] * e[4] + H[16]
+    * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[5] * e[1] + H[8] * e[2] + H[11] * e[3] + H[14] * e[4] + H[17]
+    * e[5]);
+  real t40 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38;
+  y[0] = -t40;
+  real t46 = inverse[3] * t11 + inverse[4] * t24 + inverse[5] * t38;
+  y[1] = -t46;
+  real t52 = inverse[6] * t11 + inverse[7] * t24 + inverse[8] * t38;
+  y[2] = -t52;
+  real t59 = e[0] - (V[0] * t40 + V[6] * t46 + V[12] * t52);
+  real t66 = e[1] - (V[1] * t40 + V[7] * t46 + V[13] * t52);
+  real t74 = e[2] - (V[2] * t40 + V[8] * t46 + V[14] * t52);
+  e_I[0] += Rc[0] * t59 + Rc[1] * t66 + Rc[2] * t74;
+  e_I[1] += Rc[3] * t59 + Rc[4] * t66 + Rc[5] * t74;
+  e_I[2] += Rc[6] * t59 + Rc[7] * t66 + Rc[8] * t74;
+  real t92 = e[3] - (V[3] * t40 + V[9] * t46 + V[15] * t52);
+  real t99 = e[4] - (V[4] * t40 + V[10] * t46 + V[16] * t52);
+  real t107 = e[5] - (V[5] * t40 + V[11] * t46 + V[17] * t52);
+  e_I[3] += Rc[0] * t92 + Rc[1] * t99 + Rc[2] * t107 + (t59 * (Rc[6] * r[1] - Rc[3] * r[2]) + t66 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t74 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t92 + Rc[4] * t99 + Rc[5] * t107 + (t59 * (Rc[0] * r[2] - Rc[6] * r[0]) + t66 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t74 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t92 + Rc[7] * t99 + Rc[8] * t107 + (t59 * (Rc[3] * r[0] - Rc[0] * r[1]) + t66 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t74 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"V", 18, "", 0, 0},
-    {"inverse", 9, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_load_outputs[] = {
-    {"y", 3, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_load, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* solution of a hinge with 3 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6382,282 +1869,59 @@ static const mstmm_port mstmm_sweep_generic3_tangent_load_outputs[] = {
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic3_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z)
+int mstmm_sweep_generic3_tangent_solution(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I,
+    in_t B, in_t gain, in_t y, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = gain[0] * t4;
-    const real t6 = Rc[1] * z_I[0];
-    const real t7 = Rc[4] * z_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[7] * z_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = gain[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[2] * z_I[0];
-    const real t14 = Rc[5] * z_I[1];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[8] * z_I[2];
-    const real t17 = t15 + t16;
-    const real t18 = gain[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = w[2] * t10;
-    const real t21 = w[1] * t17;
-    const real t22 = t20 - t21;
-    const real t23 = Rc[0] * z_I[3];
-    const real t24 = Rc[3] * z_I[4];
-    const real t25 = t23 + t24;
-    const real t26 = Rc[6] * z_I[5];
-    const real t27 = t25 + t26;
-    const real t28 = t22 + t27;
-    const real t29 = gain[3] * t28;
-    const real t30 = t19 + t29;
-    const real t31 = w[0] * t17;
-    const real t32 = w[2] * t4;
-    const real t33 = t31 - t32;
-    const real t34 = Rc[1] * z_I[3];
-    const real t35 = Rc[4] * z_I[4];
-    const real t36 = t34 + t35;
-    const real t37 = Rc[7] * z_I[5];
-    const real t38 = t36 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = gain[4] * t39;
-    const real t41 = t30 + t40;
-    const real t42 = w[1] * t4;
-    const real t43 = w[0] * t10;
-    const real t44 = t42 - t43;
-    const real t45 = Rc[2] * z_I[3];
-    const real t46 = Rc[5] * z_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[8] * z_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = t44 + t49;
-    const real t51 = gain[5] * t50;
-    const real t52 = t41 + t51;
-    const real t53 = v[2] * 2.0;
-    const real t54 = t10 * t53;
-    const real t55 = v[1] * 2.0;
-    const real t56 = t17 * t55;
-    const real t57 = t54 - t56;
-    const real t58 = r[2] * z_I[4];
-    const real t59 = r[1] * w_I[1];
-    const real t60 = r[2] * w_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = z_I[0] * t61;
-    const real t63 = r[0] * w_I[1];
-    const real t64 = 2.0 * t63;
-    const real t65 = r[1] * w_I[0];
-    const real t66 = t64 - t65;
-    const real t67 = z_I[1] * t66;
-    const real t68 = r[0] * w_I[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = r[2] * w_I[0];
-    const real t71 = t69 - t70;
-    const real t72 = z_I[2] * t71;
-    const real t73 = t67 + t72;
-    const real t74 = t62 - t73;
-    const real t75 = r[1] * z_I[5];
-    const real t76 = t74 - t75;
-    const real t77 = t58 + t76;
-    const real t78 = z_I[6] + t77;
-    const real t79 = Rc[0] * t78;
-    const real t80 = r[0] * z_I[5];
-    const real t81 = r[0] * w_I[0];
-    const real t82 = t60 + t81;
-    const real t83 = z_I[1] * t82;
-    const real t84 = 2.0 * t65;
-    const real t85 = t84 - t63;
-    const real t86 = z_I[0] * t85;
-    const real t87 = t83 - t86;
-    const real t88 = r[1] * w_I[2];
-    const real t89 = 2.0 * t88;
-    const real t90 = r[2] * w_I[1];
-    const real t91 = t89 - t90;
-    const real t92 = z_I[2] * t91;
-    const real t93 = t87 - t92;
-    const real t94 = t80 + t93;
-    const real t95 = r[2] * z_I[3];
-    const real t96 = t94 - t95;
-    const real t97 = z_I[7] + t96;
-    const real t98 = Rc[3] * t97;
-    const real t99 = t79 + t98;
-    const real t100 = r[1] * z_I[3];
-    const real t101 = t59 + t81;
-    const real t102 = z_I[2] * t101;
-    const real t103 = 2.0 * t70;
-    const real t104 = t103 - t68;
-    const real t105 = z_I[0] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = 2.0 * t90;
-    const real t108 = t107 - t88;
-    const real t109 = z_I[1] * t108;
-    const real t110 = t106 - t109;
-    const real t111 = r[0] * z_I[4];
-    const real t112 = t110 - t111;
-    const real t113 = t100 + t112;
-    const real t114 = z_I[8] + t113;
-    const real t115 = Rc[6] * t114;
-    const real t116 = t99 + t115;
-    const real t117 = t57 + t116;
-    const real t118 = gain[6] * t117;
-    const real t119 = t52 + t118;
-    const real t120 = v[0] * 2.0;
-    const real t121 = t17 * t120;
-    const real t122 = t4 * t53;
-    const real t123 = t121 - t122;
-    const real t124 = Rc[1] * t78;
-    const real t125 = Rc[4] * t97;
-    const real t126 = t124 + t125;
-    const real t127 = Rc[7] * t114;
-    const real t128 = t126 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = gain[7] * t129;
-    const real t131 = t119 + t130;
-    const real t132 = t4 * t55;
-    const real t133 = t10 * t120;
-    const real t134 = t132 - t133;
-    const real t135 = Rc[2] * t78;
-    const real t136 = Rc[5] * t97;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * t114;
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = gain[8] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = y[0] - t142;
-    x[0] = t143;
-    const real t144 = gain[9] * t4;
-    const real t145 = gain[10] * t10;
-    const real t146 = t144 + t145;
-    const real t147 = gain[11] * t17;
-    const real t148 = t146 + t147;
-    const real t149 = gain[12] * t28;
-    const real t150 = t148 + t149;
-    const real t151 = gain[13] * t39;
-    const real t152 = t150 + t151;
-    const real t153 = gain[14] * t50;
-    const real t154 = t152 + t153;
-    const real t155 = gain[15] * t117;
-    const real t156 = t154 + t155;
-    const real t157 = gain[16] * t129;
-    const real t158 = t156 + t157;
-    const real t159 = gain[17] * t140;
-    const real t160 = t158 + t159;
-    const real t161 = y[1] - t160;
-    x[1] = t161;
-    const real t162 = gain[18] * t4;
-    const real t163 = gain[19] * t10;
-    const real t164 = t162 + t163;
-    const real t165 = gain[20] * t17;
-    const real t166 = t164 + t165;
-    const real t167 = gain[21] * t28;
-    const real t168 = t166 + t167;
-    const real t169 = gain[22] * t39;
-    const real t170 = t168 + t169;
-    const real t171 = gain[23] * t50;
-    const real t172 = t170 + t171;
-    const real t173 = gain[24] * t117;
-    const real t174 = t172 + t173;
-    const real t175 = gain[25] * t129;
-    const real t176 = t174 + t175;
-    const real t177 = gain[26] * t140;
-    const real t178 = t176 + t177;
-    const real t179 = y[2] - t178;
-    x[2] = t179;
-    const real t180 = B[0] * t143;
-    const real t181 = B[9] * t161;
-    const real t182 = t180 + t181;
-    const real t183 = B[18] * t179;
-    const real t184 = t182 + t183;
-    const real t185 = t4 + t184;
-    z[0] = t185;
-    const real t186 = B[1] * t143;
-    const real t187 = B[10] * t161;
-    const real t188 = t186 + t187;
-    const real t189 = B[19] * t179;
-    const real t190 = t188 + t189;
-    const real t191 = t10 + t190;
-    z[1] = t191;
-    const real t192 = B[2] * t143;
-    const real t193 = B[11] * t161;
-    const real t194 = t192 + t193;
-    const real t195 = B[20] * t179;
-    const real t196 = t194 + t195;
-    const real t197 = t17 + t196;
-    z[2] = t197;
-    const real t198 = B[3] * t143;
-    const real t199 = B[12] * t161;
-    const real t200 = t198 + t199;
-    const real t201 = B[21] * t179;
-    const real t202 = t200 + t201;
-    const real t203 = t28 + t202;
-    z[3] = t203;
-    const real t204 = B[4] * t143;
-    const real t205 = B[13] * t161;
-    const real t206 = t204 + t205;
-    const real t207 = B[22] * t179;
-    const real t208 = t206 + t207;
-    const real t209 = t39 + t208;
-    z[4] = t209;
-    const real t210 = B[5] * t143;
-    const real t211 = B[14] * t161;
-    const real t212 = t210 + t211;
-    const real t213 = B[23] * t179;
-    const real t214 = t212 + t213;
-    const real t215 = t50 + t214;
-    z[5] = t215;
-    const real t216 = B[6] * t143;
-    const real t217 = B[15] * t161;
-    const real t218 = t216 + t217;
-    const real t219 = B[24] * t179;
-    const real t220 = t218 + t219;
-    const real t221 = t117 + t220;
-    z[6] = t221;
-    const real t222 = B[7] * t143;
-    const real t223 = B[16] * t161;
-    const real t224 = t222 + t223;
-    const real t225 = B[25] * t179;
-    const real t226 = t224 + t225;
-    const real t227 = t129 + t226;
-    z[7] = t227;
-    const real t228 = B[8] * t143;
-    const real t229 = B[17] * t161;
-    const real t230 = t228 + t229;
-    const real t231 = B[26] * t179;
-    const real t232 = t230 + t231;
-    const real t233 = t140 + t232;
-    z[8] = t233;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t10 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t17 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t28 = w[2] * t10 - w[1] * t17 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  real t39 = w[0] * t17 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  real t50 = w[1] * t4 - w[0] * t10 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t53 = v[2] * 2.0;
+  real t55 = v[1] * 2.0;
+  real t59 = r[1] * w_I[1];
+  real t60 = r[2] * w_I[2];
+  real t63 = r[0] * w_I[1];
+  real t65 = r[1] * w_I[0];
+  real t68 = r[0] * w_I[2];
+  real t70 = r[2] * w_I[0];
+  real t78 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t59 + t60) - (z_I[1] * (2.0 * t63 - t65) + z_I[2]
+    * (2.0 * t68 - t70)) - r[1] * z_I[5]));
+  real t81 = r[0] * w_I[0];
+  real t88 = r[1] * w_I[2];
+  real t90 = r[2] * w_I[1];
+  real t97 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t60 + t81) - z_I[0] * (2.0 * t65 - t63) - z_I[2] *
+    (2.0 * t88 - t90)) - r[2] * z_I[3]);
+  real t114 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t59 + t81) - z_I[0] * (2.0 * t70 - t68) - z_I[1]
+    * (2.0 * t90 - t88) - r[0] * z_I[4]));
+  real t117 = t10 * t53 - t17 * t55 + (Rc[0] * t78 + Rc[3] * t97 + Rc[6] * t114);
+  real t120 = v[0] * 2.0;
+  real t129 = t17 * t120 - t4 * t53 + (Rc[1] * t78 + Rc[4] * t97 + Rc[7] * t114);
+  real t140 = t4 * t55 - t10 * t120 + (Rc[2] * t78 + Rc[5] * t97 + Rc[8] * t114);
+  real t143 = y[0] - (gain[0] * t4 + gain[1] * t10 + gain[2] * t17 + gain[3] * t28 + gain[4] * t39 +
+    gain[5] * t50 + gain[6] * t117 + gain[7] * t129 + gain[8] * t140);
+  x[0] = t143;
+  real t161 = y[1] - (gain[9] * t4 + gain[10] * t10 + gain[11] * t17 + gain[12] * t28 + gain[13] *
+    t39 + gain[14] * t50 + gain[15] * t117 + gain[16] * t129 + gain[17] * t140);
+  x[1] = t161;
+  real t179 = y[2] - (gain[18] * t4 + gain[19] * t10 + gain[20] * t17 + gain[21] * t28 + gain[22] *
+    t39 + gain[23] * t50 + gain[24] * t117 + gain[25] * t129 + gain[26] * t140);
+  x[2] = t179;
+  z[0] = t4 + (B[0] * t143 + B[9] * t161 + B[18] * t179);
+  z[1] = t10 + (B[1] * t143 + B[10] * t161 + B[19] * t179);
+  z[2] = t17 + (B[2] * t143 + B[11] * t161 + B[20] * t179);
+  z[3] = t28 + (B[3] * t143 + B[12] * t161 + B[21] * t179);
+  z[4] = t39 + (B[4] * t143 + B[13] * t161 + B[22] * t179);
+  z[5] = t50 + (B[5] * t143 + B[14] * t161 + B[23] * t179);
+  z[6] = t117 + (B[6] * t143 + B[15] * t161 + B[24] * t179);
+  z[7] = t129 + (B[7] * t143 + B[16] * t161 + B[25] * t179);
+  z[8] = t140 + (B[8] * t143 + B[17] * t161 + B[26] * t179);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_solution_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_solution_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 27, "", 0, 0},
-    {"gain", 27, "", 0, 0},
-    {"y", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_solution_outputs[] = {
-    {"x", 3, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_solution, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1]))
 
 /* a right-hand side carried across a hinge with 3 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6673,215 +1937,41 @@ static const mstmm_port mstmm_sweep_generic3_tangent_solution_outputs[] = {
  * out y[3] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic3_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic3_tangent_load_with_increments(in_t Rc, in_t r, in_t H, in_t V, in_t inverse,
+    in_t e, in_t e_f, in_t e_b, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[3] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[4] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[7] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[10] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[13] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[16] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[5] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[8] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[11] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[14] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[17] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = -t40;
-    y[0] = t41;
-    const real t42 = inverse[3] * t11;
-    const real t43 = inverse[4] * t24;
-    const real t44 = t42 + t43;
-    const real t45 = inverse[5] * t38;
-    const real t46 = t44 + t45;
-    const real t47 = -t46;
-    y[1] = t47;
-    const real t48 = inverse[6] * t11;
-    const real t49 = inverse[7] * t24;
-    const real t50 = t48 + t49;
-    const real t51 = inverse[8] * t38;
-    const real t52 = t50 + t51;
-    const real t53 = -t52;
-    y[2] = t53;
-    const real t54 = V[0] * t40;
-    const real t55 = V[6] * t46;
-    const real t56 = t54 + t55;
-    const real t57 = V[12] * t52;
-    const real t58 = t56 + t57;
-    const real t59 = e[0] - t58;
-    const real t60 = e_b[0] + t59;
-    const real t61 = Rc[0] * t60;
-    const real t62 = V[1] * t40;
-    const real t63 = V[7] * t46;
-    const real t64 = t62 + t63;
-    const real t65 = V[13] * t52;
-    const real t66 = t64 + t65;
-    const real t67 = e[1] - t66;
-    const real t68 = e_b[1] + t67;
-    const real t69 = Rc[1] * t68;
-    const real t70 = t61 + t69;
-    const real t71 = V[2] * t40;
-    const real t72 = V[8] * t46;
-    const real t73 = t71 + t72;
-    const real t74 = V[14] * t52;
-    const real t75 = t73 + t74;
-    const real t76 = e[2] - t75;
-    const real t77 = e_b[2] + t76;
-    const real t78 = Rc[2] * t77;
-    const real t79 = t70 + t78;
-    e_I[0] += t79;
-    const real t80 = Rc[3] * t60;
-    const real t81 = Rc[4] * t68;
-    const real t82 = t80 + t81;
-    const real t83 = Rc[5] * t77;
-    const real t84 = t82 + t83;
-    e_I[1] += t84;
-    const real t85 = Rc[6] * t60;
-    const real t86 = Rc[7] * t68;
-    const real t87 = t85 + t86;
-    const real t88 = Rc[8] * t77;
-    const real t89 = t87 + t88;
-    e_I[2] += t89;
-    const real t90 = V[3] * t40;
-    const real t91 = V[9] * t46;
-    const real t92 = t90 + t91;
-    const real t93 = V[15] * t52;
-    const real t94 = t92 + t93;
-    const real t95 = e[3] - t94;
-    const real t96 = e_b[3] + t95;
-    const real t97 = Rc[0] * t96;
-    const real t98 = V[4] * t40;
-    const real t99 = V[10] * t46;
-    const real t100 = t98 + t99;
-    const real t101 = V[16] * t52;
-    const real t102 = t100 + t101;
-    const real t103 = e[4] - t102;
-    const real t104 = e_b[4] + t103;
-    const real t105 = Rc[1] * t104;
-    const real t106 = t97 + t105;
-    const real t107 = V[5] * t40;
-    const real t108 = V[11] * t46;
-    const real t109 = t107 + t108;
-    const real t110 = V[17] * t52;
-    const real t111 = t109 + t110;
-    const real t112 = e[5] - t111;
-    const real t113 = e_b[5] + t112;
-    const real t114 = Rc[2] * t113;
-    const real t115 = t106 + t114;
-    const real t116 = Rc[6] * r[1];
-    const real t117 = Rc[3] * r[2];
-    const real t118 = t116 - t117;
-    const real t119 = t60 * t118;
-    const real t120 = Rc[7] * r[1];
-    const real t121 = Rc[4] * r[2];
-    const real t122 = t120 - t121;
-    const real t123 = t68 * t122;
-    const real t124 = t119 + t123;
-    const real t125 = Rc[8] * r[1];
-    const real t126 = Rc[5] * r[2];
-    const real t127 = t125 - t126;
-    const real t128 = t77 * t127;
-    const real t129 = t124 + t128;
-    const real t130 = t115 + t129;
-    e_I[3] += t130;
-    const real t131 = Rc[3] * t96;
-    const real t132 = Rc[4] * t104;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[5] * t113;
-    const real t135 = t133 + t134;
-    const real t136 = Rc[0] * r[2];
-    const real t137 = Rc[6] * r[0];
-    const real t138 = t136 - t137;
-    const real t139 = t60 * t138;
-    const real t140 = Rc[1] * r[2];
-    const real t141 = Rc[7] * r[0];
-    const real t142 = t140 - t141;
-    const real t143 = t68 * t142;
-    const real t144 = t139 + t143;
-    const real t145 = Rc[2] * r[2];
-    const real t146 = Rc[8] * r[0];
-    const real t147 = t145 - t146;
-    const real t148 = t77 * t147;
-    const real t149 = t144 + t148;
-    const real t150 = t135 + t149;
-    e_I[4] += t150;
-    const real t151 = Rc[6] * t96;
-    const real t152 = Rc[7] * t104;
-    const real t153 = t151 + t152;
-    const real t154 = Rc[8] * t113;
-    const real t155 = t153 + t154;
-    const real t156 = Rc[3] * r[0];
-    const real t157 = Rc[0] * r[1];
-    const real t158 = t156 - t157;
-    const real t159 = t60 * t158;
-    const real t160 = Rc[4] * r[0];
-    const real t161 = Rc[1] * r[1];
-    const real t162 = t160 - t161;
-    const real t163 = t68 * t162;
-    const real t164 = t159 + t163;
-    const real t165 = Rc[5] * r[0];
-    const real t166 = Rc[2] * r[1];
-    const real t167 = t165 - t166;
-    const real t168 = t77 * t167;
-    const real t169 = t164 + t168;
-    const real t170 = t155 + t169;
-    e_I[5] += t170;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[3] * e[1] + H[6] * e[2] + H[9] * e[3] + H[12] * e[4] + H[15]
+    * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[4] * e[1] + H[7] * e[2] + H[10] * e[3] + H[13] * e[4] + H[16]
+    * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[5] * e[1] + H[8] * e[2] + H[11] * e[3] + H[14] * e[4] + H[17]
+    * e[5]);
+  real t40 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38;
+  y[0] = -t40;
+  real t46 = inverse[3] * t11 + inverse[4] * t24 + inverse[5] * t38;
+  y[1] = -t46;
+  real t52 = inverse[6] * t11 + inverse[7] * t24 + inverse[8] * t38;
+  y[2] = -t52;
+  real t60 = e_b[0] + (e[0] - (V[0] * t40 + V[6] * t46 + V[12] * t52));
+  real t68 = e_b[1] + (e[1] - (V[1] * t40 + V[7] * t46 + V[13] * t52));
+  real t77 = e_b[2] + (e[2] - (V[2] * t40 + V[8] * t46 + V[14] * t52));
+  e_I[0] += Rc[0] * t60 + Rc[1] * t68 + Rc[2] * t77;
+  e_I[1] += Rc[3] * t60 + Rc[4] * t68 + Rc[5] * t77;
+  e_I[2] += Rc[6] * t60 + Rc[7] * t68 + Rc[8] * t77;
+  real t96 = e_b[3] + (e[3] - (V[3] * t40 + V[9] * t46 + V[15] * t52));
+  real t104 = e_b[4] + (e[4] - (V[4] * t40 + V[10] * t46 + V[16] * t52));
+  real t113 = e_b[5] + (e[5] - (V[5] * t40 + V[11] * t46 + V[17] * t52));
+  e_I[3] += Rc[0] * t96 + Rc[1] * t104 + Rc[2] * t113 + (t60 * (Rc[6] * r[1] - Rc[3] * r[2]) + t68 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t77 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t96 + Rc[4] * t104 + Rc[5] * t113 + (t60 * (Rc[0] * r[2] - Rc[6] * r[0]) + t68 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t77 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t96 + Rc[7] * t104 + Rc[8] * t113 + (t60 * (Rc[3] * r[0] - Rc[0] * r[1]) + t68 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t77 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_load_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"V", 18, "", 0, 0},
-    {"inverse", 9, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 3, "", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_load_with_increments_outputs[] = {
-    {"y", 3, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_load_with_increments, (in[0], in[1], in[2], in[3], in[4],
+  in[5], in[6], in[7], out[0], out[1]))
 
 /* solution of a hinge with 3 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6899,782 +1989,228 @@ static const mstmm_port mstmm_sweep_generic3_tangent_load_with_increments_output
  * out x[3] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic3_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_generic3_tangent_solution_with_increments(in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t z_I, in_t B, in_t gain, in_t y, in_t b, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = b[0] + t4;
-    const real t6 = gain[0] * t5;
-    const real t7 = Rc[1] * z_I[0];
-    const real t8 = Rc[4] * z_I[1];
-    const real t9 = t7 + t8;
-    const real t10 = Rc[7] * z_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = b[1] + t11;
-    const real t13 = gain[1] * t12;
-    const real t14 = t6 + t13;
-    const real t15 = Rc[2] * z_I[0];
-    const real t16 = Rc[5] * z_I[1];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[8] * z_I[2];
-    const real t19 = t17 + t18;
-    const real t20 = b[2] + t19;
-    const real t21 = gain[2] * t20;
-    const real t22 = t14 + t21;
-    const real t23 = w[2] * t11;
-    const real t24 = w[1] * t19;
-    const real t25 = t23 - t24;
-    const real t26 = Rc[0] * z_I[3];
-    const real t27 = Rc[3] * z_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[6] * z_I[5];
-    const real t30 = t28 + t29;
-    const real t31 = t25 + t30;
-    const real t32 = b[3] + t31;
-    const real t33 = gain[3] * t32;
-    const real t34 = t22 + t33;
-    const real t35 = w[0] * t19;
-    const real t36 = w[2] * t4;
-    const real t37 = t35 - t36;
-    const real t38 = Rc[1] * z_I[3];
-    const real t39 = Rc[4] * z_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[7] * z_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = b[4] + t43;
-    const real t45 = gain[4] * t44;
-    const real t46 = t34 + t45;
-    const real t47 = w[1] * t4;
-    const real t48 = w[0] * t11;
-    const real t49 = t47 - t48;
-    const real t50 = Rc[2] * z_I[3];
-    const real t51 = Rc[5] * z_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rc[8] * z_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = b[5] + t55;
-    const real t57 = gain[5] * t56;
-    const real t58 = t46 + t57;
-    const real t59 = v[2] * 2.0;
-    const real t60 = t11 * t59;
-    const real t61 = v[1] * 2.0;
-    const real t62 = t19 * t61;
-    const real t63 = t60 - t62;
-    const real t64 = r[2] * z_I[4];
-    const real t65 = r[1] * w_I[1];
-    const real t66 = r[2] * w_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = z_I[0] * t67;
-    const real t69 = r[0] * w_I[1];
-    const real t70 = 2.0 * t69;
-    const real t71 = r[1] * w_I[0];
-    const real t72 = t70 - t71;
-    const real t73 = z_I[1] * t72;
-    const real t74 = r[0] * w_I[2];
-    const real t75 = 2.0 * t74;
-    const real t76 = r[2] * w_I[0];
-    const real t77 = t75 - t76;
-    const real t78 = z_I[2] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = t68 - t79;
-    const real t81 = r[1] * z_I[5];
-    const real t82 = t80 - t81;
-    const real t83 = t64 + t82;
-    const real t84 = z_I[6] + t83;
-    const real t85 = Rc[0] * t84;
-    const real t86 = r[0] * z_I[5];
-    const real t87 = r[0] * w_I[0];
-    const real t88 = t66 + t87;
-    const real t89 = z_I[1] * t88;
-    const real t90 = 2.0 * t71;
-    const real t91 = t90 - t69;
-    const real t92 = z_I[0] * t91;
-    const real t93 = t89 - t92;
-    const real t94 = r[1] * w_I[2];
-    const real t95 = 2.0 * t94;
-    const real t96 = r[2] * w_I[1];
-    const real t97 = t95 - t96;
-    const real t98 = z_I[2] * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t86 + t99;
-    const real t101 = r[2] * z_I[3];
-    const real t102 = t100 - t101;
-    const real t103 = z_I[7] + t102;
-    const real t104 = Rc[3] * t103;
-    const real t105 = t85 + t104;
-    const real t106 = r[1] * z_I[3];
-    const real t107 = t65 + t87;
-    const real t108 = z_I[2] * t107;
-    const real t109 = 2.0 * t76;
-    const real t110 = t109 - t74;
-    const real t111 = z_I[0] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = 2.0 * t96;
-    const real t114 = t113 - t94;
-    const real t115 = z_I[1] * t114;
-    const real t116 = t112 - t115;
-    const real t117 = r[0] * z_I[4];
-    const real t118 = t116 - t117;
-    const real t119 = t106 + t118;
-    const real t120 = z_I[8] + t119;
-    const real t121 = Rc[6] * t120;
-    const real t122 = t105 + t121;
-    const real t123 = t63 + t122;
-    const real t124 = b[6] + t123;
-    const real t125 = gain[6] * t124;
-    const real t126 = t58 + t125;
-    const real t127 = v[0] * 2.0;
-    const real t128 = t19 * t127;
-    const real t129 = t4 * t59;
-    const real t130 = t128 - t129;
-    const real t131 = Rc[1] * t84;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[7] * t120;
-    const real t135 = t133 + t134;
-    const real t136 = t130 + t135;
-    const real t137 = b[7] + t136;
-    const real t138 = gain[7] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = t4 * t61;
-    const real t141 = t11 * t127;
-    const real t142 = t140 - t141;
-    const real t143 = Rc[2] * t84;
-    const real t144 = Rc[5] * t103;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[8] * t120;
-    const real t147 = t145 + t146;
-    const real t148 = t142 + t147;
-    const real t149 = b[8] + t148;
-    const real t150 = gain[8] * t149;
-    const real t151 = t139 + t150;
-    const real t152 = y[0] - t151;
-    x[0] = t152;
-    const real t153 = gain[9] * t5;
-    const real t154 = gain[10] * t12;
-    const real t155 = t153 + t154;
-    const real t156 = gain[11] * t20;
-    const real t157 = t155 + t156;
-    const real t158 = gain[12] * t32;
-    const real t159 = t157 + t158;
-    const real t160 = gain[13] * t44;
-    const real t161 = t159 + t160;
-    const real t162 = gain[14] * t56;
-    const real t163 = t161 + t162;
-    const real t164 = gain[15] * t124;
-    const real t165 = t163 + t164;
-    const real t166 = gain[16] * t137;
-    const real t167 = t165 + t166;
-    const real t168 = gain[17] * t149;
-    const real t169 = t167 + t168;
-    const real t170 = y[1] - t169;
-    x[1] = t170;
-    const real t171 = gain[18] * t5;
-    const real t172 = gain[19] * t12;
-    const real t173 = t171 + t172;
-    const real t174 = gain[20] * t20;
-    const real t175 = t173 + t174;
-    const real t176 = gain[21] * t32;
-    const real t177 = t175 + t176;
-    const real t178 = gain[22] * t44;
-    const real t179 = t177 + t178;
-    const real t180 = gain[23] * t56;
-    const real t181 = t179 + t180;
-    const real t182 = gain[24] * t124;
-    const real t183 = t181 + t182;
-    const real t184 = gain[25] * t137;
-    const real t185 = t183 + t184;
-    const real t186 = gain[26] * t149;
-    const real t187 = t185 + t186;
-    const real t188 = y[2] - t187;
-    x[2] = t188;
-    const real t189 = B[0] * t152;
-    const real t190 = B[9] * t170;
-    const real t191 = t189 + t190;
-    const real t192 = B[18] * t188;
-    const real t193 = t191 + t192;
-    const real t194 = t5 + t193;
-    z[0] = t194;
-    const real t195 = B[1] * t152;
-    const real t196 = B[10] * t170;
-    const real t197 = t195 + t196;
-    const real t198 = B[19] * t188;
-    const real t199 = t197 + t198;
-    const real t200 = t12 + t199;
-    z[1] = t200;
-    const real t201 = B[2] * t152;
-    const real t202 = B[11] * t170;
-    const real t203 = t201 + t202;
-    const real t204 = B[20] * t188;
-    const real t205 = t203 + t204;
-    const real t206 = t20 + t205;
-    z[2] = t206;
-    const real t207 = B[3] * t152;
-    const real t208 = B[12] * t170;
-    const real t209 = t207 + t208;
-    const real t210 = B[21] * t188;
-    const real t211 = t209 + t210;
-    const real t212 = t32 + t211;
-    z[3] = t212;
-    const real t213 = B[4] * t152;
-    const real t214 = B[13] * t170;
-    const real t215 = t213 + t214;
-    const real t216 = B[22] * t188;
-    const real t217 = t215 + t216;
-    const real t218 = t44 + t217;
-    z[4] = t218;
-    const real t219 = B[5] * t152;
-    const real t220 = B[14] * t170;
-    const real t221 = t219 + t220;
-    const real t222 = B[23] * t188;
-    const real t223 = t221 + t222;
-    const real t224 = t56 + t223;
-    z[5] = t224;
-    const real t225 = B[6] * t152;
-    const real t226 = B[15] * t170;
-    const real t227 = t225 + t226;
-    const real t228 = B[24] * t188;
-    const real t229 = t227 + t228;
-    const real t230 = t124 + t229;
-    z[6] = t230;
-    const real t231 = B[7] * t152;
-    const real t232 = B[16] * t170;
-    const real t233 = t231 + t232;
-    const real t234 = B[25] * t188;
-    const real t235 = t233 + t234;
-    const real t236 = t137 + t235;
-    z[7] = t236;
-    const real t237 = B[8] * t152;
-    const real t238 = B[17] * t170;
-    const real t239 = t237 + t238;
-    const real t240 = B[26] * t188;
-    const real t241 = t239 + t240;
-    const real t242 = t149 + t241;
-    z[8] = t242;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t5 = b[0] + t4;
+  real t11 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t12 = b[1] + t11;
+  real t19 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t20 = b[2] + t19;
+  real t32 = b[3] + (w[2] * t11 - w[1] * t19 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]));
+  real t44 = b[4] + (w[0] * t19 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]));
+  real t56 = b[5] + (w[1] * t4 - w[0] * t11 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]));
+  real t59 = v[2] * 2.0;
+  real t61 = v[1] * 2.0;
+  real t65 = r[1] * w_I[1];
+  real t66 = r[2] * w_I[2];
+  real t69 = r[0] * w_I[1];
+  real t71 = r[1] * w_I[0];
+  real t74 = r[0] * w_I[2];
+  real t76 = r[2] * w_I[0];
+  real t84 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t65 + t66) - (z_I[1] * (2.0 * t69 - t71) + z_I[2]
+    * (2.0 * t74 - t76)) - r[1] * z_I[5]));
+  real t87 = r[0] * w_I[0];
+  real t94 = r[1] * w_I[2];
+  real t96 = r[2] * w_I[1];
+  real t103 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t66 + t87) - z_I[0] * (2.0 * t71 - t69) - z_I[2]
+    * (2.0 * t94 - t96)) - r[2] * z_I[3]);
+  real t120 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t65 + t87) - z_I[0] * (2.0 * t76 - t74) - z_I[1]
+    * (2.0 * t96 - t94) - r[0] * z_I[4]));
+  real t124 = b[6] + (t11 * t59 - t19 * t61 + (Rc[0] * t84 + Rc[3] * t103 + Rc[6] * t120));
+  real t127 = v[0] * 2.0;
+  real t137 = b[7] + (t19 * t127 - t4 * t59 + (Rc[1] * t84 + Rc[4] * t103 + Rc[7] * t120));
+  real t149 = b[8] + (t4 * t61 - t11 * t127 + (Rc[2] * t84 + Rc[5] * t103 + Rc[8] * t120));
+  real t152 = y[0] - (gain[0] * t5 + gain[1] * t12 + gain[2] * t20 + gain[3] * t32 + gain[4] * t44 +
+    gain[5] * t56 + gain[6] * t124 + gain[7] * t137 + gain[8] * t149);
+  x[0] = t152;
+  real t170 = y[1] - (gain[9] * t5 + gain[10] * t12 + gain[11] * t20 + gain[12] * t32 + gain[13] *
+    t44 + gain[14] * t56 + gain[15] * t124 + gain[16] * t137 + gain[17] * t149);
+  x[1] = t170;
+  real t188 = y[2] - (gain[18] * t5 + gain[19] * t12 + gain[20] * t20 + gain[21] * t32 + gain[22] *
+    t44 + gain[23] * t56 + gain[24] * t124 + gain[25] * t137 + gain[26] * t149);
+  x[2] = t188;
+  z[0] = t5 + (B[0] * t152 + B[9] * t170 + B[18] * t188);
+  z[1] = t12 + (B[1] * t152 + B[10] * t170 + B[19] * t188);
+  z[2] = t20 + (B[2] * t152 + B[11] * t170 + B[20] * t188);
+  z[3] = t32 + (B[3] * t152 + B[12] * t170 + B[21] * t188);
+  z[4] = t44 + (B[4] * t152 + B[13] * t170 + B[22] * t188);
+  z[5] = t56 + (B[5] * t152 + B[14] * t170 + B[23] * t188);
+  z[6] = t124 + (B[6] * t152 + B[15] * t170 + B[24] * t188);
+  z[7] = t137 + (B[7] * t152 + B[16] * t170 + B[25] * t188);
+  z[8] = t149 + (B[8] * t152 + B[17] * t170 + B[26] * t188);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_tangent_solution_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 27, "", 0, 0},
-    {"gain", 27, "", 0, 0},
-    {"y", 3, "", 0, 0},
-    {"b", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_tangent_solution_with_increments_outputs[] = {
-    {"x", 3, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_tangent_solution_with_increments, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]))
 
 /* free and constrained directions of a hinge with 3 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][3] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic3_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic3_complement(in_t H, out_t W)
 {
-    const real t0 = H[15] * H[15];
-    const real t1 = H[12] * H[12];
-    const real t2 = H[9] * H[9];
-    const real t3 = H[6] * H[6];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[3] * H[3];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[4] * H[4];
-    const real t14 = t12 + t13;
-    const real t15 = H[7] * H[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[10] * H[10];
-    const real t18 = t16 + t17;
-    const real t19 = H[13] * H[13];
-    const real t20 = t18 + t19;
-    const real t21 = H[16] * H[16];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[15] * H[16];
-    const real t25 = H[12] * H[13];
-    const real t26 = H[9] * H[10];
-    const real t27 = H[6] * H[7];
-    const real t28 = H[3] * H[4];
-    const real t29 = H[0] * H[1];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t26 + t31;
-    const real t33 = t25 + t32;
-    const real t34 = t24 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[5] * H[5];
-    const real t42 = t40 + t41;
-    const real t43 = H[8] * H[8];
-    const real t44 = t42 + t43;
-    const real t45 = H[11] * H[11];
-    const real t46 = t44 + t45;
-    const real t47 = H[14] * H[14];
-    const real t48 = t46 + t47;
-    const real t49 = H[17] * H[17];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[15] * H[17];
-    const real t53 = H[12] * H[14];
-    const real t54 = H[9] * H[11];
-    const real t55 = H[6] * H[8];
-    const real t56 = H[3] * H[5];
-    const real t57 = H[0] * H[2];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    const real t60 = t54 + t59;
-    const real t61 = t53 + t60;
-    const real t62 = t52 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[4] * H[5];
-    const real t68 = t66 + t67;
-    const real t69 = H[7] * H[8];
-    const real t70 = t68 + t69;
-    const real t71 = H[10] * H[11];
-    const real t72 = t70 + t71;
-    const real t73 = H[13] * H[14];
-    const real t74 = t72 + t73;
-    const real t75 = H[16] * H[17];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[0] * t35;
-    const real t85 = H[0] * t36;
-    const real t86 = H[1] - t85;
-    const real t87 = t79 * t86;
-    const real t88 = 1.0 / t82;
-    const real t89 = H[0] * t63;
-    const real t90 = H[2] - t89;
-    const real t91 = t80 * t86;
-    const real t92 = t90 - t91;
-    const real t93 = t88 * t92;
-    const real t94 = t80 * t93;
-    const real t95 = t87 - t94;
-    const real t96 = t36 * t95;
-    const real t97 = t84 - t96;
-    const real t98 = t63 * t93;
-    const real t99 = t97 - t98;
-    W[0] = t99;
-    const real t100 = H[3] * t35;
-    const real t101 = H[3] * t36;
-    const real t102 = H[4] - t101;
-    const real t103 = t79 * t102;
-    const real t104 = H[3] * t63;
-    const real t105 = H[5] - t104;
-    const real t106 = t80 * t102;
-    const real t107 = t105 - t106;
-    const real t108 = t88 * t107;
-    const real t109 = t80 * t108;
-    const real t110 = t103 - t109;
-    const real t111 = t36 * t110;
-    const real t112 = t100 - t111;
-    const real t113 = t63 * t108;
-    const real t114 = t112 - t113;
-    W[1] = t114;
-    const real t115 = H[6] * t35;
-    const real t116 = H[6] * t36;
-    const real t117 = H[7] - t116;
-    const real t118 = t79 * t117;
-    const real t119 = H[6] * t63;
-    const real t120 = H[8] - t119;
-    const real t121 = t80 * t117;
-    const real t122 = t120 - t121;
-    const real t123 = t88 * t122;
-    const real t124 = t80 * t123;
-    const real t125 = t118 - t124;
-    const real t126 = t36 * t125;
-    const real t127 = t115 - t126;
-    const real t128 = t63 * t123;
-    const real t129 = t127 - t128;
-    W[2] = t129;
-    const real t130 = H[9] * t35;
-    const real t131 = H[9] * t36;
-    const real t132 = H[10] - t131;
-    const real t133 = t79 * t132;
-    const real t134 = H[9] * t63;
-    const real t135 = H[11] - t134;
-    const real t136 = t80 * t132;
-    const real t137 = t135 - t136;
-    const real t138 = t88 * t137;
-    const real t139 = t80 * t138;
-    const real t140 = t133 - t139;
-    const real t141 = t36 * t140;
-    const real t142 = t130 - t141;
-    const real t143 = t63 * t138;
-    const real t144 = t142 - t143;
-    W[3] = t144;
-    const real t145 = H[12] * t35;
-    const real t146 = H[12] * t36;
-    const real t147 = H[13] - t146;
-    const real t148 = t79 * t147;
-    const real t149 = H[12] * t63;
-    const real t150 = H[14] - t149;
-    const real t151 = t80 * t147;
-    const real t152 = t150 - t151;
-    const real t153 = t88 * t152;
-    const real t154 = t80 * t153;
-    const real t155 = t148 - t154;
-    const real t156 = t36 * t155;
-    const real t157 = t145 - t156;
-    const real t158 = t63 * t153;
-    const real t159 = t157 - t158;
-    W[4] = t159;
-    const real t160 = H[15] * t35;
-    const real t161 = H[15] * t36;
-    const real t162 = H[16] - t161;
-    const real t163 = t79 * t162;
-    const real t164 = H[15] * t63;
-    const real t165 = H[17] - t164;
-    const real t166 = t80 * t162;
-    const real t167 = t165 - t166;
-    const real t168 = t88 * t167;
-    const real t169 = t80 * t168;
-    const real t170 = t163 - t169;
-    const real t171 = t36 * t170;
-    const real t172 = t160 - t171;
-    const real t173 = t63 * t168;
-    const real t174 = t172 - t173;
-    W[5] = t174;
-    W[6] = t95;
-    W[7] = t110;
-    W[8] = t125;
-    W[9] = t140;
-    W[10] = t155;
-    W[11] = t170;
-    W[12] = t93;
-    W[13] = t108;
-    W[14] = t123;
-    W[15] = t138;
-    W[16] = t153;
-    W[17] = t168;
-    const real t175 = H[0] < 0.0;
-    const real t176 = sqrt(t10);
-    const real t177 = -t176;
-    const real t178 = t175 != 0 ? t177 : t176;
-    const real t179 = H[0] + t178;
-    const real t180 = fabs(H[0]);
-    const real t181 = t176 + t180;
-    const real t182 = t176 * t181;
-    const real t183 = 0.0 < t182;
-    const real t184 = 1.0 / t182;
-    const real t185 = t183 != 0 ? t184 : 0.0;
-    const real t186 = H[2] * t179;
-    const real t187 = t186 + t56;
-    const real t188 = t55 + t187;
-    const real t189 = t54 + t188;
-    const real t190 = t53 + t189;
-    const real t191 = t52 + t190;
-    const real t192 = t185 * t191;
-    const real t193 = H[9] * t192;
-    const real t194 = H[11] - t193;
-    const real t195 = H[1] * t179;
-    const real t196 = t195 + t28;
-    const real t197 = t27 + t196;
-    const real t198 = t26 + t197;
-    const real t199 = t25 + t198;
-    const real t200 = t24 + t199;
-    const real t201 = t185 * t200;
-    const real t202 = H[9] * t201;
-    const real t203 = H[10] - t202;
-    const real t204 = H[15] * t201;
-    const real t205 = H[16] - t204;
-    const real t206 = t205 * t205;
-    const real t207 = H[12] * t201;
-    const real t208 = H[13] - t207;
-    const real t209 = t208 * t208;
-    const real t210 = t203 * t203;
-    const real t211 = H[3] * t201;
-    const real t212 = H[4] - t211;
-    const real t213 = t212 * t212;
-    const real t214 = H[6] * t201;
-    const real t215 = H[7] - t214;
-    const real t216 = t215 * t215;
-    const real t217 = t213 + t216;
-    const real t218 = t210 + t217;
-    const real t219 = t209 + t218;
-    const real t220 = t206 + t219;
-    const real t221 = sqrt(t220);
-    const real t222 = fabs(t212);
-    const real t223 = t221 + t222;
-    const real t224 = t221 * t223;
-    const real t225 = 0.0 < t224;
-    const real t226 = 1.0 / t224;
-    const real t227 = t225 != 0 ? t226 : 0.0;
-    const real t228 = H[15] * t192;
-    const real t229 = H[17] - t228;
-    const real t230 = t205 * t229;
-    const real t231 = H[12] * t192;
-    const real t232 = H[14] - t231;
-    const real t233 = t208 * t232;
-    const real t234 = t203 * t194;
-    const real t235 = H[3] * t192;
-    const real t236 = H[5] - t235;
-    const real t237 = t212 < 0.0;
-    const real t238 = -t221;
-    const real t239 = t237 != 0 ? t238 : t221;
-    const real t240 = t212 + t239;
-    const real t241 = t236 * t240;
-    const real t242 = H[6] * t192;
-    const real t243 = H[8] - t242;
-    const real t244 = t215 * t243;
-    const real t245 = t241 + t244;
-    const real t246 = t234 + t245;
-    const real t247 = t233 + t246;
-    const real t248 = t230 + t247;
-    const real t249 = t227 * t248;
-    const real t250 = t203 * t249;
-    const real t251 = t194 - t250;
-    const real t252 = t251 * t251;
-    const real t253 = t205 * t249;
-    const real t254 = t229 - t253;
-    const real t255 = t254 * t254;
-    const real t256 = t208 * t249;
-    const real t257 = t232 - t256;
-    const real t258 = t257 * t257;
-    const real t259 = t215 * t249;
-    const real t260 = t243 - t259;
-    const real t261 = t260 * t260;
-    const real t262 = t261 + t252;
-    const real t263 = t258 + t262;
-    const real t264 = t255 + t263;
-    const real t265 = sqrt(t264);
-    const real t266 = fabs(t260);
-    const real t267 = t265 + t266;
-    const real t268 = t265 * t267;
-    const real t269 = 0.0 < t268;
-    const real t270 = 1.0 / t268;
-    const real t271 = t269 != 0 ? t270 : 0.0;
-    const real t272 = t252 * t271;
-    const real t273 = 1.0 - t272;
-    const real t274 = t203 * t273;
-    const real t275 = t260 < 0.0;
-    const real t276 = -t265;
-    const real t277 = t275 != 0 ? t276 : t265;
-    const real t278 = t260 + t277;
-    const real t279 = t278 * t271;
-    const real t280 = t251 * t279;
-    const real t281 = t215 * t280;
-    const real t282 = t274 - t281;
-    const real t283 = t251 * t271;
-    const real t284 = t257 * t283;
-    const real t285 = t208 * t284;
-    const real t286 = t282 - t285;
-    const real t287 = t254 * t283;
-    const real t288 = t205 * t287;
-    const real t289 = t286 - t288;
-    const real t290 = t227 * t289;
-    const real t291 = t203 * t290;
-    const real t292 = t273 - t291;
-    const real t293 = H[9] * t292;
-    const real t294 = t240 * t290;
-    const real t295 = H[3] * t294;
-    const real t296 = t215 * t290;
-    const real t297 = t280 + t296;
-    const real t298 = H[6] * t297;
-    const real t299 = t295 + t298;
-    const real t300 = t293 - t299;
-    const real t301 = t208 * t290;
-    const real t302 = t284 + t301;
-    const real t303 = H[12] * t302;
-    const real t304 = t300 - t303;
-    const real t305 = t205 * t290;
-    const real t306 = t287 + t305;
-    const real t307 = H[15] * t306;
-    const real t308 = t304 - t307;
-    const real t309 = t185 * t308;
-    const real t310 = t179 * t309;
-    const real t311 = -t310;
-    W[18] = t311;
-    const real t312 = H[3] * t309;
-    const real t313 = t294 + t312;
-    const real t314 = -t313;
-    W[19] = t314;
-    const real t315 = H[6] * t309;
-    const real t316 = t297 + t315;
-    const real t317 = -t316;
-    W[20] = t317;
-    const real t318 = H[9] * t309;
-    const real t319 = t292 - t318;
-    W[21] = t319;
-    const real t320 = H[12] * t309;
-    const real t321 = t302 + t320;
-    const real t322 = -t321;
-    W[22] = t322;
-    const real t323 = H[15] * t309;
-    const real t324 = t306 + t323;
-    const real t325 = -t324;
-    W[23] = t325;
-    const real t326 = t258 * t271;
-    const real t327 = 1.0 - t326;
-    const real t328 = t208 * t327;
-    const real t329 = t257 * t279;
-    const real t330 = t215 * t329;
-    const real t331 = t203 * t284;
-    const real t332 = t330 + t331;
-    const real t333 = t328 - t332;
-    const real t334 = t257 * t271;
-    const real t335 = t254 * t334;
-    const real t336 = t205 * t335;
-    const real t337 = t333 - t336;
-    const real t338 = t227 * t337;
-    const real t339 = t208 * t338;
-    const real t340 = t327 - t339;
-    const real t341 = H[12] * t340;
-    const real t342 = t203 * t338;
-    const real t343 = t284 + t342;
-    const real t344 = H[9] * t343;
-    const real t345 = t240 * t338;
-    const real t346 = H[3] * t345;
-    const real t347 = t215 * t338;
-    const real t348 = t329 + t347;
-    const real t349 = H[6] * t348;
-    const real t350 = t346 + t349;
-    const real t351 = t344 + t350;
-    const real t352 = t341 - t351;
-    const real t353 = t205 * t338;
-    const real t354 = t335 + t353;
-    const real t355 = H[15] * t354;
-    const real t356 = t352 - t355;
-    const real t357 = t185 * t356;
-    const real t358 = t179 * t357;
-    const real t359 = -t358;
-    W[24] = t359;
-    const real t360 = H[3] * t357;
-    const real t361 = t345 + t360;
-    const real t362 = -t361;
-    W[25] = t362;
-    const real t363 = H[6] * t357;
-    const real t364 = t348 + t363;
-    const real t365 = -t364;
-    W[26] = t365;
-    const real t366 = H[9] * t357;
-    const real t367 = t343 + t366;
-    const real t368 = -t367;
-    W[27] = t368;
-    const real t369 = H[12] * t357;
-    const real t370 = t340 - t369;
-    W[28] = t370;
-    const real t371 = H[15] * t357;
-    const real t372 = t354 + t371;
-    const real t373 = -t372;
-    W[29] = t373;
-    const real t374 = t255 * t271;
-    const real t375 = 1.0 - t374;
-    const real t376 = t205 * t375;
-    const real t377 = t208 * t335;
-    const real t378 = t254 * t279;
-    const real t379 = t215 * t378;
-    const real t380 = t203 * t287;
-    const real t381 = t379 + t380;
-    const real t382 = t377 + t381;
-    const real t383 = t376 - t382;
-    const real t384 = t227 * t383;
-    const real t385 = t205 * t384;
-    const real t386 = t375 - t385;
-    const real t387 = H[15] * t386;
-    const real t388 = t208 * t384;
-    const real t389 = t335 + t388;
-    const real t390 = H[12] * t389;
-    const real t391 = t203 * t384;
-    const real t392 = t287 + t391;
-    const real t393 = H[9] * t392;
-    const real t394 = t240 * t384;
-    const real t395 = H[3] * t394;
-    const real t396 = t215 * t384;
-    const real t397 = t378 + t396;
-    const real t398 = H[6] * t397;
-    const real t399 = t395 + t398;
-    const real t400 = t393 + t399;
-    const real t401 = t390 + t400;
-    const real t402 = t387 - t401;
-    const real t403 = t185 * t402;
-    const real t404 = t179 * t403;
-    const real t405 = -t404;
-    W[30] = t405;
-    const real t406 = H[3] * t403;
-    const real t407 = t394 + t406;
-    const real t408 = -t407;
-    W[31] = t408;
-    const real t409 = H[6] * t403;
-    const real t410 = t397 + t409;
-    const real t411 = -t410;
-    W[32] = t411;
-    const real t412 = H[9] * t403;
-    const real t413 = t392 + t412;
-    const real t414 = -t413;
-    W[33] = t414;
-    const real t415 = H[12] * t403;
-    const real t416 = t389 + t415;
-    const real t417 = -t416;
-    W[34] = t417;
-    const real t418 = H[15] * t403;
-    const real t419 = t386 - t418;
-    W[35] = t419;
-    return 0;
+  real t10 = H[15] * H[15] + (H[12] * H[12] + (H[9] * H[9] + (H[6] * H[6] + (H[0] * H[0] + H[3] *
+    H[3]))));
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[4] * H[4] + H[7] * H[7] + H[10] * H[10] + H[13] * H[13] + H[16] *
+    H[16];
+  real t24 = H[15] * H[16];
+  real t25 = H[12] * H[13];
+  real t26 = H[9] * H[10];
+  real t27 = H[6] * H[7];
+  real t28 = H[3] * H[4];
+  real t34 = t24 + (t25 + (t26 + (t27 + (t28 + H[0] * H[1]))));
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[5] * H[5] + H[8] * H[8] + H[11] * H[11] + H[14] * H[14] + H[17] *
+    H[17];
+  real t52 = H[15] * H[17];
+  real t53 = H[12] * H[14];
+  real t54 = H[9] * H[11];
+  real t55 = H[6] * H[8];
+  real t56 = H[3] * H[5];
+  real t62 = t52 + (t53 + (t54 + (t55 + (t56 + H[0] * H[2]))));
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[4] * H[5] + H[7] * H[8] + H[10] * H[11] + H[13] * H[14] + H[16] * H[17]
+    - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t86 = H[1] - H[0] * t36;
+  real t88 = 1.0 / t82;
+  real t93 = t88 * (H[2] - H[0] * t63 - t80 * t86);
+  real t95 = t79 * t86 - t80 * t93;
+  W[0] = H[0] * t35 - t36 * t95 - t63 * t93;
+  real t102 = H[4] - H[3] * t36;
+  real t108 = t88 * (H[5] - H[3] * t63 - t80 * t102);
+  real t110 = t79 * t102 - t80 * t108;
+  W[1] = H[3] * t35 - t36 * t110 - t63 * t108;
+  real t117 = H[7] - H[6] * t36;
+  real t123 = t88 * (H[8] - H[6] * t63 - t80 * t117);
+  real t125 = t79 * t117 - t80 * t123;
+  W[2] = H[6] * t35 - t36 * t125 - t63 * t123;
+  real t132 = H[10] - H[9] * t36;
+  real t138 = t88 * (H[11] - H[9] * t63 - t80 * t132);
+  real t140 = t79 * t132 - t80 * t138;
+  W[3] = H[9] * t35 - t36 * t140 - t63 * t138;
+  real t147 = H[13] - H[12] * t36;
+  real t153 = t88 * (H[14] - H[12] * t63 - t80 * t147);
+  real t155 = t79 * t147 - t80 * t153;
+  W[4] = H[12] * t35 - t36 * t155 - t63 * t153;
+  real t162 = H[16] - H[15] * t36;
+  real t168 = t88 * (H[17] - H[15] * t63 - t80 * t162);
+  real t170 = t79 * t162 - t80 * t168;
+  W[5] = H[15] * t35 - t36 * t170 - t63 * t168;
+  W[6] = t95;
+  W[7] = t110;
+  W[8] = t125;
+  W[9] = t140;
+  W[10] = t155;
+  W[11] = t170;
+  W[12] = t93;
+  W[13] = t108;
+  W[14] = t123;
+  W[15] = t138;
+  W[16] = t153;
+  W[17] = t168;
+  real t176 = sqrt(t10);
+  real t177 = -t176;
+  real t179 = H[0] + ((H[0] < 0.0) ? t177 : t176);
+  real t182 = t176 * (t176 + (fabs(H[0])));
+  real t184 = 1.0 / t182;
+  real t185 = (0.0 < t182) ? t184 : 0.0;
+  real t192 = t185 * (t52 + (t53 + (t54 + (t55 + (H[2] * t179 + t56)))));
+  real t194 = H[11] - H[9] * t192;
+  real t201 = t185 * (t24 + (t25 + (t26 + (t27 + (H[1] * t179 + t28)))));
+  real t203 = H[10] - H[9] * t201;
+  real t205 = H[16] - H[15] * t201;
+  real t208 = H[13] - H[12] * t201;
+  real t212 = H[4] - H[3] * t201;
+  real t215 = H[7] - H[6] * t201;
+  real t221 = sqrt(t205 * t205 + (t208 * t208 + (t203 * t203 + (t212 * t212 + t215 * t215))));
+  real t224 = t221 * (t221 + (fabs(t212)));
+  real t226 = 1.0 / t224;
+  real t227 = (0.0 < t224) ? t226 : 0.0;
+  real t229 = H[17] - H[15] * t192;
+  real t232 = H[14] - H[12] * t192;
+  real t238 = -t221;
+  real t240 = t212 + ((t212 < 0.0) ? t238 : t221);
+  real t243 = H[8] - H[6] * t192;
+  real t249 = t227 * (t205 * t229 + (t208 * t232 + (t203 * t194 + ((H[5] - H[3] * t192) * t240 +
+    t215 * t243))));
+  real t251 = t194 - t203 * t249;
+  real t252 = t251 * t251;
+  real t254 = t229 - t205 * t249;
+  real t255 = t254 * t254;
+  real t257 = t232 - t208 * t249;
+  real t258 = t257 * t257;
+  real t260 = t243 - t215 * t249;
+  real t265 = sqrt(t255 + (t258 + (t260 * t260 + t252)));
+  real t268 = t265 * (t265 + (fabs(t260)));
+  real t270 = 1.0 / t268;
+  real t271 = (0.0 < t268) ? t270 : 0.0;
+  real t273 = 1.0 - t252 * t271;
+  real t276 = -t265;
+  real t279 = (t260 + ((t260 < 0.0) ? t276 : t265)) * t271;
+  real t280 = t251 * t279;
+  real t283 = t251 * t271;
+  real t284 = t257 * t283;
+  real t287 = t254 * t283;
+  real t290 = t227 * (t203 * t273 - t215 * t280 - t208 * t284 - t205 * t287);
+  real t292 = t273 - t203 * t290;
+  real t294 = t240 * t290;
+  real t297 = t280 + t215 * t290;
+  real t302 = t284 + t208 * t290;
+  real t306 = t287 + t205 * t290;
+  real t309 = t185 * (H[9] * t292 - (H[3] * t294 + H[6] * t297) - H[12] * t302 - H[15] * t306);
+  W[18] = -(t179 * t309);
+  W[19] = -(t294 + H[3] * t309);
+  W[20] = -(t297 + H[6] * t309);
+  W[21] = t292 - H[9] * t309;
+  W[22] = -(t302 + H[12] * t309);
+  W[23] = -(t306 + H[15] * t309);
+  real t327 = 1.0 - t258 * t271;
+  real t329 = t257 * t279;
+  real t335 = t254 * (t257 * t271);
+  real t338 = t227 * (t208 * t327 - (t215 * t329 + t203 * t284) - t205 * t335);
+  real t340 = t327 - t208 * t338;
+  real t343 = t284 + t203 * t338;
+  real t345 = t240 * t338;
+  real t348 = t329 + t215 * t338;
+  real t354 = t335 + t205 * t338;
+  real t357 = t185 * (H[12] * t340 - (H[9] * t343 + (H[3] * t345 + H[6] * t348)) - H[15] * t354);
+  W[24] = -(t179 * t357);
+  W[25] = -(t345 + H[3] * t357);
+  W[26] = -(t348 + H[6] * t357);
+  W[27] = -(t343 + H[9] * t357);
+  W[28] = t340 - H[12] * t357;
+  W[29] = -(t354 + H[15] * t357);
+  real t375 = 1.0 - t255 * t271;
+  real t378 = t254 * t279;
+  real t384 = t227 * (t205 * t375 - (t208 * t335 + (t215 * t378 + t203 * t287)));
+  real t386 = t375 - t205 * t384;
+  real t389 = t335 + t208 * t384;
+  real t392 = t287 + t203 * t384;
+  real t394 = t240 * t384;
+  real t397 = t378 + t215 * t384;
+  real t403 = t185 * (H[15] * t386 - (H[12] * t389 + (H[9] * t392 + (H[3] * t394 + H[6] * t397))));
+  W[30] = -(t179 * t403);
+  W[31] = -(t394 + H[3] * t403);
+  W[32] = -(t397 + H[6] * t403);
+  W[33] = -(t392 + H[9] * t403);
+  W[34] = -(t389 + H[12] * t403);
+  W[35] = t386 - H[15] * t403;
+  return 0;
 }
 
-static int mstmm_sweep_generic3_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_complement_inputs[] = {
-    {"H", 18, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic3_complement_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic3_complement, (in[0], out[0]))
 
 /* a column's rows divided by D, across a hinge with 3 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -7683,43 +2219,18 @@ static const mstmm_guard mstmm_sweep_generic3_complement_guards[] = {
  * in  y[3] -H^T K - C
  * out z[3] D^-1 y
  */
-int mstmm_sweep_generic3_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_generic3_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[3] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[4] * t2;
-    const real t4 = F[6] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[7] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[8] * t7;
-    const real t9 = F[7] * t8;
-    const real t10 = t3 - t9;
-    const real t11 = F[3] * t10;
-    const real t12 = t0 - t11;
-    const real t13 = F[6] * t8;
-    const real t14 = t12 - t13;
-    z[0] = t14;
-    z[1] = t10;
-    z[2] = t8;
-    return 0;
+  real t2 = y[1] - F[3] * y[0];
+  real t8 = F[8] * (y[2] - F[6] * y[0] - F[7] * t2);
+  real t10 = F[4] * t2 - F[7] * t8;
+  z[0] = F[0] * y[0] - F[3] * t10 - F[6] * t8;
+  z[1] = t10;
+  z[2] = t8;
+  return 0;
 }
 
-static int mstmm_sweep_generic3_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_divide_inputs[] = {
-    {"F", 9, "", 0, 0},
-    {"y", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_divide_outputs[] = {
-    {"z", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 3 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -7728,31 +2239,13 @@ static const mstmm_port mstmm_sweep_generic3_divide_outputs[] = {
  * in  z[3] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_generic3_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+int mstmm_sweep_generic3_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    L_ij[0] += t4;
-    return 0;
+  L_ij[0] += y[0] * z[0] + y[1] * z[1] + y[2] * z[2];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_couple_inputs[] = {
-    {"y", 3, "", 0, 0},
-    {"z", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 3 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -7761,33 +2254,13 @@ static const mstmm_port mstmm_sweep_generic3_couple_outputs[] = {
  * in  z[3] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic3_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_generic3_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = -t4;
-    l[0] += t5;
-    return 0;
+  l[0] += -(y[0] * z[0] + y[1] * z[1] + y[2] * z[2]);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_add_known_part_inputs[] = {
-    {"y", 3, "", 0, 0},
-    {"z", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 3 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -7796,32 +2269,15 @@ static const mstmm_port mstmm_sweep_generic3_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[3] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic3_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_generic3_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    const real t1 = y[1] * x[0];
-    y_0[1] += t1;
-    const real t2 = y[2] * x[0];
-    y_0[2] += t2;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  y_0[1] += y[1] * x[0];
+  y_0[2] += y[2] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_inputs[] = {
-    {"y", 3, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_outputs[] = {
-    {"y_0", 3, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of the bodies accelerated by a hinge with 3 speeds
  * in  S[21] inertia of everything outboard, at P
@@ -7829,334 +2285,57 @@ static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_outputs[] = {
  * in  udot[3] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic3_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e)
+int mstmm_sweep_generic3_required_load(in_t S, in_t H, in_t udot, out_t e)
 {
-    const real t0 = S[0] * H[0];
-    const real t1 = S[1] * H[3];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * H[6];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * H[9];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * H[12];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * H[15];
-    const real t10 = t8 + t9;
-    const real t11 = udot[0] * t10;
-    const real t12 = S[0] * H[1];
-    const real t13 = S[1] * H[4];
-    const real t14 = t12 + t13;
-    const real t15 = S[2] * H[7];
-    const real t16 = t14 + t15;
-    const real t17 = S[3] * H[10];
-    const real t18 = t16 + t17;
-    const real t19 = S[4] * H[13];
-    const real t20 = t18 + t19;
-    const real t21 = S[5] * H[16];
-    const real t22 = t20 + t21;
-    const real t23 = udot[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = S[0] * H[2];
-    const real t26 = S[1] * H[5];
-    const real t27 = t25 + t26;
-    const real t28 = S[2] * H[8];
-    const real t29 = t27 + t28;
-    const real t30 = S[3] * H[11];
-    const real t31 = t29 + t30;
-    const real t32 = S[4] * H[14];
-    const real t33 = t31 + t32;
-    const real t34 = S[5] * H[17];
-    const real t35 = t33 + t34;
-    const real t36 = udot[2] * t35;
-    const real t37 = t24 + t36;
-    e[0] = t37;
-    const real t38 = S[1] * H[0];
-    const real t39 = S[6] * H[3];
-    const real t40 = t38 + t39;
-    const real t41 = S[7] * H[6];
-    const real t42 = t40 + t41;
-    const real t43 = S[8] * H[9];
-    const real t44 = t42 + t43;
-    const real t45 = S[9] * H[12];
-    const real t46 = t44 + t45;
-    const real t47 = S[10] * H[15];
-    const real t48 = t46 + t47;
-    const real t49 = udot[0] * t48;
-    const real t50 = S[1] * H[1];
-    const real t51 = S[6] * H[4];
-    const real t52 = t50 + t51;
-    const real t53 = S[7] * H[7];
-    const real t54 = t52 + t53;
-    const real t55 = S[8] * H[10];
-    const real t56 = t54 + t55;
-    const real t57 = S[9] * H[13];
-    const real t58 = t56 + t57;
-    const real t59 = S[10] * H[16];
-    const real t60 = t58 + t59;
-    const real t61 = udot[1] * t60;
-    const real t62 = t49 + t61;
-    const real t63 = S[1] * H[2];
-    const real t64 = S[6] * H[5];
-    const real t65 = t63 + t64;
-    const real t66 = S[7] * H[8];
-    const real t67 = t65 + t66;
-    const real t68 = S[8] * H[11];
-    const real t69 = t67 + t68;
-    const real t70 = S[9] * H[14];
-    const real t71 = t69 + t70;
-    const real t72 = S[10] * H[17];
-    const real t73 = t71 + t72;
-    const real t74 = udot[2] * t73;
-    const real t75 = t62 + t74;
-    e[1] = t75;
-    const real t76 = S[2] * H[0];
-    const real t77 = S[7] * H[3];
-    const real t78 = t76 + t77;
-    const real t79 = S[11] * H[6];
-    const real t80 = t78 + t79;
-    const real t81 = S[12] * H[9];
-    const real t82 = t80 + t81;
-    const real t83 = S[13] * H[12];
-    const real t84 = t82 + t83;
-    const real t85 = S[14] * H[15];
-    const real t86 = t84 + t85;
-    const real t87 = udot[0] * t86;
-    const real t88 = S[2] * H[1];
-    const real t89 = S[7] * H[4];
-    const real t90 = t88 + t89;
-    const real t91 = S[11] * H[7];
-    const real t92 = t90 + t91;
-    const real t93 = S[12] * H[10];
-    const real t94 = t92 + t93;
-    const real t95 = S[13] * H[13];
-    const real t96 = t94 + t95;
-    const real t97 = S[14] * H[16];
-    const real t98 = t96 + t97;
-    const real t99 = udot[1] * t98;
-    const real t100 = t87 + t99;
-    const real t101 = S[2] * H[2];
-    const real t102 = S[7] * H[5];
-    const real t103 = t101 + t102;
-    const real t104 = S[11] * H[8];
-    const real t105 = t103 + t104;
-    const real t106 = S[12] * H[11];
-    const real t107 = t105 + t106;
-    const real t108 = S[13] * H[14];
-    const real t109 = t107 + t108;
-    const real t110 = S[14] * H[17];
-    const real t111 = t109 + t110;
-    const real t112 = udot[2] * t111;
-    const real t113 = t100 + t112;
-    e[2] = t113;
-    const real t114 = S[3] * H[0];
-    const real t115 = S[8] * H[3];
-    const real t116 = t114 + t115;
-    const real t117 = S[12] * H[6];
-    const real t118 = t116 + t117;
-    const real t119 = S[15] * H[9];
-    const real t120 = t118 + t119;
-    const real t121 = S[16] * H[12];
-    const real t122 = t120 + t121;
-    const real t123 = S[17] * H[15];
-    const real t124 = t122 + t123;
-    const real t125 = udot[0] * t124;
-    const real t126 = S[3] * H[1];
-    const real t127 = S[8] * H[4];
-    const real t128 = t126 + t127;
-    const real t129 = S[12] * H[7];
-    const real t130 = t128 + t129;
-    const real t131 = S[15] * H[10];
-    const real t132 = t130 + t131;
-    const real t133 = S[16] * H[13];
-    const real t134 = t132 + t133;
-    const real t135 = S[17] * H[16];
-    const real t136 = t134 + t135;
-    const real t137 = udot[1] * t136;
-    const real t138 = t125 + t137;
-    const real t139 = S[3] * H[2];
-    const real t140 = S[8] * H[5];
-    const real t141 = t139 + t140;
-    const real t142 = S[12] * H[8];
-    const real t143 = t141 + t142;
-    const real t144 = S[15] * H[11];
-    const real t145 = t143 + t144;
-    const real t146 = S[16] * H[14];
-    const real t147 = t145 + t146;
-    const real t148 = S[17] * H[17];
-    const real t149 = t147 + t148;
-    const real t150 = udot[2] * t149;
-    const real t151 = t138 + t150;
-    e[3] = t151;
-    const real t152 = S[4] * H[0];
-    const real t153 = S[9] * H[3];
-    const real t154 = t152 + t153;
-    const real t155 = S[13] * H[6];
-    const real t156 = t154 + t155;
-    const real t157 = S[16] * H[9];
-    const real t158 = t156 + t157;
-    const real t159 = S[18] * H[12];
-    const real t160 = t158 + t159;
-    const real t161 = S[19] * H[15];
-    const real t162 = t160 + t161;
-    const real t163 = udot[0] * t162;
-    const real t164 = S[4] * H[1];
-    const real t165 = S[9] * H[4];
-    const real t166 = t164 + t165;
-    const real t167 = S[13] * H[7];
-    const real t168 = t166 + t167;
-    const real t169 = S[16] * H[10];
-    const real t170 = t168 + t169;
-    const real t171 = S[18] * H[13];
-    const real t172 = t170 + t171;
-    const real t173 = S[19] * H[16];
-    const real t174 = t172 + t173;
-    const real t175 = udot[1] * t174;
-    const real t176 = t163 + t175;
-    const real t177 = S[4] * H[2];
-    const real t178 = S[9] * H[5];
-    const real t179 = t177 + t178;
-    const real t180 = S[13] * H[8];
-    const real t181 = t179 + t180;
-    const real t182 = S[16] * H[11];
-    const real t183 = t181 + t182;
-    const real t184 = S[18] * H[14];
-    const real t185 = t183 + t184;
-    const real t186 = S[19] * H[17];
-    const real t187 = t185 + t186;
-    const real t188 = udot[2] * t187;
-    const real t189 = t176 + t188;
-    e[4] = t189;
-    const real t190 = S[5] * H[0];
-    const real t191 = S[10] * H[3];
-    const real t192 = t190 + t191;
-    const real t193 = S[14] * H[6];
-    const real t194 = t192 + t193;
-    const real t195 = S[17] * H[9];
-    const real t196 = t194 + t195;
-    const real t197 = S[19] * H[12];
-    const real t198 = t196 + t197;
-    const real t199 = S[20] * H[15];
-    const real t200 = t198 + t199;
-    const real t201 = udot[0] * t200;
-    const real t202 = S[5] * H[1];
-    const real t203 = S[10] * H[4];
-    const real t204 = t202 + t203;
-    const real t205 = S[14] * H[7];
-    const real t206 = t204 + t205;
-    const real t207 = S[17] * H[10];
-    const real t208 = t206 + t207;
-    const real t209 = S[19] * H[13];
-    const real t210 = t208 + t209;
-    const real t211 = S[20] * H[16];
-    const real t212 = t210 + t211;
-    const real t213 = udot[1] * t212;
-    const real t214 = t201 + t213;
-    const real t215 = S[5] * H[2];
-    const real t216 = S[10] * H[5];
-    const real t217 = t215 + t216;
-    const real t218 = S[14] * H[8];
-    const real t219 = t217 + t218;
-    const real t220 = S[17] * H[11];
-    const real t221 = t219 + t220;
-    const real t222 = S[19] * H[14];
-    const real t223 = t221 + t222;
-    const real t224 = S[20] * H[17];
-    const real t225 = t223 + t224;
-    const real t226 = udot[2] * t225;
-    const real t227 = t214 + t226;
-    e[5] = t227;
-    return 0;
+  e[0] = udot[0] * (S[0] * H[0] + S[1] * H[3] + S[2] * H[6] + S[3] * H[9] + S[4] * H[12] + S[5] *
+    H[15]) + udot[1] * (S[0] * H[1] + S[1] * H[4] + S[2] * H[7] + S[3] * H[10] + S[4] * H[13] + S[5]
+    * H[16]) + udot[2] * (S[0] * H[2] + S[1] * H[5] + S[2] * H[8] + S[3] * H[11] + S[4] * H[14] +
+    S[5] * H[17]);
+  e[1] = udot[0] * (S[1] * H[0] + S[6] * H[3] + S[7] * H[6] + S[8] * H[9] + S[9] * H[12] + S[10] *
+    H[15]) + udot[1] * (S[1] * H[1] + S[6] * H[4] + S[7] * H[7] + S[8] * H[10] + S[9] * H[13] +
+    S[10] * H[16]) + udot[2] * (S[1] * H[2] + S[6] * H[5] + S[7] * H[8] + S[8] * H[11] + S[9] *
+    H[14] + S[10] * H[17]);
+  e[2] = udot[0] * (S[2] * H[0] + S[7] * H[3] + S[11] * H[6] + S[12] * H[9] + S[13] * H[12] + S[14]
+    * H[15]) + udot[1] * (S[2] * H[1] + S[7] * H[4] + S[11] * H[7] + S[12] * H[10] + S[13] * H[13] +
+    S[14] * H[16]) + udot[2] * (S[2] * H[2] + S[7] * H[5] + S[11] * H[8] + S[12] * H[11] + S[13] *
+    H[14] + S[14] * H[17]);
+  e[3] = udot[0] * (S[3] * H[0] + S[8] * H[3] + S[12] * H[6] + S[15] * H[9] + S[16] * H[12] + S[17]
+    * H[15]) + udot[1] * (S[3] * H[1] + S[8] * H[4] + S[12] * H[7] + S[15] * H[10] + S[16] * H[13] +
+    S[17] * H[16]) + udot[2] * (S[3] * H[2] + S[8] * H[5] + S[12] * H[8] + S[15] * H[11] + S[16] *
+    H[14] + S[17] * H[17]);
+  e[4] = udot[0] * (S[4] * H[0] + S[9] * H[3] + S[13] * H[6] + S[16] * H[9] + S[18] * H[12] + S[19]
+    * H[15]) + udot[1] * (S[4] * H[1] + S[9] * H[4] + S[13] * H[7] + S[16] * H[10] + S[18] * H[13] +
+    S[19] * H[16]) + udot[2] * (S[4] * H[2] + S[9] * H[5] + S[13] * H[8] + S[16] * H[11] + S[18] *
+    H[14] + S[19] * H[17]);
+  e[5] = udot[0] * (S[5] * H[0] + S[10] * H[3] + S[14] * H[6] + S[17] * H[9] + S[19] * H[12] + S[20]
+    * H[15]) + udot[1] * (S[5] * H[1] + S[10] * H[4] + S[14] * H[7] + S[17] * H[10] + S[19] * H[13]
+    + S[20] * H[16]) + udot[2] * (S[5] * H[2] + S[10] * H[5] + S[14] * H[8] + S[17] * H[11] + S[19]
+    * H[14] + S[20] * H[17]);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_required_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_required_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_required_load_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"udot", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_required_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_required_load, (in[0], in[1], in[2], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 3 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][3] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[3] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[3] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic3_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y)
+int mstmm_sweep_generic3_ground_column_load(in_t H, in_t e, in_t tau, out_t y)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[3] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[6] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[9] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[12] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[15] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[4] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[7] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[10] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[13] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[16] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[5] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[8] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[11] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[14] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[17] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    return 0;
+  y[0] = tau[0] - (H[0] * e[0] + H[3] * e[1] + H[6] * e[2] + H[9] * e[3] + H[12] * e[4] + H[15] *
+    e[5]);
+  y[1] = tau[1] - (H[1] * e[0] + H[4] * e[1] + H[7] * e[2] + H[10] * e[3] + H[13] * e[4] + H[16] *
+    e[5]);
+  y[2] = tau[2] - (H[2] * e[0] + H[5] * e[1] + H[8] * e[2] + H[11] * e[3] + H[14] * e[4] + H[17] *
+    e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic3_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_ground_column_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_ground_column_load_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_ground_column_load_outputs[] = {
-    {"y", 3, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_ground_column_load, (in[0], in[1], in[2], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -8179,536 +2358,120 @@ static const mstmm_port mstmm_sweep_generic3_ground_column_load_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic3_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic3_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)c;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = s[2] * d_H[11];
-    const real t159 = H[11] * d_s[2];
-    const real t160 = t158 + t159;
-    const real t161 = s[1] * d_H[10];
-    const real t162 = H[10] * d_s[1];
-    const real t163 = t161 + t162;
-    const real t164 = s[0] * d_H[9];
-    const real t165 = H[9] * d_s[0];
-    const real t166 = t164 + t165;
-    const real t167 = t163 + t166;
-    const real t168 = t160 + t167;
-    const real t169 = d_c[3] + t168;
-    const real t170 = t157 + t169;
-    const real t171 = motion_I[5] * t34;
-    const real t172 = t65 * d_motion_I[5];
-    const real t173 = t171 + t172;
-    const real t174 = motion_I[4] * t19;
-    const real t175 = t73 * d_motion_I[4];
-    const real t176 = t174 + t175;
-    const real t177 = motion_I[3] * t4;
-    const real t178 = t81 * d_motion_I[3];
-    const real t179 = t177 + t178;
-    const real t180 = t176 + t179;
-    const real t181 = t173 + t180;
-    const real t182 = t170 + t181;
-    d_motion[3] = t182;
-    const real t183 = t153 * d_w[0];
-    const real t184 = w[0] * t139;
-    const real t185 = t183 + t184;
-    const real t186 = w[2] * t85;
-    const real t187 = t81 * motion_I[0];
-    const real t188 = t73 * motion_I[1];
-    const real t189 = t187 + t188;
-    const real t190 = t65 * motion_I[2];
-    const real t191 = t189 + t190;
-    const real t192 = t191 * d_w[2];
-    const real t193 = t186 + t192;
-    const real t194 = t185 - t193;
-    const real t195 = H[14] * d_s[2];
-    const real t196 = s[2] * d_H[14];
-    const real t197 = t195 + t196;
-    const real t198 = H[13] * d_s[1];
-    const real t199 = s[1] * d_H[13];
-    const real t200 = t198 + t199;
-    const real t201 = H[12] * d_s[0];
-    const real t202 = s[0] * d_H[12];
-    const real t203 = t201 + t202;
-    const real t204 = t200 + t203;
-    const real t205 = t197 + t204;
-    const real t206 = d_c[4] + t205;
-    const real t207 = t194 + t206;
-    const real t208 = motion_I[5] * t39;
-    const real t209 = t92 * d_motion_I[5];
-    const real t210 = t208 + t209;
-    const real t211 = motion_I[4] * t24;
-    const real t212 = t100 * d_motion_I[4];
-    const real t213 = t211 + t212;
-    const real t214 = motion_I[3] * t9;
-    const real t215 = t108 * d_motion_I[3];
-    const real t216 = t214 + t215;
-    const real t217 = t213 + t216;
-    const real t218 = t210 + t217;
-    const real t219 = t207 + t218;
-    d_motion[4] = t219;
-    const real t220 = w[1] * t85;
-    const real t221 = t191 * d_w[1];
-    const real t222 = t220 + t221;
-    const real t223 = t146 * d_w[0];
-    const real t224 = w[0] * t112;
-    const real t225 = t223 + t224;
-    const real t226 = t222 - t225;
-    const real t227 = H[17] * d_s[2];
-    const real t228 = s[2] * d_H[17];
-    const real t229 = t227 + t228;
-    const real t230 = H[16] * d_s[1];
-    const real t231 = s[1] * d_H[16];
-    const real t232 = t230 + t231;
-    const real t233 = H[15] * d_s[0];
-    const real t234 = s[0] * d_H[15];
-    const real t235 = t233 + t234;
-    const real t236 = t232 + t235;
-    const real t237 = t229 + t236;
-    const real t238 = d_c[5] + t237;
-    const real t239 = t226 + t238;
-    const real t240 = motion_I[5] * t44;
-    const real t241 = t119 * d_motion_I[5];
-    const real t242 = t240 + t241;
-    const real t243 = motion_I[4] * t29;
-    const real t244 = t127 * d_motion_I[4];
-    const real t245 = t243 + t244;
-    const real t246 = motion_I[3] * t14;
-    const real t247 = t135 * d_motion_I[3];
-    const real t248 = t246 + t247;
-    const real t249 = t245 + t248;
-    const real t250 = t242 + t249;
-    const real t251 = t239 + t250;
-    d_motion[5] = t251;
-    const real t252 = v[2] * t112;
-    const real t253 = t146 * d_v[2];
-    const real t254 = t252 + t253;
-    const real t255 = 2.0 * t254;
-    const real t256 = v[1] * t139;
-    const real t257 = t153 * d_v[1];
-    const real t258 = t256 + t257;
-    const real t259 = 2.0 * t258;
-    const real t260 = t255 - t259;
-    const real t261 = H[2] * d_s[2];
-    const real t262 = s[2] * d_H[2];
-    const real t263 = t261 + t262;
-    const real t264 = H[1] * d_s[1];
-    const real t265 = s[1] * d_H[1];
-    const real t266 = t264 + t265;
-    const real t267 = H[0] * d_s[0];
-    const real t268 = s[0] * d_H[0];
-    const real t269 = t267 + t268;
-    const real t270 = t266 + t269;
-    const real t271 = t263 + t270;
-    const real t272 = d_c[0] + t271;
-    const real t273 = t260 + t272;
-    const real t274 = Rt[0] * d[0];
-    const real t275 = Rt[1] * d[1];
-    const real t276 = t274 + t275;
-    const real t277 = Rt[2] * d[2];
-    const real t278 = t276 + t277;
-    const real t279 = t278 + ro[0];
-    const real t280 = motion_I[0] * motion_I[2];
-    const real t281 = t280 - motion_I[4];
-    const real t282 = t279 * t281;
-    const real t283 = Rt[3] * d[0];
-    const real t284 = Rt[4] * d[1];
-    const real t285 = t283 + t284;
-    const real t286 = Rt[5] * d[2];
-    const real t287 = t285 + t286;
-    const real t288 = t287 + ro[1];
-    const real t289 = motion_I[1] * motion_I[2];
-    const real t290 = motion_I[3] + t289;
-    const real t291 = t288 * t290;
-    const real t292 = t282 + t291;
-    const real t293 = Rt[6] * d[0];
-    const real t294 = Rt[7] * d[1];
-    const real t295 = t293 + t294;
-    const real t296 = Rt[8] * d[2];
-    const real t297 = t295 + t296;
-    const real t298 = t297 + ro[2];
-    const real t299 = motion_I[1] * motion_I[1];
-    const real t300 = motion_I[0] * motion_I[0];
-    const real t301 = t299 + t300;
-    const real t302 = t298 * t301;
-    const real t303 = t292 - t302;
-    const real t304 = t303 + motion_I[8];
-    const real t305 = t304 * t34;
-    const real t306 = t290 * t54;
-    const real t307 = motion_I[2] * d_motion_I[1];
-    const real t308 = motion_I[1] * d_motion_I[2];
-    const real t309 = t307 + t308;
-    const real t310 = d_motion_I[3] + t309;
-    const real t311 = t288 * t310;
-    const real t312 = t306 + t311;
-    const real t313 = t281 * t49;
-    const real t314 = motion_I[2] * d_motion_I[0];
-    const real t315 = motion_I[0] * d_motion_I[2];
-    const real t316 = t314 + t315;
-    const real t317 = t316 - d_motion_I[4];
-    const real t318 = t279 * t317;
-    const real t319 = t313 + t318;
-    const real t320 = t312 + t319;
-    const real t321 = t301 * t59;
-    const real t322 = motion_I[0] * d_motion_I[0];
-    const real t323 = t322 + t322;
-    const real t324 = motion_I[1] * d_motion_I[1];
-    const real t325 = t324 + t324;
-    const real t326 = t323 + t325;
-    const real t327 = t298 * t326;
-    const real t328 = t321 + t327;
-    const real t329 = t320 - t328;
-    const real t330 = d_motion_I[8] + t329;
-    const real t331 = t65 * t330;
-    const real t332 = t305 + t331;
-    const real t333 = motion_I[0] * motion_I[1];
-    const real t334 = motion_I[5] + t333;
-    const real t335 = t279 * t334;
-    const real t336 = motion_I[2] * motion_I[2];
-    const real t337 = t336 + t300;
-    const real t338 = t288 * t337;
-    const real t339 = t335 - t338;
-    const real t340 = t289 - motion_I[3];
-    const real t341 = t298 * t340;
-    const real t342 = t339 + t341;
-    const real t343 = t342 + motion_I[7];
-    const real t344 = t343 * t19;
-    const real t345 = t340 * t59;
-    const real t346 = t309 - d_motion_I[3];
-    const real t347 = t298 * t346;
-    const real t348 = t345 + t347;
-    const real t349 = t334 * t49;
-    const real t350 = motion_I[1] * d_motion_I[0];
-    const real t351 = motion_I[0] * d_motion_I[1];
-    const real t352 = t350 + t351;
-    const real t353 = d_motion_I[5] + t352;
-    const real t354 = t279 * t353;
-    const real t355 = t349 + t354;
-    const real t356 = t337 * t54;
-    const real t357 = motion_I[2] * d_motion_I[2];
-    const real t358 = t357 + t357;
-    const real t359 = t323 + t358;
-    const real t360 = t288 * t359;
-    const real t361 = t356 + t360;
-    const real t362 = t355 - t361;
-    const real t363 = t348 + t362;
-    const real t364 = d_motion_I[7] + t363;
-    const real t365 = t73 * t364;
-    const real t366 = t344 + t365;
-    const real t367 = t333 - motion_I[5];
-    const real t368 = t288 * t367;
-    const real t369 = t299 + t336;
-    const real t370 = t279 * t369;
-    const real t371 = t368 - t370;
-    const real t372 = motion_I[4] + t280;
-    const real t373 = t298 * t372;
-    const real t374 = t371 + t373;
-    const real t375 = t374 + motion_I[6];
-    const real t376 = t375 * t4;
-    const real t377 = t372 * t59;
-    const real t378 = d_motion_I[4] + t316;
-    const real t379 = t298 * t378;
-    const real t380 = t377 + t379;
-    const real t381 = t367 * t54;
-    const real t382 = t352 - d_motion_I[5];
-    const real t383 = t288 * t382;
-    const real t384 = t381 + t383;
-    const real t385 = t369 * t49;
-    const real t386 = t325 + t358;
-    const real t387 = t279 * t386;
-    const real t388 = t385 + t387;
-    const real t389 = t384 - t388;
-    const real t390 = t380 + t389;
-    const real t391 = d_motion_I[6] + t390;
-    const real t392 = t81 * t391;
-    const real t393 = t376 + t392;
-    const real t394 = t366 + t393;
-    const real t395 = t332 + t394;
-    const real t396 = t273 + t395;
-    d_motion[6] = t396;
-    const real t397 = v[0] * t139;
-    const real t398 = t153 * d_v[0];
-    const real t399 = t397 + t398;
-    const real t400 = 2.0 * t399;
-    const real t401 = v[2] * t85;
-    const real t402 = t191 * d_v[2];
-    const real t403 = t401 + t402;
-    const real t404 = 2.0 * t403;
-    const real t405 = t400 - t404;
-    const real t406 = H[5] * d_s[2];
-    const real t407 = s[2] * d_H[5];
-    const real t408 = t406 + t407;
-    const real t409 = H[4] * d_s[1];
-    const real t410 = s[1] * d_H[4];
-    const real t411 = t409 + t410;
-    const real t412 = H[3] * d_s[0];
-    const real t413 = s[0] * d_H[3];
-    const real t414 = t412 + t413;
-    const real t415 = t411 + t414;
-    const real t416 = t408 + t415;
-    const real t417 = d_c[1] + t416;
-    const real t418 = t405 + t417;
-    const real t419 = t304 * t39;
-    const real t420 = t92 * t330;
-    const real t421 = t419 + t420;
-    const real t422 = t343 * t24;
-    const real t423 = t100 * t364;
-    const real t424 = t422 + t423;
-    const real t425 = t375 * t9;
-    const real t426 = t108 * t391;
-    const real t427 = t425 + t426;
-    const real t428 = t424 + t427;
-    const real t429 = t421 + t428;
-    const real t430 = t418 + t429;
-    d_motion[7] = t430;
-    const real t431 = v[1] * t85;
-    const real t432 = t191 * d_v[1];
-    const real t433 = t431 + t432;
-    const real t434 = 2.0 * t433;
-    const real t435 = v[0] * t112;
-    const real t436 = t146 * d_v[0];
-    const real t437 = t435 + t436;
-    const real t438 = 2.0 * t437;
-    const real t439 = t434 - t438;
-    const real t440 = H[8] * d_s[2];
-    const real t441 = s[2] * d_H[8];
-    const real t442 = t440 + t441;
-    const real t443 = H[7] * d_s[1];
-    const real t444 = s[1] * d_H[7];
-    const real t445 = t443 + t444;
-    const real t446 = H[6] * d_s[0];
-    const real t447 = s[0] * d_H[6];
-    const real t448 = t446 + t447;
-    const real t449 = t445 + t448;
-    const real t450 = t442 + t449;
-    const real t451 = d_c[2] + t450;
-    const real t452 = t439 + t451;
-    const real t453 = t304 * t44;
-    const real t454 = t119 * t330;
-    const real t455 = t453 + t454;
-    const real t456 = t343 * t29;
-    const real t457 = t127 * t364;
-    const real t458 = t456 + t457;
-    const real t459 = t375 * t14;
-    const real t460 = t135 * t391;
-    const real t461 = t459 + t460;
-    const real t462 = t458 + t461;
-    const real t463 = t455 + t462;
-    const real t464 = t452 + t463;
-    d_motion[8] = t464;
-    return 0;
+  (void)c;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139) + (d_c[3] + (s[2] *
+    d_H[11] + H[11] * d_s[2] + (s[1] * d_H[10] + H[10] * d_s[1] + (s[0] * d_H[9] + H[9] * d_s[0]))))
+    + (motion_I[5] * t34 + t65 * d_motion_I[5] + (motion_I[4] * t19 + t73 * d_motion_I[4] +
+    (motion_I[3] * t4 + t81 * d_motion_I[3])));
+  real t191 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t191 * d_w[2]) + (d_c[4] + (H[14] *
+    d_s[2] + s[2] * d_H[14] + (H[13] * d_s[1] + s[1] * d_H[13] + (H[12] * d_s[0] + s[0] *
+    d_H[12])))) + (motion_I[5] * t39 + t92 * d_motion_I[5] + (motion_I[4] * t24 + t100 *
+    d_motion_I[4] + (motion_I[3] * t9 + t108 * d_motion_I[3])));
+  d_motion[5] = w[1] * t85 + t191 * d_w[1] - (t146 * d_w[0] + w[0] * t112) + (d_c[5] + (H[17] *
+    d_s[2] + s[2] * d_H[17] + (H[16] * d_s[1] + s[1] * d_H[16] + (H[15] * d_s[0] + s[0] *
+    d_H[15])))) + (motion_I[5] * t44 + t119 * d_motion_I[5] + (motion_I[4] * t29 + t127 *
+    d_motion_I[4] + (motion_I[3] * t14 + t135 * d_motion_I[3])));
+  real t279 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t280 = motion_I[0] * motion_I[2];
+  real t281 = t280 - motion_I[4];
+  real t288 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t289 = motion_I[1] * motion_I[2];
+  real t290 = motion_I[3] + t289;
+  real t298 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t299 = motion_I[1] * motion_I[1];
+  real t300 = motion_I[0] * motion_I[0];
+  real t301 = t299 + t300;
+  real t304 = t279 * t281 + t288 * t290 - t298 * t301 + motion_I[8];
+  real t309 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t316 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t322 = motion_I[0] * d_motion_I[0];
+  real t323 = t322 + t322;
+  real t324 = motion_I[1] * d_motion_I[1];
+  real t325 = t324 + t324;
+  real t330 = d_motion_I[8] + (t290 * t54 + t288 * (d_motion_I[3] + t309) + (t281 * t49 + t279 *
+    (t316 - d_motion_I[4])) - (t301 * t59 + t298 * (t323 + t325)));
+  real t333 = motion_I[0] * motion_I[1];
+  real t334 = motion_I[5] + t333;
+  real t336 = motion_I[2] * motion_I[2];
+  real t337 = t336 + t300;
+  real t340 = t289 - motion_I[3];
+  real t343 = t279 * t334 - t288 * t337 + t298 * t340 + motion_I[7];
+  real t352 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t357 = motion_I[2] * d_motion_I[2];
+  real t358 = t357 + t357;
+  real t364 = d_motion_I[7] + (t340 * t59 + t298 * (t309 - d_motion_I[3]) + (t334 * t49 + t279 *
+    (d_motion_I[5] + t352) - (t337 * t54 + t288 * (t323 + t358))));
+  real t367 = t333 - motion_I[5];
+  real t369 = t299 + t336;
+  real t372 = motion_I[4] + t280;
+  real t375 = t288 * t367 - t279 * t369 + t298 * t372 + motion_I[6];
+  real t391 = d_motion_I[6] + (t372 * t59 + t298 * (d_motion_I[4] + t316) + (t367 * t54 + t288 *
+    (t352 - d_motion_I[5]) - (t369 * t49 + t279 * (t325 + t358))));
+  d_motion[6] = 2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]) + (d_c[0]
+    + (H[2] * d_s[2] + s[2] * d_H[2] + (H[1] * d_s[1] + s[1] * d_H[1] + (H[0] * d_s[0] + s[0] *
+    d_H[0])))) + (t304 * t34 + t65 * t330 + (t343 * t19 + t73 * t364 + (t375 * t4 + t81 * t391)));
+  d_motion[7] = 2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t191 * d_v[2]) + (d_c[1] +
+    (H[5] * d_s[2] + s[2] * d_H[5] + (H[4] * d_s[1] + s[1] * d_H[4] + (H[3] * d_s[0] + s[0] *
+    d_H[3])))) + (t304 * t39 + t92 * t330 + (t343 * t24 + t100 * t364 + (t375 * t9 + t108 * t391)));
+  d_motion[8] = 2.0 * (v[1] * t85 + t191 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]) + (d_c[2] +
+    (H[8] * d_s[2] + s[2] * d_H[8] + (H[7] * d_s[1] + s[1] * d_H[7] + (H[6] * d_s[0] + s[0] *
+    d_H[6])))) + (t304 * t44 + t119 * t330 + (t343 * t29 + t127 * t364 + (t375 * t14 + t135 *
+    t391)));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 18, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 18, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 3, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6][3] motion subspace
@@ -8717,100 +2480,21 @@ static const mstmm_port mstmm_sweep_generic3_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[3] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic3_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic3_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    const real t0 = f[5] * d_H[15];
-    const real t1 = H[15] * d_f[5];
-    const real t2 = t0 + t1;
-    const real t3 = f[4] * d_H[12];
-    const real t4 = H[12] * d_f[4];
-    const real t5 = t3 + t4;
-    const real t6 = f[3] * d_H[9];
-    const real t7 = H[9] * d_f[3];
-    const real t8 = t6 + t7;
-    const real t9 = f[2] * d_H[6];
-    const real t10 = H[6] * d_f[2];
-    const real t11 = t9 + t10;
-    const real t12 = f[1] * d_H[3];
-    const real t13 = H[3] * d_f[1];
-    const real t14 = t12 + t13;
-    const real t15 = f[0] * d_H[0];
-    const real t16 = H[0] * d_f[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_tau[0] = t22;
-    const real t23 = H[16] * d_f[5];
-    const real t24 = f[5] * d_H[16];
-    const real t25 = t23 + t24;
-    const real t26 = H[13] * d_f[4];
-    const real t27 = f[4] * d_H[13];
-    const real t28 = t26 + t27;
-    const real t29 = H[10] * d_f[3];
-    const real t30 = f[3] * d_H[10];
-    const real t31 = t29 + t30;
-    const real t32 = H[7] * d_f[2];
-    const real t33 = f[2] * d_H[7];
-    const real t34 = t32 + t33;
-    const real t35 = H[4] * d_f[1];
-    const real t36 = f[1] * d_H[4];
-    const real t37 = t35 + t36;
-    const real t38 = H[1] * d_f[0];
-    const real t39 = f[0] * d_H[1];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t31 + t42;
-    const real t44 = t28 + t43;
-    const real t45 = t25 + t44;
-    d_tau[1] = t45;
-    const real t46 = H[17] * d_f[5];
-    const real t47 = f[5] * d_H[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[14] * d_f[4];
-    const real t50 = f[4] * d_H[14];
-    const real t51 = t49 + t50;
-    const real t52 = H[11] * d_f[3];
-    const real t53 = f[3] * d_H[11];
-    const real t54 = t52 + t53;
-    const real t55 = H[8] * d_f[2];
-    const real t56 = f[2] * d_H[8];
-    const real t57 = t55 + t56;
-    const real t58 = H[5] * d_f[1];
-    const real t59 = f[1] * d_H[5];
-    const real t60 = t58 + t59;
-    const real t61 = H[2] * d_f[0];
-    const real t62 = f[0] * d_H[2];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    const real t66 = t54 + t65;
-    const real t67 = t51 + t66;
-    const real t68 = t48 + t67;
-    d_tau[2] = t68;
-    return 0;
+  d_tau[0] = f[5] * d_H[15] + H[15] * d_f[5] + (f[4] * d_H[12] + H[12] * d_f[4] + (f[3] * d_H[9] +
+    H[9] * d_f[3] + (f[2] * d_H[6] + H[6] * d_f[2] + (f[1] * d_H[3] + H[3] * d_f[1] + (f[0] * d_H[0]
+    + H[0] * d_f[0])))));
+  d_tau[1] = H[16] * d_f[5] + f[5] * d_H[16] + (H[13] * d_f[4] + f[4] * d_H[13] + (H[10] * d_f[3] +
+    f[3] * d_H[10] + (H[7] * d_f[2] + f[2] * d_H[7] + (H[4] * d_f[1] + f[1] * d_H[4] + (H[1] *
+    d_f[0] + f[0] * d_H[1])))));
+  d_tau[2] = H[17] * d_f[5] + f[5] * d_H[17] + (H[14] * d_f[4] + f[4] * d_H[14] + (H[11] * d_f[3] +
+    f[3] * d_H[11] + (H[8] * d_f[2] + f[2] * d_H[8] + (H[5] * d_f[1] + f[1] * d_H[5] + (H[2] *
+    d_f[0] + f[0] * d_H[2])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_effort_slope_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 18, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_effort_slope_outputs[] = {
-    {"d_tau", 3, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -8818,1218 +2502,344 @@ static const mstmm_port mstmm_sweep_generic3_effort_slope_outputs[] = {
  * in  d_H[6][3] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic3_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic3_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    const real t0 = H[15] * H[15];
-    const real t1 = H[12] * H[12];
-    const real t2 = H[9] * H[9];
-    const real t3 = H[6] * H[6];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[3] * H[3];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 1.0 / t10;
-    const real t12 = t11 * d_H[0];
-    const real t13 = H[3] * d_H[3];
-    const real t14 = t13 + t13;
-    const real t15 = H[0] * d_H[0];
-    const real t16 = t15 + t15;
-    const real t17 = t14 + t16;
-    const real t18 = H[6] * d_H[6];
-    const real t19 = t18 + t18;
-    const real t20 = t17 + t19;
-    const real t21 = H[9] * d_H[9];
-    const real t22 = t21 + t21;
-    const real t23 = t20 + t22;
-    const real t24 = H[12] * d_H[12];
-    const real t25 = t24 + t24;
-    const real t26 = t23 + t25;
-    const real t27 = H[15] * d_H[15];
-    const real t28 = t27 + t27;
-    const real t29 = t26 + t28;
-    const real t30 = t11 * t29;
-    const real t31 = t30 / t10;
-    const real t32 = H[0] * t31;
-    const real t33 = t12 - t32;
-    const real t34 = H[1] * H[1];
-    const real t35 = H[4] * H[4];
-    const real t36 = t34 + t35;
-    const real t37 = H[7] * H[7];
-    const real t38 = t36 + t37;
-    const real t39 = H[10] * H[10];
-    const real t40 = t38 + t39;
-    const real t41 = H[13] * H[13];
-    const real t42 = t40 + t41;
-    const real t43 = H[16] * H[16];
-    const real t44 = t42 + t43;
-    const real t45 = H[15] * H[16];
-    const real t46 = H[12] * H[13];
-    const real t47 = H[9] * H[10];
-    const real t48 = H[6] * H[7];
-    const real t49 = H[3] * H[4];
-    const real t50 = H[0] * H[1];
-    const real t51 = t49 + t50;
-    const real t52 = t48 + t51;
-    const real t53 = t47 + t52;
-    const real t54 = t46 + t53;
-    const real t55 = t45 + t54;
-    const real t56 = t55 * t11;
-    const real t57 = t55 * t56;
-    const real t58 = t44 - t57;
-    const real t59 = 1.0 / t58;
-    const real t60 = H[0] * t56;
-    const real t61 = H[1] - t60;
-    const real t62 = t59 * t61;
-    const real t63 = H[1] * H[2];
-    const real t64 = H[4] * H[5];
-    const real t65 = t63 + t64;
-    const real t66 = H[7] * H[8];
-    const real t67 = t65 + t66;
-    const real t68 = H[10] * H[11];
-    const real t69 = t67 + t68;
-    const real t70 = H[13] * H[14];
-    const real t71 = t69 + t70;
-    const real t72 = H[16] * H[17];
-    const real t73 = t71 + t72;
-    const real t74 = H[15] * H[17];
-    const real t75 = H[12] * H[14];
-    const real t76 = H[9] * H[11];
-    const real t77 = H[6] * H[8];
-    const real t78 = H[3] * H[5];
-    const real t79 = H[0] * H[2];
-    const real t80 = t78 + t79;
-    const real t81 = t77 + t80;
-    const real t82 = t76 + t81;
-    const real t83 = t75 + t82;
-    const real t84 = t74 + t83;
-    const real t85 = t56 * t84;
-    const real t86 = t73 - t85;
-    const real t87 = t86 * t59;
-    const real t88 = H[2] * H[2];
-    const real t89 = H[5] * H[5];
-    const real t90 = t88 + t89;
-    const real t91 = H[8] * H[8];
-    const real t92 = t90 + t91;
-    const real t93 = H[11] * H[11];
-    const real t94 = t92 + t93;
-    const real t95 = H[14] * H[14];
-    const real t96 = t94 + t95;
-    const real t97 = H[17] * H[17];
-    const real t98 = t96 + t97;
-    const real t99 = t11 * t84;
-    const real t100 = t84 * t99;
-    const real t101 = t98 - t100;
-    const real t102 = t86 * t87;
-    const real t103 = t101 - t102;
-    const real t104 = 1.0 / t103;
-    const real t105 = H[0] * t99;
-    const real t106 = H[2] - t105;
-    const real t107 = t87 * t61;
-    const real t108 = t106 - t107;
-    const real t109 = t104 * t108;
-    const real t110 = t87 * t109;
-    const real t111 = t62 - t110;
-    const real t112 = H[1] * d_H[0];
-    const real t113 = H[0] * d_H[1];
-    const real t114 = t112 + t113;
-    const real t115 = H[4] * d_H[3];
-    const real t116 = H[3] * d_H[4];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    const real t119 = H[7] * d_H[6];
-    const real t120 = H[6] * d_H[7];
-    const real t121 = t119 + t120;
-    const real t122 = t118 + t121;
-    const real t123 = H[10] * d_H[9];
-    const real t124 = H[9] * d_H[10];
-    const real t125 = t123 + t124;
-    const real t126 = t122 + t125;
-    const real t127 = H[13] * d_H[12];
-    const real t128 = H[12] * d_H[13];
-    const real t129 = t127 + t128;
-    const real t130 = t126 + t129;
-    const real t131 = H[16] * d_H[15];
-    const real t132 = H[15] * d_H[16];
-    const real t133 = t131 + t132;
-    const real t134 = t130 + t133;
-    const real t135 = t11 * t134;
-    const real t136 = t55 * t31;
-    const real t137 = t135 - t136;
-    const real t138 = t111 * t137;
-    const real t139 = t56 * d_H[0];
-    const real t140 = H[0] * t137;
-    const real t141 = t139 + t140;
-    const real t142 = d_H[1] - t141;
-    const real t143 = t59 * t142;
-    const real t144 = H[16] * d_H[16];
-    const real t145 = t144 + t144;
-    const real t146 = H[13] * d_H[13];
-    const real t147 = t146 + t146;
-    const real t148 = H[10] * d_H[10];
-    const real t149 = t148 + t148;
-    const real t150 = H[7] * d_H[7];
-    const real t151 = t150 + t150;
-    const real t152 = H[4] * d_H[4];
-    const real t153 = t152 + t152;
-    const real t154 = H[1] * d_H[1];
-    const real t155 = t154 + t154;
-    const real t156 = t153 + t155;
-    const real t157 = t151 + t156;
-    const real t158 = t149 + t157;
-    const real t159 = t147 + t158;
-    const real t160 = t145 + t159;
-    const real t161 = t56 * t134;
-    const real t162 = t55 * t137;
-    const real t163 = t161 + t162;
-    const real t164 = t160 - t163;
-    const real t165 = t59 * t164;
-    const real t166 = t165 / t58;
-    const real t167 = t61 * t166;
-    const real t168 = t143 - t167;
-    const real t169 = H[17] * d_H[16];
-    const real t170 = H[16] * d_H[17];
-    const real t171 = t169 + t170;
-    const real t172 = H[14] * d_H[13];
-    const real t173 = H[13] * d_H[14];
-    const real t174 = t172 + t173;
-    const real t175 = H[11] * d_H[10];
-    const real t176 = H[10] * d_H[11];
-    const real t177 = t175 + t176;
-    const real t178 = H[8] * d_H[7];
-    const real t179 = H[7] * d_H[8];
-    const real t180 = t178 + t179;
-    const real t181 = H[5] * d_H[4];
-    const real t182 = H[4] * d_H[5];
-    const real t183 = t181 + t182;
-    const real t184 = H[2] * d_H[1];
-    const real t185 = H[1] * d_H[2];
-    const real t186 = t184 + t185;
-    const real t187 = t183 + t186;
-    const real t188 = t180 + t187;
-    const real t189 = t177 + t188;
-    const real t190 = t174 + t189;
-    const real t191 = t171 + t190;
-    const real t192 = t84 * t137;
-    const real t193 = H[2] * d_H[0];
-    const real t194 = H[0] * d_H[2];
-    const real t195 = t193 + t194;
-    const real t196 = H[5] * d_H[3];
-    const real t197 = H[3] * d_H[5];
-    const real t198 = t196 + t197;
-    const real t199 = t195 + t198;
-    const real t200 = H[8] * d_H[6];
-    const real t201 = H[6] * d_H[8];
-    const real t202 = t200 + t201;
-    const real t203 = t199 + t202;
-    const real t204 = H[11] * d_H[9];
-    const real t205 = H[9] * d_H[11];
-    const real t206 = t204 + t205;
-    const real t207 = t203 + t206;
-    const real t208 = H[14] * d_H[12];
-    const real t209 = H[12] * d_H[14];
-    const real t210 = t208 + t209;
-    const real t211 = t207 + t210;
-    const real t212 = H[17] * d_H[15];
-    const real t213 = H[15] * d_H[17];
-    const real t214 = t212 + t213;
-    const real t215 = t211 + t214;
-    const real t216 = t56 * t215;
-    const real t217 = t192 + t216;
-    const real t218 = t191 - t217;
-    const real t219 = t59 * t218;
-    const real t220 = t86 * t166;
-    const real t221 = t219 - t220;
-    const real t222 = t109 * t221;
-    const real t223 = t99 * d_H[0];
-    const real t224 = t11 * t215;
-    const real t225 = t84 * t31;
-    const real t226 = t224 - t225;
-    const real t227 = H[0] * t226;
-    const real t228 = t223 + t227;
-    const real t229 = d_H[2] - t228;
-    const real t230 = t61 * t221;
-    const real t231 = t87 * t142;
-    const real t232 = t230 + t231;
-    const real t233 = t229 - t232;
-    const real t234 = t104 * t233;
-    const real t235 = H[17] * d_H[17];
-    const real t236 = t235 + t235;
-    const real t237 = H[14] * d_H[14];
-    const real t238 = t237 + t237;
-    const real t239 = H[11] * d_H[11];
-    const real t240 = t239 + t239;
-    const real t241 = H[8] * d_H[8];
-    const real t242 = t241 + t241;
-    const real t243 = H[5] * d_H[5];
-    const real t244 = t243 + t243;
-    const real t245 = H[2] * d_H[2];
-    const real t246 = t245 + t245;
-    const real t247 = t244 + t246;
-    const real t248 = t242 + t247;
-    const real t249 = t240 + t248;
-    const real t250 = t238 + t249;
-    const real t251 = t236 + t250;
-    const real t252 = t99 * t215;
-    const real t253 = t84 * t226;
-    const real t254 = t252 + t253;
-    const real t255 = t251 - t254;
-    const real t256 = t87 * t218;
-    const real t257 = t86 * t221;
-    const real t258 = t256 + t257;
-    const real t259 = t255 - t258;
-    const real t260 = t104 * t259;
-    const real t261 = t260 / t103;
-    const real t262 = t108 * t261;
-    const real t263 = t234 - t262;
-    const real t264 = t87 * t263;
-    const real t265 = t222 + t264;
-    const real t266 = t168 - t265;
-    const real t267 = t56 * t266;
-    const real t268 = t138 + t267;
-    const real t269 = t33 - t268;
-    const real t270 = t109 * t226;
-    const real t271 = t99 * t263;
-    const real t272 = t270 + t271;
-    const real t273 = t269 - t272;
-    d_W[0] = t273;
-    const real t274 = t11 * d_H[3];
-    const real t275 = H[3] * t31;
-    const real t276 = t274 - t275;
-    const real t277 = H[3] * t56;
-    const real t278 = H[4] - t277;
-    const real t279 = t59 * t278;
-    const real t280 = H[3] * t99;
-    const real t281 = H[5] - t280;
-    const real t282 = t87 * t278;
-    const real t283 = t281 - t282;
-    const real t284 = t104 * t283;
-    const real t285 = t87 * t284;
-    const real t286 = t279 - t285;
-    const real t287 = t286 * t137;
-    const real t288 = t56 * d_H[3];
-    const real t289 = H[3] * t137;
-    const real t290 = t288 + t289;
-    const real t291 = d_H[4] - t290;
-    const real t292 = t59 * t291;
-    const real t293 = t278 * t166;
-    const real t294 = t292 - t293;
-    const real t295 = t284 * t221;
-    const real t296 = t99 * d_H[3];
-    const real t297 = H[3] * t226;
-    const real t298 = t296 + t297;
-    const real t299 = d_H[5] - t298;
-    const real t300 = t278 * t221;
-    const real t301 = t87 * t291;
-    const real t302 = t300 + t301;
-    const real t303 = t299 - t302;
-    const real t304 = t104 * t303;
-    const real t305 = t283 * t261;
-    const real t306 = t304 - t305;
-    const real t307 = t87 * t306;
-    const real t308 = t295 + t307;
-    const real t309 = t294 - t308;
-    const real t310 = t56 * t309;
-    const real t311 = t287 + t310;
-    const real t312 = t276 - t311;
-    const real t313 = t284 * t226;
-    const real t314 = t99 * t306;
-    const real t315 = t313 + t314;
-    const real t316 = t312 - t315;
-    d_W[1] = t316;
-    const real t317 = t11 * d_H[6];
-    const real t318 = H[6] * t31;
-    const real t319 = t317 - t318;
-    const real t320 = H[6] * t56;
-    const real t321 = H[7] - t320;
-    const real t322 = t59 * t321;
-    const real t323 = H[6] * t99;
-    const real t324 = H[8] - t323;
-    const real t325 = t87 * t321;
-    const real t326 = t324 - t325;
-    const real t327 = t104 * t326;
-    const real t328 = t87 * t327;
-    const real t329 = t322 - t328;
-    const real t330 = t329 * t137;
-    const real t331 = t56 * d_H[6];
-    const real t332 = H[6] * t137;
-    const real t333 = t331 + t332;
-    const real t334 = d_H[7] - t333;
-    const real t335 = t59 * t334;
-    const real t336 = t321 * t166;
-    const real t337 = t335 - t336;
-    const real t338 = t327 * t221;
-    const real t339 = t99 * d_H[6];
-    const real t340 = H[6] * t226;
-    const real t341 = t339 + t340;
-    const real t342 = d_H[8] - t341;
-    const real t343 = t321 * t221;
-    const real t344 = t87 * t334;
-    const real t345 = t343 + t344;
-    const real t346 = t342 - t345;
-    const real t347 = t104 * t346;
-    const real t348 = t326 * t261;
-    const real t349 = t347 - t348;
-    const real t350 = t87 * t349;
-    const real t351 = t338 + t350;
-    const real t352 = t337 - t351;
-    const real t353 = t56 * t352;
-    const real t354 = t330 + t353;
-    const real t355 = t319 - t354;
-    const real t356 = t327 * t226;
-    const real t357 = t99 * t349;
-    const real t358 = t356 + t357;
-    const real t359 = t355 - t358;
-    d_W[2] = t359;
-    const real t360 = t11 * d_H[9];
-    const real t361 = H[9] * t31;
-    const real t362 = t360 - t361;
-    const real t363 = H[9] * t56;
-    const real t364 = H[10] - t363;
-    const real t365 = t59 * t364;
-    const real t366 = H[9] * t99;
-    const real t367 = H[11] - t366;
-    const real t368 = t87 * t364;
-    const real t369 = t367 - t368;
-    const real t370 = t104 * t369;
-    const real t371 = t87 * t370;
-    const real t372 = t365 - t371;
-    const real t373 = t372 * t137;
-    const real t374 = t56 * d_H[9];
-    const real t375 = H[9] * t137;
-    const real t376 = t374 + t375;
-    const real t377 = d_H[10] - t376;
-    const real t378 = t59 * t377;
-    const real t379 = t364 * t166;
-    const real t380 = t378 - t379;
-    const real t381 = t370 * t221;
-    const real t382 = t99 * d_H[9];
-    const real t383 = H[9] * t226;
-    const real t384 = t382 + t383;
-    const real t385 = d_H[11] - t384;
-    const real t386 = t364 * t221;
-    const real t387 = t87 * t377;
-    const real t388 = t386 + t387;
-    const real t389 = t385 - t388;
-    const real t390 = t104 * t389;
-    const real t391 = t369 * t261;
-    const real t392 = t390 - t391;
-    const real t393 = t87 * t392;
-    const real t394 = t381 + t393;
-    const real t395 = t380 - t394;
-    const real t396 = t56 * t395;
-    const real t397 = t373 + t396;
-    const real t398 = t362 - t397;
-    const real t399 = t370 * t226;
-    const real t400 = t99 * t392;
-    const real t401 = t399 + t400;
-    const real t402 = t398 - t401;
-    d_W[3] = t402;
-    const real t403 = t11 * d_H[12];
-    const real t404 = H[12] * t31;
-    const real t405 = t403 - t404;
-    const real t406 = H[12] * t56;
-    const real t407 = H[13] - t406;
-    const real t408 = t59 * t407;
-    const real t409 = H[12] * t99;
-    const real t410 = H[14] - t409;
-    const real t411 = t87 * t407;
-    const real t412 = t410 - t411;
-    const real t413 = t104 * t412;
-    const real t414 = t87 * t413;
-    const real t415 = t408 - t414;
-    const real t416 = t415 * t137;
-    const real t417 = t56 * d_H[12];
-    const real t418 = H[12] * t137;
-    const real t419 = t417 + t418;
-    const real t420 = d_H[13] - t419;
-    const real t421 = t59 * t420;
-    const real t422 = t407 * t166;
-    const real t423 = t421 - t422;
-    const real t424 = t413 * t221;
-    const real t425 = t99 * d_H[12];
-    const real t426 = H[12] * t226;
-    const real t427 = t425 + t426;
-    const real t428 = d_H[14] - t427;
-    const real t429 = t407 * t221;
-    const real t430 = t87 * t420;
-    const real t431 = t429 + t430;
-    const real t432 = t428 - t431;
-    const real t433 = t104 * t432;
-    const real t434 = t412 * t261;
-    const real t435 = t433 - t434;
-    const real t436 = t87 * t435;
-    const real t437 = t424 + t436;
-    const real t438 = t423 - t437;
-    const real t439 = t56 * t438;
-    const real t440 = t416 + t439;
-    const real t441 = t405 - t440;
-    const real t442 = t413 * t226;
-    const real t443 = t99 * t435;
-    const real t444 = t442 + t443;
-    const real t445 = t441 - t444;
-    d_W[4] = t445;
-    const real t446 = t11 * d_H[15];
-    const real t447 = H[15] * t31;
-    const real t448 = t446 - t447;
-    const real t449 = H[15] * t56;
-    const real t450 = H[16] - t449;
-    const real t451 = t59 * t450;
-    const real t452 = H[15] * t99;
-    const real t453 = H[17] - t452;
-    const real t454 = t87 * t450;
-    const real t455 = t453 - t454;
-    const real t456 = t104 * t455;
-    const real t457 = t87 * t456;
-    const real t458 = t451 - t457;
-    const real t459 = t458 * t137;
-    const real t460 = t56 * d_H[15];
-    const real t461 = H[15] * t137;
-    const real t462 = t460 + t461;
-    const real t463 = d_H[16] - t462;
-    const real t464 = t59 * t463;
-    const real t465 = t450 * t166;
-    const real t466 = t464 - t465;
-    const real t467 = t456 * t221;
-    const real t468 = t99 * d_H[15];
-    const real t469 = H[15] * t226;
-    const real t470 = t468 + t469;
-    const real t471 = d_H[17] - t470;
-    const real t472 = t450 * t221;
-    const real t473 = t87 * t463;
-    const real t474 = t472 + t473;
-    const real t475 = t471 - t474;
-    const real t476 = t104 * t475;
-    const real t477 = t455 * t261;
-    const real t478 = t476 - t477;
-    const real t479 = t87 * t478;
-    const real t480 = t467 + t479;
-    const real t481 = t466 - t480;
-    const real t482 = t56 * t481;
-    const real t483 = t459 + t482;
-    const real t484 = t448 - t483;
-    const real t485 = t456 * t226;
-    const real t486 = t99 * t478;
-    const real t487 = t485 + t486;
-    const real t488 = t484 - t487;
-    d_W[5] = t488;
-    d_W[6] = t266;
-    d_W[7] = t309;
-    d_W[8] = t352;
-    d_W[9] = t395;
-    d_W[10] = t438;
-    d_W[11] = t481;
-    d_W[12] = t263;
-    d_W[13] = t306;
-    d_W[14] = t349;
-    d_W[15] = t392;
-    d_W[16] = t435;
-    d_W[17] = t478;
-    const real t489 = sqrt(t10);
-    const real t490 = fabs(H[0]);
-    const real t491 = t489 + t490;
-    const real t492 = t489 * t491;
-    const real t493 = 0.0 < t492;
-    const real t494 = 1.0 / t492;
-    const real t495 = t493 != 0 ? t494 : 0.0;
-    const real t496 = H[0] < 0.0;
-    const real t497 = -t489;
-    const real t498 = t496 != 0 ? t497 : t489;
-    const real t499 = H[0] + t498;
-    const real t500 = H[2] * t499;
-    const real t501 = t78 + t500;
-    const real t502 = t77 + t501;
-    const real t503 = t76 + t502;
-    const real t504 = t75 + t503;
-    const real t505 = t74 + t504;
-    const real t506 = t495 * t505;
-    const real t507 = H[9] * t506;
-    const real t508 = H[11] - t507;
-    const real t509 = H[1] * t499;
-    const real t510 = t49 + t509;
-    const real t511 = t48 + t510;
-    const real t512 = t47 + t511;
-    const real t513 = t46 + t512;
-    const real t514 = t45 + t513;
-    const real t515 = t495 * t514;
-    const real t516 = H[9] * t515;
-    const real t517 = H[10] - t516;
-    const real t518 = H[15] * t515;
-    const real t519 = H[16] - t518;
-    const real t520 = t519 * t519;
-    const real t521 = H[12] * t515;
-    const real t522 = H[13] - t521;
-    const real t523 = t522 * t522;
-    const real t524 = t517 * t517;
-    const real t525 = H[3] * t515;
-    const real t526 = H[4] - t525;
-    const real t527 = t526 * t526;
-    const real t528 = H[6] * t515;
-    const real t529 = H[7] - t528;
-    const real t530 = t529 * t529;
-    const real t531 = t527 + t530;
-    const real t532 = t524 + t531;
-    const real t533 = t523 + t532;
-    const real t534 = t520 + t533;
-    const real t535 = sqrt(t534);
-    const real t536 = fabs(t526);
-    const real t537 = t535 + t536;
-    const real t538 = t535 * t537;
-    const real t539 = 0.0 < t538;
-    const real t540 = 1.0 / t538;
-    const real t541 = t539 != 0 ? t540 : 0.0;
-    const real t542 = H[15] * t506;
-    const real t543 = H[17] - t542;
-    const real t544 = t519 * t543;
-    const real t545 = H[12] * t506;
-    const real t546 = H[14] - t545;
-    const real t547 = t522 * t546;
-    const real t548 = t508 * t517;
-    const real t549 = H[3] * t506;
-    const real t550 = H[5] - t549;
-    const real t551 = t526 < 0.0;
-    const real t552 = -t535;
-    const real t553 = t551 != 0 ? t552 : t535;
-    const real t554 = t526 + t553;
-    const real t555 = t550 * t554;
-    const real t556 = H[6] * t506;
-    const real t557 = H[8] - t556;
-    const real t558 = t529 * t557;
-    const real t559 = t555 + t558;
-    const real t560 = t548 + t559;
-    const real t561 = t547 + t560;
-    const real t562 = t544 + t561;
-    const real t563 = t541 * t562;
-    const real t564 = t517 * t563;
-    const real t565 = t508 - t564;
-    const real t566 = t565 * t565;
-    const real t567 = t519 * t563;
-    const real t568 = t543 - t567;
-    const real t569 = t568 * t568;
-    const real t570 = t522 * t563;
-    const real t571 = t546 - t570;
-    const real t572 = t571 * t571;
-    const real t573 = t529 * t563;
-    const real t574 = t557 - t573;
-    const real t575 = t574 * t574;
-    const real t576 = t566 + t575;
-    const real t577 = t572 + t576;
-    const real t578 = t569 + t577;
-    const real t579 = sqrt(t578);
-    const real t580 = fabs(t574);
-    const real t581 = t579 + t580;
-    const real t582 = t579 * t581;
-    const real t583 = 0.0 < t582;
-    const real t584 = 1.0 / t582;
-    const real t585 = t583 != 0 ? t584 : 0.0;
-    const real t586 = t566 * t585;
-    const real t587 = 1.0 - t586;
-    const real t588 = t517 * t587;
-    const real t589 = t574 < 0.0;
-    const real t590 = -t579;
-    const real t591 = t589 != 0 ? t590 : t579;
-    const real t592 = t574 + t591;
-    const real t593 = t585 * t592;
-    const real t594 = t565 * t593;
-    const real t595 = t529 * t594;
-    const real t596 = t588 - t595;
-    const real t597 = t565 * t585;
-    const real t598 = t571 * t597;
-    const real t599 = t522 * t598;
-    const real t600 = t596 - t599;
-    const real t601 = t568 * t597;
-    const real t602 = t519 * t601;
-    const real t603 = t600 - t602;
-    const real t604 = t541 * t603;
-    const real t605 = t517 * t604;
-    const real t606 = t587 - t605;
-    const real t607 = H[9] * t606;
-    const real t608 = t554 * t604;
-    const real t609 = H[3] * t608;
-    const real t610 = t529 * t604;
-    const real t611 = t594 + t610;
-    const real t612 = H[6] * t611;
-    const real t613 = t609 + t612;
-    const real t614 = t607 - t613;
-    const real t615 = t522 * t604;
-    const real t616 = t598 + t615;
-    const real t617 = H[12] * t616;
-    const real t618 = t614 - t617;
-    const real t619 = t519 * t604;
-    const real t620 = t601 + t619;
-    const real t621 = H[15] * t620;
-    const real t622 = t618 - t621;
-    const real t623 = t495 * t622;
-    const real t624 = t489 * 2.0;
-    const real t625 = t29 / t624;
-    const real t626 = -t625;
-    const real t627 = t496 != 0 ? t626 : t625;
-    const real t628 = d_H[0] + t627;
-    const real t629 = t623 * t628;
-    const real t630 = t491 * t625;
-    const real t631 = H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0]);
-    const real t632 = d_H[0] * t631;
-    const real t633 = t625 + t632;
-    const real t634 = t489 * t633;
-    const real t635 = t630 + t634;
-    const real t636 = t494 * t635;
-    const real t637 = t636 / t492;
-    const real t638 = -t637;
-    const real t639 = t493 != 0 ? t638 : 0.0;
-    const real t640 = t622 * t639;
-    const real t641 = t606 * d_H[9];
-    const real t642 = t506 * d_H[9];
-    const real t643 = t505 * t639;
-    const real t644 = t499 * d_H[2];
-    const real t645 = H[2] * t628;
-    const real t646 = t644 + t645;
-    const real t647 = t198 + t646;
-    const real t648 = t202 + t647;
-    const real t649 = t206 + t648;
-    const real t650 = t210 + t649;
-    const real t651 = t214 + t650;
-    const real t652 = t495 * t651;
-    const real t653 = t643 + t652;
-    const real t654 = H[9] * t653;
-    const real t655 = t642 + t654;
-    const real t656 = d_H[11] - t655;
-    const real t657 = t515 * d_H[9];
-    const real t658 = t514 * t639;
-    const real t659 = t499 * d_H[1];
-    const real t660 = H[1] * t628;
-    const real t661 = t659 + t660;
-    const real t662 = t117 + t661;
-    const real t663 = t121 + t662;
-    const real t664 = t125 + t663;
-    const real t665 = t129 + t664;
-    const real t666 = t133 + t665;
-    const real t667 = t495 * t666;
-    const real t668 = t658 + t667;
-    const real t669 = H[9] * t668;
-    const real t670 = t657 + t669;
-    const real t671 = d_H[10] - t670;
-    const real t672 = t563 * t671;
-    const real t673 = t515 * d_H[6];
-    const real t674 = H[6] * t668;
-    const real t675 = t673 + t674;
-    const real t676 = d_H[7] - t675;
-    const real t677 = t529 * t676;
-    const real t678 = t677 + t677;
-    const real t679 = t515 * d_H[3];
-    const real t680 = H[3] * t668;
-    const real t681 = t679 + t680;
-    const real t682 = d_H[4] - t681;
-    const real t683 = t526 * t682;
-    const real t684 = t683 + t683;
-    const real t685 = t678 + t684;
-    const real t686 = t517 * t671;
-    const real t687 = t686 + t686;
-    const real t688 = t685 + t687;
-    const real t689 = t515 * d_H[12];
-    const real t690 = H[12] * t668;
-    const real t691 = t689 + t690;
-    const real t692 = d_H[13] - t691;
-    const real t693 = t522 * t692;
-    const real t694 = t693 + t693;
-    const real t695 = t688 + t694;
-    const real t696 = t515 * d_H[15];
-    const real t697 = H[15] * t668;
-    const real t698 = t696 + t697;
-    const real t699 = d_H[16] - t698;
-    const real t700 = t519 * t699;
-    const real t701 = t700 + t700;
-    const real t702 = t695 + t701;
-    const real t703 = t535 * 2.0;
-    const real t704 = t702 / t703;
-    const real t705 = t537 * t704;
-    const real t706 = t526 > 0 ? 1 : (t526 < 0 ? -1 : t526);
-    const real t707 = t682 * t706;
-    const real t708 = t704 + t707;
-    const real t709 = t535 * t708;
-    const real t710 = t705 + t709;
-    const real t711 = t540 * t710;
-    const real t712 = t711 / t538;
-    const real t713 = -t712;
-    const real t714 = t539 != 0 ? t713 : 0.0;
-    const real t715 = t562 * t714;
-    const real t716 = t557 * t676;
-    const real t717 = t506 * d_H[6];
-    const real t718 = H[6] * t653;
-    const real t719 = t717 + t718;
-    const real t720 = d_H[8] - t719;
-    const real t721 = t529 * t720;
-    const real t722 = t716 + t721;
-    const real t723 = t506 * d_H[3];
-    const real t724 = H[3] * t653;
-    const real t725 = t723 + t724;
-    const real t726 = d_H[5] - t725;
-    const real t727 = t554 * t726;
-    const real t728 = -t704;
-    const real t729 = t551 != 0 ? t728 : t704;
-    const real t730 = t682 + t729;
-    const real t731 = t550 * t730;
-    const real t732 = t727 + t731;
-    const real t733 = t722 + t732;
-    const real t734 = t517 * t656;
-    const real t735 = t508 * t671;
-    const real t736 = t734 + t735;
-    const real t737 = t733 + t736;
-    const real t738 = t546 * t692;
-    const real t739 = t506 * d_H[12];
-    const real t740 = H[12] * t653;
-    const real t741 = t739 + t740;
-    const real t742 = d_H[14] - t741;
-    const real t743 = t522 * t742;
-    const real t744 = t738 + t743;
-    const real t745 = t737 + t744;
-    const real t746 = t543 * t699;
-    const real t747 = t506 * d_H[15];
-    const real t748 = H[15] * t653;
-    const real t749 = t747 + t748;
-    const real t750 = d_H[17] - t749;
-    const real t751 = t519 * t750;
-    const real t752 = t746 + t751;
-    const real t753 = t745 + t752;
-    const real t754 = t541 * t753;
-    const real t755 = t715 + t754;
-    const real t756 = t517 * t755;
-    const real t757 = t672 + t756;
-    const real t758 = t656 - t757;
-    const real t759 = t565 * t758;
-    const real t760 = t759 + t759;
-    const real t761 = t585 * t760;
-    const real t762 = t563 * t676;
-    const real t763 = t529 * t755;
-    const real t764 = t762 + t763;
-    const real t765 = t720 - t764;
-    const real t766 = t574 * t765;
-    const real t767 = t766 + t766;
-    const real t768 = t767 + t760;
-    const real t769 = t563 * t692;
-    const real t770 = t522 * t755;
-    const real t771 = t769 + t770;
-    const real t772 = t742 - t771;
-    const real t773 = t571 * t772;
-    const real t774 = t773 + t773;
-    const real t775 = t768 + t774;
-    const real t776 = t563 * t699;
-    const real t777 = t519 * t755;
-    const real t778 = t776 + t777;
-    const real t779 = t750 - t778;
-    const real t780 = t568 * t779;
-    const real t781 = t780 + t780;
-    const real t782 = t775 + t781;
-    const real t783 = t579 * 2.0;
-    const real t784 = t782 / t783;
-    const real t785 = t581 * t784;
-    const real t786 = t574 > 0 ? 1 : (t574 < 0 ? -1 : t574);
-    const real t787 = t765 * t786;
-    const real t788 = t787 + t784;
-    const real t789 = t579 * t788;
-    const real t790 = t785 + t789;
-    const real t791 = t584 * t790;
-    const real t792 = t791 / t582;
-    const real t793 = -t792;
-    const real t794 = t583 != 0 ? t793 : 0.0;
-    const real t795 = t566 * t794;
-    const real t796 = t761 + t795;
-    const real t797 = t604 * t671;
-    const real t798 = t603 * t714;
-    const real t799 = t587 * t671;
-    const real t800 = t517 * t796;
-    const real t801 = t799 - t800;
-    const real t802 = t594 * t676;
-    const real t803 = t593 * t758;
-    const real t804 = t592 * t794;
-    const real t805 = -t784;
-    const real t806 = t589 != 0 ? t805 : t784;
-    const real t807 = t765 + t806;
-    const real t808 = t585 * t807;
-    const real t809 = t804 + t808;
-    const real t810 = t565 * t809;
-    const real t811 = t803 + t810;
-    const real t812 = t529 * t811;
-    const real t813 = t802 + t812;
-    const real t814 = t801 - t813;
-    const real t815 = t598 * t692;
-    const real t816 = t597 * t772;
-    const real t817 = t585 * t758;
-    const real t818 = t565 * t794;
-    const real t819 = t817 + t818;
-    const real t820 = t571 * t819;
-    const real t821 = t816 + t820;
-    const real t822 = t522 * t821;
-    const real t823 = t815 + t822;
-    const real t824 = t814 - t823;
-    const real t825 = t601 * t699;
-    const real t826 = t597 * t779;
-    const real t827 = t568 * t819;
-    const real t828 = t826 + t827;
-    const real t829 = t519 * t828;
-    const real t830 = t825 + t829;
-    const real t831 = t824 - t830;
-    const real t832 = t541 * t831;
-    const real t833 = t798 + t832;
-    const real t834 = t517 * t833;
-    const real t835 = t797 + t834;
-    const real t836 = t796 + t835;
-    const real t837 = H[9] * t836;
-    const real t838 = t641 - t837;
-    const real t839 = t611 * d_H[6];
-    const real t840 = t604 * t676;
-    const real t841 = t529 * t833;
-    const real t842 = t840 + t841;
-    const real t843 = t811 + t842;
-    const real t844 = H[6] * t843;
-    const real t845 = t839 + t844;
-    const real t846 = t608 * d_H[3];
-    const real t847 = t604 * t730;
-    const real t848 = t554 * t833;
-    const real t849 = t847 + t848;
-    const real t850 = H[3] * t849;
-    const real t851 = t846 + t850;
-    const real t852 = t845 + t851;
-    const real t853 = t838 - t852;
-    const real t854 = t616 * d_H[12];
-    const real t855 = t604 * t692;
-    const real t856 = t522 * t833;
-    const real t857 = t855 + t856;
-    const real t858 = t821 + t857;
-    const real t859 = H[12] * t858;
-    const real t860 = t854 + t859;
-    const real t861 = t853 - t860;
-    const real t862 = t620 * d_H[15];
-    const real t863 = t604 * t699;
-    const real t864 = t519 * t833;
-    const real t865 = t863 + t864;
-    const real t866 = t828 + t865;
-    const real t867 = H[15] * t866;
-    const real t868 = t862 + t867;
-    const real t869 = t861 - t868;
-    const real t870 = t495 * t869;
-    const real t871 = t640 + t870;
-    const real t872 = t499 * t871;
-    const real t873 = t629 + t872;
-    const real t874 = -t873;
-    d_W[18] = t874;
-    const real t875 = t623 * d_H[3];
-    const real t876 = H[3] * t871;
-    const real t877 = t875 + t876;
-    const real t878 = t849 + t877;
-    const real t879 = -t878;
-    d_W[19] = t879;
-    const real t880 = t623 * d_H[6];
-    const real t881 = H[6] * t871;
-    const real t882 = t880 + t881;
-    const real t883 = t843 + t882;
-    const real t884 = -t883;
-    d_W[20] = t884;
-    const real t885 = t623 * d_H[9];
-    const real t886 = H[9] * t871;
-    const real t887 = t885 + t886;
-    const real t888 = t836 + t887;
-    const real t889 = -t888;
-    d_W[21] = t889;
-    const real t890 = t623 * d_H[12];
-    const real t891 = H[12] * t871;
-    const real t892 = t890 + t891;
-    const real t893 = t858 + t892;
-    const real t894 = -t893;
-    d_W[22] = t894;
-    const real t895 = t623 * d_H[15];
-    const real t896 = H[15] * t871;
-    const real t897 = t895 + t896;
-    const real t898 = t866 + t897;
-    const real t899 = -t898;
-    d_W[23] = t899;
-    const real t900 = t572 * t585;
-    const real t901 = 1.0 - t900;
-    const real t902 = t522 * t901;
-    const real t903 = t571 * t593;
-    const real t904 = t529 * t903;
-    const real t905 = t517 * t598;
-    const real t906 = t904 + t905;
-    const real t907 = t902 - t906;
-    const real t908 = t571 * t585;
-    const real t909 = t568 * t908;
-    const real t910 = t519 * t909;
-    const real t911 = t907 - t910;
-    const real t912 = t541 * t911;
-    const real t913 = t522 * t912;
-    const real t914 = t901 - t913;
-    const real t915 = H[12] * t914;
-    const real t916 = t517 * t912;
-    const real t917 = t598 + t916;
-    const real t918 = H[9] * t917;
-    const real t919 = t554 * t912;
-    const real t920 = H[3] * t919;
-    const real t921 = t529 * t912;
-    const real t922 = t903 + t921;
-    const real t923 = H[6] * t922;
-    const real t924 = t920 + t923;
-    const real t925 = t918 + t924;
-    const real t926 = t915 - t925;
-    const real t927 = t519 * t912;
-    const real t928 = t909 + t927;
-    const real t929 = H[15] * t928;
-    const real t930 = t926 - t929;
-    const real t931 = t495 * t930;
-    const real t932 = t931 * t628;
-    const real t933 = t930 * t639;
-    const real t934 = t914 * d_H[12];
-    const real t935 = t585 * t774;
-    const real t936 = t572 * t794;
-    const real t937 = t935 + t936;
-    const real t938 = t912 * t692;
-    const real t939 = t911 * t714;
-    const real t940 = t901 * t692;
-    const real t941 = t522 * t937;
-    const real t942 = t940 - t941;
-    const real t943 = t598 * t671;
-    const real t944 = t517 * t821;
-    const real t945 = t943 + t944;
-    const real t946 = t903 * t676;
-    const real t947 = t593 * t772;
-    const real t948 = t571 * t809;
-    const real t949 = t947 + t948;
-    const real t950 = t529 * t949;
-    const real t951 = t946 + t950;
-    const real t952 = t945 + t951;
-    const real t953 = t942 - t952;
-    const real t954 = t909 * t699;
-    const real t955 = t908 * t779;
-    const real t956 = t585 * t772;
-    const real t957 = t571 * t794;
-    const real t958 = t956 + t957;
-    const real t959 = t568 * t958;
-    const real t960 = t955 + t959;
-    const real t961 = t519 * t960;
-    const real t962 = t954 + t961;
-    const real t963 = t953 - t962;
-    const real t964 = t541 * t963;
-    const real t965 = t939 + t964;
-    const real t966 = t522 * t965;
-    const real t967 = t938 + t966;
-    const real t968 = t937 + t967;
-    const real t969 = H[12] * t968;
-    const real t970 = t934 - t969;
-    const real t971 = t922 * d_H[6];
-    const real t972 = t912 * t676;
-    const real t973 = t529 * t965;
-    const real t974 = t972 + t973;
-    const real t975 = t949 + t974;
-    const real t976 = H[6] * t975;
-    const real t977 = t971 + t976;
-    const real t978 = t919 * d_H[3];
-    const real t979 = t912 * t730;
-    const real t980 = t554 * t965;
-    const real t981 = t979 + t980;
-    const real t982 = H[3] * t981;
-    const real t983 = t978 + t982;
-    const real t984 = t977 + t983;
-    const real t985 = t917 * d_H[9];
-    const real t986 = t912 * t671;
-    const real t987 = t517 * t965;
-    const real t988 = t986 + t987;
-    const real t989 = t821 + t988;
-    const real t990 = H[9] * t989;
-    const real t991 = t985 + t990;
-    const real t992 = t984 + t991;
-    const real t993 = t970 - t992;
-    const real t994 = t928 * d_H[15];
-    const real t995 = t912 * t699;
-    const real t996 = t519 * t965;
-    const real t997 = t995 + t996;
-    const real t998 = t960 + t997;
-    const real t999 = H[15] * t998;
-    const real t1000 = t994 + t999;
-    const real t1001 = t993 - t1000;
-    const real t1002 = t495 * t1001;
-    const real t1003 = t933 + t1002;
-    const real t1004 = t499 * t1003;
-    const real t1005 = t932 + t1004;
-    const real t1006 = -t1005;
-    d_W[24] = t1006;
-    const real t1007 = t931 * d_H[3];
-    const real t1008 = H[3] * t1003;
-    const real t1009 = t1007 + t1008;
-    const real t1010 = t981 + t1009;
-    const real t1011 = -t1010;
-    d_W[25] = t1011;
-    const real t1012 = t931 * d_H[6];
-    const real t1013 = H[6] * t1003;
-    const real t1014 = t1012 + t1013;
-    const real t1015 = t975 + t1014;
-    const real t1016 = -t1015;
-    d_W[26] = t1016;
-    const real t1017 = t931 * d_H[9];
-    const real t1018 = H[9] * t1003;
-    const real t1019 = t1017 + t1018;
-    const real t1020 = t989 + t1019;
-    const real t1021 = -t1020;
-    d_W[27] = t1021;
-    const real t1022 = t931 * d_H[12];
-    const real t1023 = H[12] * t1003;
-    const real t1024 = t1022 + t1023;
-    const real t1025 = t968 + t1024;
-    const real t1026 = -t1025;
-    d_W[28] = t1026;
-    const real t1027 = t931 * d_H[15];
-    const real t1028 = H[15] * t1003;
-    const real t1029 = t1027 + t1028;
-    const real t1030 = t998 + t1029;
-    const real t1031 = -t1030;
-    d_W[29] = t1031;
-    const real t1032 = t569 * t585;
-    const real t1033 = 1.0 - t1032;
-    const real t1034 = t519 * t1033;
-    const real t1035 = t522 * t909;
-    const real t1036 = t568 * t593;
-    const real t1037 = t529 * t1036;
-    const real t1038 = t517 * t601;
-    const real t1039 = t1037 + t1038;
-    const real t1040 = t1035 + t1039;
-    const real t1041 = t1034 - t1040;
-    const real t1042 = t541 * t1041;
-    const real t1043 = t519 * t1042;
-    const real t1044 = t1033 - t1043;
-    const real t1045 = H[15] * t1044;
-    const real t1046 = t522 * t1042;
-    const real t1047 = t909 + t1046;
-    const real t1048 = H[12] * t1047;
-    const real t1049 = t517 * t1042;
-    const real t1050 = t601 + t1049;
-    const real t1051 = H[9] * t1050;
-    const real t1052 = t554 * t1042;
-    const real t1053 = H[3] * t1052;
-    const real t1054 = t529 * t1042;
-    const real t1055 = t1036 + t1054;
-    const real t1056 = H[6] * t1055;
-    const real t1057 = t1053 + t1056;
-    const real t1058 = t1051 + t1057;
-    const real t1059 = t1048 + t1058;
-    const real t1060 = t1045 - t1059;
-    const real t1061 = t495 * t1060;
-    const real t1062 = t1061 * t628;
-    const real t1063 = t1060 * t639;
-    const real t1064 = t1044 * d_H[15];
-    const real t1065 = t585 * t781;
-    const real t1066 = t569 * t794;
-    const real t1067 = t1065 + t1066;
-    const real t1068 = t1042 * t699;
-    const real t1069 = t1041 * t714;
-    const real t1070 = t1033 * t699;
-    const real t1071 = t519 * t1067;
-    const real t1072 = t1070 - t1071;
-    const real t1073 = t601 * t671;
-    const real t1074 = t517 * t828;
-    const real t1075 = t1073 + t1074;
-    const real t1076 = t1036 * t676;
-    const real t1077 = t593 * t779;
-    const real t1078 = t568 * t809;
-    const real t1079 = t1077 + t1078;
-    const real t1080 = t529 * t1079;
-    const real t1081 = t1076 + t1080;
-    const real t1082 = t1075 + t1081;
-    const real t1083 = t909 * t692;
-    const real t1084 = t522 * t960;
-    const real t1085 = t1083 + t1084;
-    const real t1086 = t1082 + t1085;
-    const real t1087 = t1072 - t1086;
-    const real t1088 = t541 * t1087;
-    const real t1089 = t1069 + t1088;
-    const real t1090 = t519 * t1089;
-    const real t1091 = t1068 + t1090;
-    const real t1092 = t1067 + t1091;
-    const real t1093 = H[15] * t1092;
-    const real t1094 = t1064 - t1093;
-    const real t1095 = t1055 * d_H[6];
-    const real t1096 = t1042 * t676;
-    const real t1097 = t529 * t1089;
-    const real t1098 = t1096 + t1097;
-    const real t1099 = t1079 + t1098;
-    const real t1100 = H[6] * t1099;
-    const real t1101 = t1095 + t1100;
-    const real t1102 = t1052 * d_H[3];
-    const real t1103 = t1042 * t730;
-    const real t1104 = t554 * t1089;
-    const real t1105 = t1103 + t1104;
-    const real t1106 = H[3] * t1105;
-    const real t1107 = t1102 + t1106;
-    const real t1108 = t1101 + t1107;
-    const real t1109 = t1050 * d_H[9];
-    const real t1110 = t1042 * t671;
-    const real t1111 = t517 * t1089;
-    const real t1112 = t1110 + t1111;
-    const real t1113 = t828 + t1112;
-    const real t1114 = H[9] * t1113;
-    const real t1115 = t1109 + t1114;
-    const real t1116 = t1108 + t1115;
-    const real t1117 = t1047 * d_H[12];
-    const real t1118 = t1042 * t692;
-    const real t1119 = t522 * t1089;
-    const real t1120 = t1118 + t1119;
-    const real t1121 = t960 + t1120;
-    const real t1122 = H[12] * t1121;
-    const real t1123 = t1117 + t1122;
-    const real t1124 = t1116 + t1123;
-    const real t1125 = t1094 - t1124;
-    const real t1126 = t495 * t1125;
-    const real t1127 = t1063 + t1126;
-    const real t1128 = t499 * t1127;
-    const real t1129 = t1062 + t1128;
-    const real t1130 = -t1129;
-    d_W[30] = t1130;
-    const real t1131 = t1061 * d_H[3];
-    const real t1132 = H[3] * t1127;
-    const real t1133 = t1131 + t1132;
-    const real t1134 = t1105 + t1133;
-    const real t1135 = -t1134;
-    d_W[31] = t1135;
-    const real t1136 = t1061 * d_H[6];
-    const real t1137 = H[6] * t1127;
-    const real t1138 = t1136 + t1137;
-    const real t1139 = t1099 + t1138;
-    const real t1140 = -t1139;
-    d_W[32] = t1140;
-    const real t1141 = t1061 * d_H[9];
-    const real t1142 = H[9] * t1127;
-    const real t1143 = t1141 + t1142;
-    const real t1144 = t1113 + t1143;
-    const real t1145 = -t1144;
-    d_W[33] = t1145;
-    const real t1146 = t1061 * d_H[12];
-    const real t1147 = H[12] * t1127;
-    const real t1148 = t1146 + t1147;
-    const real t1149 = t1121 + t1148;
-    const real t1150 = -t1149;
-    d_W[34] = t1150;
-    const real t1151 = t1061 * d_H[15];
-    const real t1152 = H[15] * t1127;
-    const real t1153 = t1151 + t1152;
-    const real t1154 = t1092 + t1153;
-    const real t1155 = -t1154;
-    d_W[35] = t1155;
-    return 0;
+  real t10 = H[15] * H[15] + (H[12] * H[12] + (H[9] * H[9] + (H[6] * H[6] + (H[0] * H[0] + H[3] *
+    H[3]))));
+  real t11 = 1.0 / t10;
+  real t13 = H[3] * d_H[3];
+  real t15 = H[0] * d_H[0];
+  real t18 = H[6] * d_H[6];
+  real t21 = H[9] * d_H[9];
+  real t24 = H[12] * d_H[12];
+  real t27 = H[15] * d_H[15];
+  real t29 = t13 + t13 + (t15 + t15) + (t18 + t18) + (t21 + t21) + (t24 + t24) + (t27 + t27);
+  real t31 = t11 * t29 / t10;
+  real t45 = H[15] * H[16];
+  real t46 = H[12] * H[13];
+  real t47 = H[9] * H[10];
+  real t48 = H[6] * H[7];
+  real t49 = H[3] * H[4];
+  real t55 = t45 + (t46 + (t47 + (t48 + (t49 + H[0] * H[1]))));
+  real t56 = t55 * t11;
+  real t58 = H[1] * H[1] + H[4] * H[4] + H[7] * H[7] + H[10] * H[10] + H[13] * H[13] + H[16] * H[16]
+    - t55 * t56;
+  real t59 = 1.0 / t58;
+  real t61 = H[1] - H[0] * t56;
+  real t74 = H[15] * H[17];
+  real t75 = H[12] * H[14];
+  real t76 = H[9] * H[11];
+  real t77 = H[6] * H[8];
+  real t78 = H[3] * H[5];
+  real t84 = t74 + (t75 + (t76 + (t77 + (t78 + H[0] * H[2]))));
+  real t86 = H[1] * H[2] + H[4] * H[5] + H[7] * H[8] + H[10] * H[11] + H[13] * H[14] + H[16] * H[17]
+    - t56 * t84;
+  real t87 = t86 * t59;
+  real t99 = t11 * t84;
+  real t103 = H[2] * H[2] + H[5] * H[5] + H[8] * H[8] + H[11] * H[11] + H[14] * H[14] + H[17] *
+    H[17] - t84 * t99 - t86 * t87;
+  real t104 = 1.0 / t103;
+  real t108 = H[2] - H[0] * t99 - t87 * t61;
+  real t109 = t104 * t108;
+  real t117 = H[4] * d_H[3] + H[3] * d_H[4];
+  real t121 = H[7] * d_H[6] + H[6] * d_H[7];
+  real t125 = H[10] * d_H[9] + H[9] * d_H[10];
+  real t129 = H[13] * d_H[12] + H[12] * d_H[13];
+  real t133 = H[16] * d_H[15] + H[15] * d_H[16];
+  real t134 = H[1] * d_H[0] + H[0] * d_H[1] + t117 + t121 + t125 + t129 + t133;
+  real t137 = t11 * t134 - t55 * t31;
+  real t142 = d_H[1] - (t56 * d_H[0] + H[0] * t137);
+  real t144 = H[16] * d_H[16];
+  real t146 = H[13] * d_H[13];
+  real t148 = H[10] * d_H[10];
+  real t150 = H[7] * d_H[7];
+  real t152 = H[4] * d_H[4];
+  real t154 = H[1] * d_H[1];
+  real t166 = t59 * (t144 + t144 + (t146 + t146 + (t148 + t148 + (t150 + t150 + (t152 + t152 + (t154
+    + t154))))) - (t56 * t134 + t55 * t137)) / t58;
+  real t198 = H[5] * d_H[3] + H[3] * d_H[5];
+  real t202 = H[8] * d_H[6] + H[6] * d_H[8];
+  real t206 = H[11] * d_H[9] + H[9] * d_H[11];
+  real t210 = H[14] * d_H[12] + H[12] * d_H[14];
+  real t214 = H[17] * d_H[15] + H[15] * d_H[17];
+  real t215 = H[2] * d_H[0] + H[0] * d_H[2] + t198 + t202 + t206 + t210 + t214;
+  real t218 = H[17] * d_H[16] + H[16] * d_H[17] + (H[14] * d_H[13] + H[13] * d_H[14] + (H[11] *
+    d_H[10] + H[10] * d_H[11] + (H[8] * d_H[7] + H[7] * d_H[8] + (H[5] * d_H[4] + H[4] * d_H[5] +
+    (H[2] * d_H[1] + H[1] * d_H[2]))))) - (t84 * t137 + t56 * t215);
+  real t221 = t59 * t218 - t86 * t166;
+  real t226 = t11 * t215 - t84 * t31;
+  real t235 = H[17] * d_H[17];
+  real t237 = H[14] * d_H[14];
+  real t239 = H[11] * d_H[11];
+  real t241 = H[8] * d_H[8];
+  real t243 = H[5] * d_H[5];
+  real t245 = H[2] * d_H[2];
+  real t261 = t104 * (t235 + t235 + (t237 + t237 + (t239 + t239 + (t241 + t241 + (t243 + t243 +
+    (t245 + t245))))) - (t99 * t215 + t84 * t226) - (t87 * t218 + t86 * t221)) / t103;
+  real t263 = t104 * (d_H[2] - (t99 * d_H[0] + H[0] * t226) - (t61 * t221 + t87 * t142)) - t108 *
+    t261;
+  real t266 = t59 * t142 - t61 * t166 - (t109 * t221 + t87 * t263);
+  d_W[0] = t11 * d_H[0] - H[0] * t31 - ((t59 * t61 - t87 * t109) * t137 + t56 * t266) - (t109 * t226
+    + t99 * t263);
+  real t278 = H[4] - H[3] * t56;
+  real t283 = H[5] - H[3] * t99 - t87 * t278;
+  real t284 = t104 * t283;
+  real t291 = d_H[4] - (t56 * d_H[3] + H[3] * t137);
+  real t306 = t104 * (d_H[5] - (t99 * d_H[3] + H[3] * t226) - (t278 * t221 + t87 * t291)) - t283 *
+    t261;
+  real t309 = t59 * t291 - t278 * t166 - (t284 * t221 + t87 * t306);
+  d_W[1] = t11 * d_H[3] - H[3] * t31 - ((t59 * t278 - t87 * t284) * t137 + t56 * t309) - (t284 *
+    t226 + t99 * t306);
+  real t321 = H[7] - H[6] * t56;
+  real t326 = H[8] - H[6] * t99 - t87 * t321;
+  real t327 = t104 * t326;
+  real t334 = d_H[7] - (t56 * d_H[6] + H[6] * t137);
+  real t349 = t104 * (d_H[8] - (t99 * d_H[6] + H[6] * t226) - (t321 * t221 + t87 * t334)) - t326 *
+    t261;
+  real t352 = t59 * t334 - t321 * t166 - (t327 * t221 + t87 * t349);
+  d_W[2] = t11 * d_H[6] - H[6] * t31 - ((t59 * t321 - t87 * t327) * t137 + t56 * t352) - (t327 *
+    t226 + t99 * t349);
+  real t364 = H[10] - H[9] * t56;
+  real t369 = H[11] - H[9] * t99 - t87 * t364;
+  real t370 = t104 * t369;
+  real t377 = d_H[10] - (t56 * d_H[9] + H[9] * t137);
+  real t392 = t104 * (d_H[11] - (t99 * d_H[9] + H[9] * t226) - (t364 * t221 + t87 * t377)) - t369 *
+    t261;
+  real t395 = t59 * t377 - t364 * t166 - (t370 * t221 + t87 * t392);
+  d_W[3] = t11 * d_H[9] - H[9] * t31 - ((t59 * t364 - t87 * t370) * t137 + t56 * t395) - (t370 *
+    t226 + t99 * t392);
+  real t407 = H[13] - H[12] * t56;
+  real t412 = H[14] - H[12] * t99 - t87 * t407;
+  real t413 = t104 * t412;
+  real t420 = d_H[13] - (t56 * d_H[12] + H[12] * t137);
+  real t435 = t104 * (d_H[14] - (t99 * d_H[12] + H[12] * t226) - (t407 * t221 + t87 * t420)) - t412
+    * t261;
+  real t438 = t59 * t420 - t407 * t166 - (t413 * t221 + t87 * t435);
+  d_W[4] = t11 * d_H[12] - H[12] * t31 - ((t59 * t407 - t87 * t413) * t137 + t56 * t438) - (t413 *
+    t226 + t99 * t435);
+  real t450 = H[16] - H[15] * t56;
+  real t455 = H[17] - H[15] * t99 - t87 * t450;
+  real t456 = t104 * t455;
+  real t463 = d_H[16] - (t56 * d_H[15] + H[15] * t137);
+  real t478 = t104 * (d_H[17] - (t99 * d_H[15] + H[15] * t226) - (t450 * t221 + t87 * t463)) - t455
+    * t261;
+  real t481 = t59 * t463 - t450 * t166 - (t456 * t221 + t87 * t478);
+  d_W[5] = t11 * d_H[15] - H[15] * t31 - ((t59 * t450 - t87 * t456) * t137 + t56 * t481) - (t456 *
+    t226 + t99 * t478);
+  d_W[6] = t266;
+  d_W[7] = t309;
+  d_W[8] = t352;
+  d_W[9] = t395;
+  d_W[10] = t438;
+  d_W[11] = t481;
+  d_W[12] = t263;
+  d_W[13] = t306;
+  d_W[14] = t349;
+  d_W[15] = t392;
+  d_W[16] = t435;
+  d_W[17] = t478;
+  real t489 = sqrt(t10);
+  real t491 = t489 + (fabs(H[0]));
+  real t492 = t489 * t491;
+  real t493 = 0.0 < t492;
+  real t494 = 1.0 / t492;
+  real t495 = t493 != 0 ? t494 : 0.0;
+  real t496 = H[0] < 0.0;
+  real t497 = -t489;
+  real t499 = H[0] + (t496 != 0 ? t497 : t489);
+  real t505 = t74 + (t75 + (t76 + (t77 + (t78 + H[2] * t499))));
+  real t506 = t495 * t505;
+  real t508 = H[11] - H[9] * t506;
+  real t514 = t45 + (t46 + (t47 + (t48 + (t49 + H[1] * t499))));
+  real t515 = t495 * t514;
+  real t517 = H[10] - H[9] * t515;
+  real t519 = H[16] - H[15] * t515;
+  real t522 = H[13] - H[12] * t515;
+  real t526 = H[4] - H[3] * t515;
+  real t529 = H[7] - H[6] * t515;
+  real t535 = sqrt(t519 * t519 + (t522 * t522 + (t517 * t517 + (t526 * t526 + t529 * t529))));
+  real t537 = t535 + (fabs(t526));
+  real t538 = t535 * t537;
+  real t539 = 0.0 < t538;
+  real t540 = 1.0 / t538;
+  real t541 = t539 != 0 ? t540 : 0.0;
+  real t543 = H[17] - H[15] * t506;
+  real t546 = H[14] - H[12] * t506;
+  real t550 = H[5] - H[3] * t506;
+  real t551 = t526 < 0.0;
+  real t552 = -t535;
+  real t554 = t526 + (t551 != 0 ? t552 : t535);
+  real t557 = H[8] - H[6] * t506;
+  real t562 = t519 * t543 + (t522 * t546 + (t508 * t517 + (t550 * t554 + t529 * t557)));
+  real t563 = t541 * t562;
+  real t565 = t508 - t517 * t563;
+  real t566 = t565 * t565;
+  real t568 = t543 - t519 * t563;
+  real t569 = t568 * t568;
+  real t571 = t546 - t522 * t563;
+  real t572 = t571 * t571;
+  real t574 = t557 - t529 * t563;
+  real t579 = sqrt(t569 + (t572 + (t566 + t574 * t574)));
+  real t581 = t579 + (fabs(t574));
+  real t582 = t579 * t581;
+  real t583 = 0.0 < t582;
+  real t584 = 1.0 / t582;
+  real t585 = t583 != 0 ? t584 : 0.0;
+  real t587 = 1.0 - t566 * t585;
+  real t589 = t574 < 0.0;
+  real t590 = -t579;
+  real t592 = t574 + (t589 != 0 ? t590 : t579);
+  real t593 = t585 * t592;
+  real t594 = t565 * t593;
+  real t597 = t565 * t585;
+  real t598 = t571 * t597;
+  real t601 = t568 * t597;
+  real t603 = t517 * t587 - t529 * t594 - t522 * t598 - t519 * t601;
+  real t604 = t541 * t603;
+  real t606 = t587 - t517 * t604;
+  real t608 = t554 * t604;
+  real t611 = t594 + t529 * t604;
+  real t616 = t598 + t522 * t604;
+  real t620 = t601 + t519 * t604;
+  real t622 = H[9] * t606 - (H[3] * t608 + H[6] * t611) - H[12] * t616 - H[15] * t620;
+  real t623 = t495 * t622;
+  real t625 = t29 / (t489 * 2.0);
+  real t626 = -t625;
+  real t628 = d_H[0] + (t496 != 0 ? t626 : t625);
+  real t638 = -(t494 * (t491 * t625 + t489 * (t625 + d_H[0] * (H[0] > 0 ? 1 : (H[0] < 0 ? -1 :
+    H[0])))) / t492);
+  real t639 = t493 != 0 ? t638 : 0.0;
+  real t653 = t505 * t639 + t495 * (t214 + (t210 + (t206 + (t202 + (t198 + (t499 * d_H[2] + H[2] *
+    t628))))));
+  real t656 = d_H[11] - (t506 * d_H[9] + H[9] * t653);
+  real t668 = t514 * t639 + t495 * (t133 + (t129 + (t125 + (t121 + (t117 + (t499 * d_H[1] + H[1] *
+    t628))))));
+  real t671 = d_H[10] - (t515 * d_H[9] + H[9] * t668);
+  real t676 = d_H[7] - (t515 * d_H[6] + H[6] * t668);
+  real t677 = t529 * t676;
+  real t682 = d_H[4] - (t515 * d_H[3] + H[3] * t668);
+  real t683 = t526 * t682;
+  real t686 = t517 * t671;
+  real t692 = d_H[13] - (t515 * d_H[12] + H[12] * t668);
+  real t693 = t522 * t692;
+  real t699 = d_H[16] - (t515 * d_H[15] + H[15] * t668);
+  real t700 = t519 * t699;
+  real t704 = (t677 + t677 + (t683 + t683) + (t686 + t686) + (t693 + t693) + (t700 + t700)) / (t535
+    * 2.0);
+  real t713 = -(t540 * (t537 * t704 + t535 * (t704 + t682 * (t526 > 0 ? 1 : (t526 < 0 ? -1 :
+    t526)))) / t538);
+  real t714 = t539 != 0 ? t713 : 0.0;
+  real t720 = d_H[8] - (t506 * d_H[6] + H[6] * t653);
+  real t728 = -t704;
+  real t730 = t682 + (t551 != 0 ? t728 : t704);
+  real t742 = d_H[14] - (t506 * d_H[12] + H[12] * t653);
+  real t750 = d_H[17] - (t506 * d_H[15] + H[15] * t653);
+  real t755 = t562 * t714 + t541 * (t557 * t676 + t529 * t720 + (t554 * (d_H[5] - (t506 * d_H[3] +
+    H[3] * t653)) + t550 * t730) + (t517 * t656 + t508 * t671) + (t546 * t692 + t522 * t742) + (t543
+    * t699 + t519 * t750));
+  real t758 = t656 - (t563 * t671 + t517 * t755);
+  real t759 = t565 * t758;
+  real t760 = t759 + t759;
+  real t765 = t720 - (t563 * t676 + t529 * t755);
+  real t766 = t574 * t765;
+  real t772 = t742 - (t563 * t692 + t522 * t755);
+  real t773 = t571 * t772;
+  real t774 = t773 + t773;
+  real t779 = t750 - (t563 * t699 + t519 * t755);
+  real t780 = t568 * t779;
+  real t781 = t780 + t780;
+  real t784 = (t766 + t766 + t760 + t774 + t781) / (t579 * 2.0);
+  real t793 = -(t584 * (t581 * t784 + t579 * (t765 * (t574 > 0 ? 1 : (t574 < 0 ? -1 : t574)) +
+    t784)) / t582);
+  real t794 = t583 != 0 ? t793 : 0.0;
+  real t796 = t585 * t760 + t566 * t794;
+  real t805 = -t784;
+  real t809 = t592 * t794 + t585 * (t765 + (t589 != 0 ? t805 : t784));
+  real t811 = t593 * t758 + t565 * t809;
+  real t819 = t585 * t758 + t565 * t794;
+  real t821 = t597 * t772 + t571 * t819;
+  real t828 = t597 * t779 + t568 * t819;
+  real t833 = t603 * t714 + t541 * (t587 * t671 - t517 * t796 - (t594 * t676 + t529 * t811) - (t598
+    * t692 + t522 * t821) - (t601 * t699 + t519 * t828));
+  real t836 = t796 + (t604 * t671 + t517 * t833);
+  real t843 = t811 + (t604 * t676 + t529 * t833);
+  real t849 = t604 * t730 + t554 * t833;
+  real t858 = t821 + (t604 * t692 + t522 * t833);
+  real t866 = t828 + (t604 * t699 + t519 * t833);
+  real t871 = t622 * t639 + t495 * (t606 * d_H[9] - H[9] * t836 - (t611 * d_H[6] + H[6] * t843 +
+    (t608 * d_H[3] + H[3] * t849)) - (t616 * d_H[12] + H[12] * t858) - (t620 * d_H[15] + H[15] *
+    t866));
+  d_W[18] = -(t623 * t628 + t499 * t871);
+  d_W[19] = -(t849 + (t623 * d_H[3] + H[3] * t871));
+  d_W[20] = -(t843 + (t623 * d_H[6] + H[6] * t871));
+  d_W[21] = -(t836 + (t623 * d_H[9] + H[9] * t871));
+  d_W[22] = -(t858 + (t623 * d_H[12] + H[12] * t871));
+  d_W[23] = -(t866 + (t623 * d_H[15] + H[15] * t871));
+  real t901 = 1.0 - t572 * t585;
+  real t903 = t571 * t593;
+  real t908 = t571 * t585;
+  real t909 = t568 * t908;
+  real t911 = t522 * t901 - (t529 * t903 + t517 * t598) - t519 * t909;
+  real t912 = t541 * t911;
+  real t914 = t901 - t522 * t912;
+  real t917 = t598 + t517 * t912;
+  real t919 = t554 * t912;
+  real t922 = t903 + t529 * t912;
+  real t928 = t909 + t519 * t912;
+  real t930 = H[12] * t914 - (H[9] * t917 + (H[3] * t919 + H[6] * t922)) - H[15] * t928;
+  real t931 = t495 * t930;
+  real t937 = t585 * t774 + t572 * t794;
+  real t949 = t593 * t772 + t571 * t809;
+  real t960 = t908 * t779 + t568 * (t585 * t772 + t571 * t794);
+  real t965 = t911 * t714 + t541 * (t901 * t692 - t522 * t937 - (t598 * t671 + t517 * t821 + (t903 *
+    t676 + t529 * t949)) - (t909 * t699 + t519 * t960));
+  real t968 = t937 + (t912 * t692 + t522 * t965);
+  real t975 = t949 + (t912 * t676 + t529 * t965);
+  real t981 = t912 * t730 + t554 * t965;
+  real t989 = t821 + (t912 * t671 + t517 * t965);
+  real t998 = t960 + (t912 * t699 + t519 * t965);
+  real t1003 = t930 * t639 + t495 * (t914 * d_H[12] - H[12] * t968 - (t922 * d_H[6] + H[6] * t975 +
+    (t919 * d_H[3] + H[3] * t981) + (t917 * d_H[9] + H[9] * t989)) - (t928 * d_H[15] + H[15] *
+    t998));
+  d_W[24] = -(t931 * t628 + t499 * t1003);
+  d_W[25] = -(t981 + (t931 * d_H[3] + H[3] * t1003));
+  d_W[26] = -(t975 + (t931 * d_H[6] + H[6] * t1003));
+  d_W[27] = -(t989 + (t931 * d_H[9] + H[9] * t1003));
+  d_W[28] = -(t968 + (t931 * d_H[12] + H[12] * t1003));
+  d_W[29] = -(t998 + (t931 * d_H[15] + H[15] * t1003));
+  real t1033 = 1.0 - t569 * t585;
+  real t1036 = t568 * t593;
+  real t1041 = t519 * t1033 - (t522 * t909 + (t529 * t1036 + t517 * t601));
+  real t1042 = t541 * t1041;
+  real t1044 = t1033 - t519 * t1042;
+  real t1047 = t909 + t522 * t1042;
+  real t1050 = t601 + t517 * t1042;
+  real t1052 = t554 * t1042;
+  real t1055 = t1036 + t529 * t1042;
+  real t1060 = H[15] * t1044 - (H[12] * t1047 + (H[9] * t1050 + (H[3] * t1052 + H[6] * t1055)));
+  real t1061 = t495 * t1060;
+  real t1067 = t585 * t781 + t569 * t794;
+  real t1079 = t593 * t779 + t568 * t809;
+  real t1089 = t1041 * t714 + t541 * (t1033 * t699 - t519 * t1067 - (t601 * t671 + t517 * t828 +
+    (t1036 * t676 + t529 * t1079) + (t909 * t692 + t522 * t960)));
+  real t1092 = t1067 + (t1042 * t699 + t519 * t1089);
+  real t1099 = t1079 + (t1042 * t676 + t529 * t1089);
+  real t1105 = t1042 * t730 + t554 * t1089;
+  real t1113 = t828 + (t1042 * t671 + t517 * t1089);
+  real t1121 = t960 + (t1042 * t692 + t522 * t1089);
+  real t1127 = t1060 * t639 + t495 * (t1044 * d_H[15] - H[15] * t1092 - (t1055 * d_H[6] + H[6] *
+    t1099 + (t1052 * d_H[3] + H[3] * t1105) + (t1050 * d_H[9] + H[9] * t1113) + (t1047 * d_H[12] +
+    H[12] * t1121)));
+  d_W[30] = -(t1061 * t628 + t499 * t1127);
+  d_W[31] = -(t1105 + (t1061 * d_H[3] + H[3] * t1127));
+  d_W[32] = -(t1099 + (t1061 * d_H[6] + H[6] * t1127));
+  d_W[33] = -(t1113 + (t1061 * d_H[9] + H[9] * t1127));
+  d_W[34] = -(t1121 + (t1061 * d_H[12] + H[12] * t1127));
+  d_W[35] = -(t1092 + (t1061 * d_H[15] + H[15] * t1127));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_complement_slope_inputs[] = {
-    {"H", 18, "", 0, 0},
-    {"d_H", 18, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_complement_slope, (in[0], in[1], out[0]))
 
 /* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -10040,41 +2850,14 @@ static const mstmm_port mstmm_sweep_generic3_complement_slope_outputs[] = {
  * in  d_z[3] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic3_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+int mstmm_sweep_generic3_add_known_part_slope(in_t y, in_t z, in_t d_y, in_t d_z, out_t d_l)
 {
-    const real t0 = z[2] * d_y[2];
-    const real t1 = y[2] * d_z[2];
-    const real t2 = t0 + t1;
-    const real t3 = z[1] * d_y[1];
-    const real t4 = y[1] * d_z[1];
-    const real t5 = t3 + t4;
-    const real t6 = z[0] * d_y[0];
-    const real t7 = y[0] * d_z[0];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t2 + t9;
-    const real t11 = -t10;
-    d_l[0] += t11;
-    return 0;
+  d_l[0] += -(z[2] * d_y[2] + y[2] * d_z[2] + (z[1] * d_y[1] + y[1] * d_z[1] + (z[0] * d_y[0] + y[0]
+    * d_z[0])));
+  return 0;
 }
 
-static int mstmm_sweep_generic3_add_known_part_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_add_known_part_slope_inputs[] = {
-    {"y", 3, "", 0, 0},
-    {"z", 3, "", 0, 0},
-    {"d_y", 3, "", 0, 0},
-    {"d_z", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_add_known_part_slope_outputs[] = {
-    {"d_l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_add_known_part_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -10085,433 +2868,199 @@ static const mstmm_port mstmm_sweep_generic3_add_known_part_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[3] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic3_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+int mstmm_sweep_generic3_add_multiplier_effort_slope(in_t y, in_t x, in_t d_y, in_t d_x,
+    out_t d_y_0)
 {
-    const real t0 = x[0] * d_y[0];
-    const real t1 = y[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_y_0[0] += t2;
-    const real t3 = y[1] * d_x[0];
-    const real t4 = x[0] * d_y[1];
-    const real t5 = t3 + t4;
-    d_y_0[1] += t5;
-    const real t6 = y[2] * d_x[0];
-    const real t7 = x[0] * d_y[2];
-    const real t8 = t6 + t7;
-    d_y_0[2] += t8;
-    return 0;
+  d_y_0[0] += x[0] * d_y[0] + y[0] * d_x[0];
+  d_y_0[1] += y[1] * d_x[0] + x[0] * d_y[1];
+  d_y_0[2] += y[2] * d_x[0] + x[0] * d_y[2];
+  return 0;
 }
 
-static int mstmm_sweep_generic3_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic3_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_slope_inputs[] = {
-    {"y", 3, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_y", 3, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic3_add_multiplier_effort_slope_outputs[] = {
-    {"d_y_0", 3, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic3_add_multiplier_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic3_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic3_forward,
-        .call = mstmm_sweep_generic3_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_forward_inputs,
-        .outputs = mstmm_sweep_generic3_forward_outputs,
-        .ir_hash = "c095eb3c76b3ee8d498892e71ab273478e8782cf2ba90c40fdb314e974b2ab13",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic3_condense,
-        .call = mstmm_sweep_generic3_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic3_condense_inputs,
-        .outputs = mstmm_sweep_generic3_condense_outputs,
-        .ir_hash = "3507edcd6b5cc78ff79a7b31151fb27e67aadafa804ef3e2fd91d24192c3bc96",
-        .n_guards = 9,
-        .guards = mstmm_sweep_generic3_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic3_recover,
-        .call = mstmm_sweep_generic3_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_recover_inputs,
-        .outputs = mstmm_sweep_generic3_recover_outputs,
-        .ir_hash = "aee61b775d0313ed0dd243e26c0478725367ff658f197ef48621b3bdbce4f4a1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic3_effort,
-        .call = mstmm_sweep_generic3_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_effort_inputs,
-        .outputs = mstmm_sweep_generic3_effort_outputs,
-        .ir_hash = "85f8c56d4dabe1e16825ecc10cfe205140249bf9a33f6acc8ad8387dda25f4d1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic3_project,
-        .call = mstmm_sweep_generic3_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_project_inputs,
-        .outputs = mstmm_sweep_generic3_project_outputs,
-        .ir_hash = "4b45ecaa0c3cf437593bb8bc3bc35e36a763f1d3daae3a3a069f39af88a0bd3f",
-        .n_guards = 3,
-        .guards = mstmm_sweep_generic3_project_guards,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic3_factor,
-        .call = mstmm_sweep_generic3_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_factor_inputs,
-        .outputs = mstmm_sweep_generic3_factor_outputs,
-        .ir_hash = "1788eb0da328c2eb36189dfe3656b5664c3c7b072f4783c5c94a2ede30c15f22",
-        .n_guards = 6,
-        .guards = mstmm_sweep_generic3_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic3_column_load,
-        .call = mstmm_sweep_generic3_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_column_load_inputs,
-        .outputs = mstmm_sweep_generic3_column_load_outputs,
-        .ir_hash = "f8c3cb9b645cd09cee2681671c26146681c73914ff0545c1bdab55dc1dcca958",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic3_column_acceleration,
-        .call = mstmm_sweep_generic3_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic3_column_acceleration_outputs,
-        .ir_hash = "06b529b17349ac376df1ca45dcdea63230bb96a66dc1aab6adb095e5ffd379d1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic3_qr_eliminate,
-        .call = mstmm_sweep_generic3_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic3_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic3_qr_eliminate_outputs,
-        .ir_hash = "7a2f62c041ff19f60418a9ac81eadd459e128fc35b0710b60a8f5d632c7c9876",
-        .n_guards = 6,
-        .guards = mstmm_sweep_generic3_qr_eliminate_guards,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_carrier,
-        .call = mstmm_sweep_generic3_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_carrier_outputs,
-        .ir_hash = "0ac3293c3d45850c91b5113baa183ca71c312167f6f0980e89f7887fbfe3402f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_column,
-        .call = mstmm_sweep_generic3_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_column_outputs,
-        .ir_hash = "04c2cc157223ed30b9bb19d2702ad4d0648c0fa26fe385bbcace50bf54c20663",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_coordinate_change",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_coordinate_change,
-        .call = mstmm_sweep_generic3_tangent_coordinate_change_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_coordinate_change_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_coordinate_change_outputs,
-        .ir_hash = "c525357e801eb798efe5c1f22883a9e3e3cc7a43bdcc7145eb4935e50deb1248",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_steady",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_steady,
-        .call = mstmm_sweep_generic3_tangent_steady_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_tangent_steady_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_steady_outputs,
-        .ir_hash = "1a9b4917617fb6dca21551e642553a194a5e56b6854e8c210029289327e162b2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rotational",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_rotational,
-        .call = mstmm_sweep_generic3_tangent_rotational_call,
-        .n_inputs = 9,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_tangent_rotational_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_rotational_outputs,
-        .ir_hash = "f743f1b30ac98a445fd749d450c714f4a23d0ea67036eb8f210343b7c773d80c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rows",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_rows,
-        .call = mstmm_sweep_generic3_tangent_rows_call,
-        .n_inputs = 4,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic3_tangent_rows_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_rows_outputs,
-        .ir_hash = "719ae65ebb96acbd94d12a13f9fe75b13c3c782195e517dd4f345796e088be2c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_reduce",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_reduce,
-        .call = mstmm_sweep_generic3_tangent_reduce_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_tangent_reduce_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_reduce_outputs,
-        .ir_hash = "7165a7823606a1374f89a4d36aab18d31c50f854f42b2d53ca9153a0b5c76ace",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_load,
-        .call = mstmm_sweep_generic3_tangent_load_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_load_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_load_outputs,
-        .ir_hash = "deba023d1b3ae3f54e22b5bcfea101196b90f69b99c0b586bc245c15c06fec1f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_solution,
-        .call = mstmm_sweep_generic3_tangent_solution_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_solution_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_solution_outputs,
-        .ir_hash = "94817786987ab1fc7fe81a6e2347a29d394a9ac505e542d63cdc0e48ddda3fa9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_load_with_increments,
-        .call = mstmm_sweep_generic3_tangent_load_with_increments_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_load_with_increments_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_load_with_increments_outputs,
-        .ir_hash = "d5b2529934ac2358d4c3b978db551032b54b049157f3a5b865179f1ee9a5cb27",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic3_tangent_solution_with_increments,
-        .call = mstmm_sweep_generic3_tangent_solution_with_increments_call,
-        .n_inputs = 10,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic3_tangent_solution_with_increments_inputs,
-        .outputs = mstmm_sweep_generic3_tangent_solution_with_increments_outputs,
-        .ir_hash = "cb9fccf978d3496cca5d5a94d2cd7190aeadbe9de9cf6dded18ea66523936eff",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic3_complement,
-        .call = mstmm_sweep_generic3_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_complement_inputs,
-        .outputs = mstmm_sweep_generic3_complement_outputs,
-        .ir_hash = "313ee53947d1877f1c8d37170e5533286b45533fdaf648f532bcc30ee17c4634",
-        .n_guards = 3,
-        .guards = mstmm_sweep_generic3_complement_guards,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_generic3_divide,
-        .call = mstmm_sweep_generic3_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_divide_inputs,
-        .outputs = mstmm_sweep_generic3_divide_outputs,
-        .ir_hash = "e0bf7e77d2a110871d1bec70367c6090b997aa7b34a69d9d4fe2e7bc506a2f6a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_generic3_couple,
-        .call = mstmm_sweep_generic3_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_couple_inputs,
-        .outputs = mstmm_sweep_generic3_couple_outputs,
-        .ir_hash = "495ba4d7290e7ae6dca044df866ae514a93566b6facc48b448315f25db512fb9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_generic3_add_known_part,
-        .call = mstmm_sweep_generic3_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_add_known_part_inputs,
-        .outputs = mstmm_sweep_generic3_add_known_part_outputs,
-        .ir_hash = "c5919eee74907259f2391acbf2228ae318324d31f82c27e60e353e0c30c9a421",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_generic3_add_multiplier_effort,
-        .call = mstmm_sweep_generic3_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_generic3_add_multiplier_effort_outputs,
-        .ir_hash = "5d354851b7717db93db4bf475eff0c44e9defe67e0ce044ca46d3c70b3789818",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_load",
-        .function = (void (*)(void))mstmm_sweep_generic3_required_load,
-        .call = mstmm_sweep_generic3_required_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_required_load_inputs,
-        .outputs = mstmm_sweep_generic3_required_load_outputs,
-        .ir_hash = "bfc9a4ffd15dd9c36f57b0fdaa7f274c6fe65fac388c1cd64dc253b7071cc552",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_generic3_ground_column_load,
-        .call = mstmm_sweep_generic3_ground_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_ground_column_load_inputs,
-        .outputs = mstmm_sweep_generic3_ground_column_load_outputs,
-        .ir_hash = "c072357577765010ae97695f83a2ee2119bbbbd8421d25cbd5a1921d13ce9e42",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_forward_slope,
-        .call = mstmm_sweep_generic3_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic3_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic3_forward_slope_outputs,
-        .ir_hash = "d3d0f6249d9ae57c1298a7ec541406fb3cf1109b1417361ecd07efc136c4475b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_effort_slope,
-        .call = mstmm_sweep_generic3_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic3_effort_slope_outputs,
-        .ir_hash = "2e186256f7a6c5632133cf28ae36bcf5727e591d24a3f9a5fb04a0a24e50bb89",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_complement_slope,
-        .call = mstmm_sweep_generic3_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic3_complement_slope_outputs,
-        .ir_hash = "4ced649dff240cf2f351128bd292bd83533be001d549f95944f660aa18b9fe66",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_add_known_part_slope,
-        .call = mstmm_sweep_generic3_add_known_part_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_add_known_part_slope_inputs,
-        .outputs = mstmm_sweep_generic3_add_known_part_slope_outputs,
-        .ir_hash = "3368afafb0f0e93d078f1364fb3fe51a69afbda8cdcf48c8addbf443f44a9160",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic3_add_multiplier_effort_slope,
-        .call = mstmm_sweep_generic3_add_multiplier_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic3_add_multiplier_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic3_add_multiplier_effort_slope_outputs,
-        .ir_hash = "0e4e31553cc32dd3a3c76d65942b0e128d2fdb5ed83a40992bbcf89af1e5a38f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic3_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 18, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 3, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "91915d719df6d3232a5a8d930d003f46e3f9f14c191a13a844f32223dde5c29e", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic3_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 18, "", 0, 0}, {"g", 3, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "0833167c46cbd0e288f3c1ff22085bcf9cc6b465ecbd27735f271d0f4b3697ae", 9, (const
+    mstmm_guard[]){{1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic3_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"G", 18, "", 0, 0}, {"g", 3, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 3, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "51765ae2282271db474b4df57f4df61d3d2d894d9efa9e807c82538e52221f9f", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic3_effort), 2, 1, (const mstmm_port[]){{"H", 18, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 3, "N, N*m", 0, 0}},
+    "60832f4571b5eddee5e1fcc83064aa9f51ac14d245b9b60825f844689c4c9a6c", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic3_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 3, "", 0, 0}},
+    "a02022cb473bf67e6071f295f314604d68135061e07f40ddb77589d114627890", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}}},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic3_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"W", 9, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 9, "", 0,
+    0}, {"G", 18, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "f55b00c1a00600172c4f44046b0158b42b79a72c3880ab1de0359c64de34ab94", 6, (const mstmm_guard[]){{1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic3_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"G", 18, "", 0,
+    0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 3,
+    "N, N*m", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "98c6afd68fb015f163ca489a1f5ca893ae7404812383e04b3ee5ac150d6b0827", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic3_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"F", 9, "", 0, 0},
+    {"G", 18, "", 0, 0}, {"y", 3, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 3, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "e7baaa4ccab93d4bbcbc4f678e16b175fc4c9691a639f1d35c275d557470157d", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic3_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 18, "", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 18, "", 0, 0}, {"g", 3, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "43cfe3c0172ec4dea9c153d409b7cb2ca023dfd3bd492b06604e20d72b0a8d9d", 6, (const mstmm_guard[]){{1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}}},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 18, "", 0, 0}, {"s", 3, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "291c48170311fe9857d1b0c45c7f552dd9e68bd9cfb9553bebc2f362764cebfc", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 18, "", 0, 0}, {"s", 3, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 18, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    3, "", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"laws", 3, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 3, "", 0, 0}},
+    "0f71dcc6016a343b2a6b292669586e87339ea0e46c286f4f3dddfbe2c07555e2", 0, NULL},
+  {"tangent_coordinate_change", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_coordinate_change), 2,
+    2, (const mstmm_port[]){{"H", 18, "", 0, 0}, {"d_q", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "0b628028ddf37311c81d513f6ce2b9253d275d508f7a0b931daa2f963b49f24c", 0, NULL},
+  {"tangent_steady", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_steady), 11, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 18, "", 0, 0}, {"v", 3, "", 0,
+    0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 3, "", 0, 0},
+    {"d_s", 3, "", 0, 0}, {"J", 3, "kg*m2 or kg", 0, 0}, {"laws", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 3, "", 0, 0}},
+    "f7a8d042fa74c3b7ca2551adfd5405b62243a60ec3d8ce8779c6e29b148df473", 0, NULL},
+  {"tangent_rotational", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_rotational), 9, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"H", 18, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 3, "", 0, 0}, {"d_s", 3, "", 0, 0}, {"J", 3,
+    "kg*m2 or kg", 0, 0}, {"laws", 3, "", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6,
+    "", 0, 0}, {"row", 3, "", 0, 0}},
+    "0efc8a8e9a8987228416bd26fe26e1893d50f50fea5a4d16ad0cd8668d7f9d48", 0, NULL},
+  {"tangent_rows", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_rows), 4, 4, (const
+    mstmm_port[]){{"H", 18, "", 0, 0}, {"B", 27, "", 0, 0}, {"W", 9, "", 0, 0}, {"S", 54, "", 0,
+    0}}, (const mstmm_port[]){{"K", 18, "", 0, 0}, {"right", 27, "", 0, 0}, {"D", 9, "", 0, 0},
+    {"one", 9, "", 0, 0}}, "deeaca78da71065408366764723b089603c661dff820c65511fa0333d62aec2a", 0,
+    NULL},
+  {"tangent_reduce", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_reduce), 4, 3, (const
+    mstmm_port[]){{"inverse", 9, "", 0, 0}, {"right", 27, "", 0, 0}, {"K", 18, "", 0, 0}, {"G", 18,
+    "", 0, 0}}, (const mstmm_port[]){{"gain", 27, "", 0, 0}, {"V", 18, "", 0, 0}, {"S", 54, "", 1,
+    0}}, "01bd3263e7d33a7895700fa028009cc81515b2387b60a04fc297fd7c2b1aa46c", 0, NULL},
+  {"tangent_load", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_load), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"V", 18, "", 0,
+    0}, {"inverse", 9, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"y", 3, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "530eb5f206b730fe4a6acf68c79420e39936c2ca1268aa289df5ebda85e53097", 0, NULL},
+  {"tangent_solution", MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_solution), 9, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 27, "", 0, 0}, {"gain", 27,
+    "", 0, 0}, {"y", 3, "", 0, 0}}, (const mstmm_port[]){{"x", 3, "", 0, 0}, {"z", 9, "", 0, 0}},
+    "be69a5af8b0d4a27899a4d6b29d26b4ae43ec83babd024026058239b04dc0159", 0, NULL},
+  {"tangent_load_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_load_with_increments), 8, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 18, "", 0, 0}, {"V", 18, "", 0,
+    0}, {"inverse", 9, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 3, "", 0, 0}, {"e_b", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 3, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "698f775956f01b0499545caea3f83986d96e880470f3721dc213502edf522a85", 0, NULL},
+  {"tangent_solution_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic3_tangent_solution_with_increments), 10, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 27, "", 0, 0}, {"gain", 27,
+    "", 0, 0}, {"y", 3, "", 0, 0}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"x", 3, "", 0, 0},
+    {"z", 9, "", 0, 0}}, "71690a6f5b186d29973d06887eee67cd40d58bd63526d7467d42dd2a9091497c", 0,
+    NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic3_complement), 1, 1, (const mstmm_port[]){{"H",
+    18, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "1c8cf1865ddb4c1207cd30de3a153be32e80b7e1a41a53e0e2392078a51fc14c", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}}},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_generic3_divide), 2, 1, (const mstmm_port[]){{"F", 9, "",
+    0, 0}, {"y", 3, "", 0, 0}}, (const mstmm_port[]){{"z", 3, "", 0, 0}},
+    "9341763d47bf71732fce1bbb53cfd42d93bf79b7086792e87bd23c024c275591", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_generic3_couple), 2, 1, (const mstmm_port[]){{"y", 3, "",
+    0, 0}, {"z", 3, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "624466332ba80ad4eddae707ed33f61666a65698262a7a65d3d067de56f2c4f5", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_generic3_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 3, "", 0, 0}, {"z", 3, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "736235149d1d3eb5b1eb2dc8816e680e75a6962b552b54705db898bad3f776fc", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_generic3_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 3, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    3, "", 1, 0}}, "1a765e870f7229912ca44349e908d0b94f81c420fa931c98525952136b8c618f", 0, NULL},
+  {"required_load", MSTMM_FUNCTIONS(mstmm_sweep_generic3_required_load), 3, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"H", 18, "", 0, 0}, {"udot", 3, "", 0, 0}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "11ea26e7264f9c4ce331ff2ade0e021db9b111cd0c56c7e7f9a63399afdbbad7", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic3_ground_column_load), 3, 1, (const
+    mstmm_port[]){{"H", 18, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 3, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"y", 3, "N, N*m", 0, 0}},
+    "7e8564464d7418045748b868abc2a9a8b3db5f58ec8487102e5c155f43ab9f34", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic3_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 18, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 3, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 18, "", 0,
+    0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 3, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "6e5cfe8e3735aac411e4777c1719263213a0ed262580e4887ed16ff75d2a33ea",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic3_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 18, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 18, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 3, "N, N*m", 0, 0}},
+    "0946f028dfb82219c67de3d33355d1cb3f6babc8b1af89d7d8077017c4cf5310", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic3_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 18, "", 0, 0}, {"d_H", 18, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "",
+    0, 0}}, "d05fa1ae49401be2b34941275fdefc74526074f971528bf1e50c18fc3d4c7ab2", 0, NULL},
+  {"add_known_part_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic3_add_known_part_slope), 4, 1, (const
+    mstmm_port[]){{"y", 3, "", 0, 0}, {"z", 3, "", 0, 0}, {"d_y", 3, "", 0, 0}, {"d_z", 3, "", 0,
+    0}}, (const mstmm_port[]){{"d_l", 1, "", 1, 0}},
+    "5c0e45ee18abc93e0c97cf8ab6a6c3d4846851ca16220631d54ae334c61d40c9", 0, NULL},
+  {"add_multiplier_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic3_add_multiplier_effort_slope),
+    4, 1, (const mstmm_port[]){{"y", 3, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_y", 3, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_y_0", 3, "", 1, 0}},
+    "b9a9d8485b4a6066b734756cd540600325850496e0600dcb2727ab4a2140099a", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic3 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic3",
-    .hash = "39b23f410b91af28cc9043804f27ae793d924f05b7af9706bfb3e7609d4ab854",
+    .hash = "fd052aa33298757636b23d4d9741cc179587433c279451bc321aa9bebc6a33b0",
     .nq = 0,
     .nu = 0,
     .np = 0,

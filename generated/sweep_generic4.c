@@ -10,105 +10,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic4;
-int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic4_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic4_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic4_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic4_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic4_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic4_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic4_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x);
-int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row);
-int mstmm_sweep_generic4_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
-int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one);
-int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S);
-int mstmm_sweep_generic4_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic4_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic4_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z);
-int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic4_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_generic4_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_generic4_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic4_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y);
-int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic4_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-int mstmm_sweep_generic4_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic4_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -127,8 +28,6 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 #endif
 
 /* bias motion outboard of a hinge with 4 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -143,291 +42,70 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic4_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic4_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = H[12] * s[0];
-    const real t87 = H[13] * s[1];
-    const real t88 = t86 + t87;
-    const real t89 = H[14] * s[2];
-    const real t90 = t88 + t89;
-    const real t91 = H[15] * s[3];
-    const real t92 = t90 + t91;
-    const real t93 = c[3] + t92;
-    const real t94 = w[2] * t73;
-    const real t95 = w[1] * t79;
-    const real t96 = t94 - t95;
-    const real t97 = t93 + t96;
-    const real t98 = t85 + t97;
-    motion[3] = t98;
-    const real t99 = motion_I[3] * t9;
-    const real t100 = motion_I[4] * t24;
-    const real t101 = t99 + t100;
-    const real t102 = motion_I[5] * t39;
-    const real t103 = t101 + t102;
-    const real t104 = H[16] * s[0];
-    const real t105 = H[17] * s[1];
-    const real t106 = t104 + t105;
-    const real t107 = H[18] * s[2];
-    const real t108 = t106 + t107;
-    const real t109 = H[19] * s[3];
-    const real t110 = t108 + t109;
-    const real t111 = c[4] + t110;
-    const real t112 = w[0] * t79;
-    const real t113 = w[2] * t67;
-    const real t114 = t112 - t113;
-    const real t115 = t111 + t114;
-    const real t116 = t103 + t115;
-    motion[4] = t116;
-    const real t117 = motion_I[3] * t14;
-    const real t118 = motion_I[4] * t29;
-    const real t119 = t117 + t118;
-    const real t120 = motion_I[5] * t44;
-    const real t121 = t119 + t120;
-    const real t122 = H[20] * s[0];
-    const real t123 = H[21] * s[1];
-    const real t124 = t122 + t123;
-    const real t125 = H[22] * s[2];
-    const real t126 = t124 + t125;
-    const real t127 = H[23] * s[3];
-    const real t128 = t126 + t127;
-    const real t129 = c[5] + t128;
-    const real t130 = w[1] * t67;
-    const real t131 = w[0] * t73;
-    const real t132 = t130 - t131;
-    const real t133 = t129 + t132;
-    const real t134 = t121 + t133;
-    motion[5] = t134;
-    const real t135 = motion_I[0] * motion_I[1];
-    const real t136 = t135 - motion_I[5];
-    const real t137 = t56 * t136;
-    const real t138 = motion_I[1] * motion_I[1];
-    const real t139 = motion_I[2] * motion_I[2];
-    const real t140 = t138 + t139;
-    const real t141 = t50 * t140;
-    const real t142 = t137 - t141;
-    const real t143 = motion_I[0] * motion_I[2];
-    const real t144 = motion_I[4] + t143;
-    const real t145 = t62 * t144;
-    const real t146 = t142 + t145;
-    const real t147 = motion_I[6] + t146;
-    const real t148 = t4 * t147;
-    const real t149 = motion_I[5] + t135;
-    const real t150 = t50 * t149;
-    const real t151 = motion_I[0] * motion_I[0];
-    const real t152 = t139 + t151;
-    const real t153 = t56 * t152;
-    const real t154 = t150 - t153;
-    const real t155 = motion_I[1] * motion_I[2];
-    const real t156 = t155 - motion_I[3];
-    const real t157 = t62 * t156;
-    const real t158 = t154 + t157;
-    const real t159 = motion_I[7] + t158;
-    const real t160 = t19 * t159;
-    const real t161 = t148 + t160;
-    const real t162 = t143 - motion_I[4];
-    const real t163 = t50 * t162;
-    const real t164 = motion_I[3] + t155;
-    const real t165 = t56 * t164;
-    const real t166 = t163 + t165;
-    const real t167 = t138 + t151;
-    const real t168 = t62 * t167;
-    const real t169 = t166 - t168;
-    const real t170 = motion_I[8] + t169;
-    const real t171 = t34 * t170;
-    const real t172 = t161 + t171;
-    const real t173 = H[0] * s[0];
-    const real t174 = H[1] * s[1];
-    const real t175 = t173 + t174;
-    const real t176 = H[2] * s[2];
-    const real t177 = t175 + t176;
-    const real t178 = H[3] * s[3];
-    const real t179 = t177 + t178;
-    const real t180 = c[0] + t179;
-    const real t181 = v[2] * t73;
-    const real t182 = 2.0 * t181;
-    const real t183 = v[1] * t79;
-    const real t184 = 2.0 * t183;
-    const real t185 = t182 - t184;
-    const real t186 = t180 + t185;
-    const real t187 = t172 + t186;
-    motion[6] = t187;
-    const real t188 = t9 * t147;
-    const real t189 = t24 * t159;
-    const real t190 = t188 + t189;
-    const real t191 = t39 * t170;
-    const real t192 = t190 + t191;
-    const real t193 = H[4] * s[0];
-    const real t194 = H[5] * s[1];
-    const real t195 = t193 + t194;
-    const real t196 = H[6] * s[2];
-    const real t197 = t195 + t196;
-    const real t198 = H[7] * s[3];
-    const real t199 = t197 + t198;
-    const real t200 = c[1] + t199;
-    const real t201 = v[0] * t79;
-    const real t202 = 2.0 * t201;
-    const real t203 = v[2] * t67;
-    const real t204 = 2.0 * t203;
-    const real t205 = t202 - t204;
-    const real t206 = t200 + t205;
-    const real t207 = t192 + t206;
-    motion[7] = t207;
-    const real t208 = t14 * t147;
-    const real t209 = t29 * t159;
-    const real t210 = t208 + t209;
-    const real t211 = t44 * t170;
-    const real t212 = t210 + t211;
-    const real t213 = H[8] * s[0];
-    const real t214 = H[9] * s[1];
-    const real t215 = t213 + t214;
-    const real t216 = H[10] * s[2];
-    const real t217 = t215 + t216;
-    const real t218 = H[11] * s[3];
-    const real t219 = t217 + t218;
-    const real t220 = c[2] + t219;
-    const real t221 = v[1] * t67;
-    const real t222 = 2.0 * t221;
-    const real t223 = v[0] * t73;
-    const real t224 = 2.0 * t223;
-    const real t225 = t222 - t224;
-    const real t226 = t220 + t225;
-    const real t227 = t212 + t226;
-    motion[8] = t227;
-    return 0;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + (H[12] * s[0] +
+    H[13] * s[1] + H[14] * s[2] + H[15] * s[3]) + (w[2] * t73 - w[1] * t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + (H[16] * s[0] +
+    H[17] * s[1] + H[18] * s[2] + H[19] * s[3]) + (w[0] * t79 - w[2] * t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + (H[20] * s[0] +
+    H[21] * s[1] + H[22] * s[2] + H[23] * s[3]) + (w[1] * t67 - w[0] * t73));
+  real t135 = motion_I[0] * motion_I[1];
+  real t138 = motion_I[1] * motion_I[1];
+  real t139 = motion_I[2] * motion_I[2];
+  real t143 = motion_I[0] * motion_I[2];
+  real t147 = motion_I[6] + (t56 * (t135 - motion_I[5]) - t50 * (t138 + t139) + t62 * (motion_I[4] +
+    t143));
+  real t151 = motion_I[0] * motion_I[0];
+  real t155 = motion_I[1] * motion_I[2];
+  real t159 = motion_I[7] + (t50 * (motion_I[5] + t135) - t56 * (t139 + t151) + t62 * (t155 -
+    motion_I[3]));
+  real t170 = motion_I[8] + (t50 * (t143 - motion_I[4]) + t56 * (motion_I[3] + t155) - t62 * (t138 +
+    t151));
+  motion[6] = t4 * t147 + t19 * t159 + t34 * t170 + (c[0] + (H[0] * s[0] + H[1] * s[1] + H[2] * s[2]
+    + H[3] * s[3]) + (2.0 * (v[2] * t73) - 2.0 * (v[1] * t79)));
+  motion[7] = t9 * t147 + t24 * t159 + t39 * t170 + (c[1] + (H[4] * s[0] + H[5] * s[1] + H[6] * s[2]
+    + H[7] * s[3]) + (2.0 * (v[0] * t79) - 2.0 * (v[2] * t67)));
+  motion[8] = t14 * t147 + t29 * t159 + t44 * t170 + (c[2] + (H[8] * s[0] + H[9] * s[1] + H[10] *
+    s[2] + H[11] * s[3]) + (2.0 * (v[1] * t67) - 2.0 * (v[0] * t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 4, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with 4 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the free coordinates
@@ -441,1460 +119,294 @@ static const mstmm_port mstmm_sweep_generic4_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic4_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[4] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[4] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[8] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[12] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[16] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[20] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[4] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[4] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[8] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[12] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[16] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[20] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[8] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[4] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[8] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[12] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[16] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[20] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[12] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[4] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[8] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[12] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[16] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[20] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[16] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[4] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[8] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[12] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[16] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[20] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[20] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t79 = H[1] * S[0];
-    const real t80 = H[5] * S[1];
-    const real t81 = t79 + t80;
-    const real t82 = H[9] * S[2];
-    const real t83 = t81 + t82;
-    const real t84 = H[13] * S[3];
-    const real t85 = t83 + t84;
-    const real t86 = H[17] * S[4];
-    const real t87 = t85 + t86;
-    const real t88 = H[21] * S[5];
-    const real t89 = t87 + t88;
-    const real t90 = H[1] * t89;
-    const real t91 = H[1] * S[1];
-    const real t92 = H[5] * S[6];
-    const real t93 = t91 + t92;
-    const real t94 = H[9] * S[7];
-    const real t95 = t93 + t94;
-    const real t96 = H[13] * S[8];
-    const real t97 = t95 + t96;
-    const real t98 = H[17] * S[9];
-    const real t99 = t97 + t98;
-    const real t100 = H[21] * S[10];
-    const real t101 = t99 + t100;
-    const real t102 = H[5] * t101;
-    const real t103 = t90 + t102;
-    const real t104 = H[1] * S[2];
-    const real t105 = H[5] * S[7];
-    const real t106 = t104 + t105;
-    const real t107 = H[9] * S[11];
-    const real t108 = t106 + t107;
-    const real t109 = H[13] * S[12];
-    const real t110 = t108 + t109;
-    const real t111 = H[17] * S[13];
-    const real t112 = t110 + t111;
-    const real t113 = H[21] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = H[9] * t114;
-    const real t116 = t103 + t115;
-    const real t117 = H[1] * S[3];
-    const real t118 = H[5] * S[8];
-    const real t119 = t117 + t118;
-    const real t120 = H[9] * S[12];
-    const real t121 = t119 + t120;
-    const real t122 = H[13] * S[15];
-    const real t123 = t121 + t122;
-    const real t124 = H[17] * S[16];
-    const real t125 = t123 + t124;
-    const real t126 = H[21] * S[17];
-    const real t127 = t125 + t126;
-    const real t128 = H[13] * t127;
-    const real t129 = t116 + t128;
-    const real t130 = H[1] * S[4];
-    const real t131 = H[5] * S[9];
-    const real t132 = t130 + t131;
-    const real t133 = H[9] * S[13];
-    const real t134 = t132 + t133;
-    const real t135 = H[13] * S[16];
-    const real t136 = t134 + t135;
-    const real t137 = H[17] * S[18];
-    const real t138 = t136 + t137;
-    const real t139 = H[21] * S[19];
-    const real t140 = t138 + t139;
-    const real t141 = H[17] * t140;
-    const real t142 = t129 + t141;
-    const real t143 = H[1] * S[5];
-    const real t144 = H[5] * S[10];
-    const real t145 = t143 + t144;
-    const real t146 = H[9] * S[14];
-    const real t147 = t145 + t146;
-    const real t148 = H[13] * S[17];
-    const real t149 = t147 + t148;
-    const real t150 = H[17] * S[19];
-    const real t151 = t149 + t150;
-    const real t152 = H[21] * S[20];
-    const real t153 = t151 + t152;
-    const real t154 = H[21] * t153;
-    const real t155 = t142 + t154;
-    const real t156 = J[1] + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * t89;
-    const real t159 = H[4] * t101;
-    const real t160 = t158 + t159;
-    const real t161 = H[8] * t114;
-    const real t162 = t160 + t161;
-    const real t163 = H[12] * t127;
-    const real t164 = t162 + t163;
-    const real t165 = H[16] * t140;
-    const real t166 = t164 + t165;
-    const real t167 = H[20] * t153;
-    const real t168 = t166 + t167;
-    const real t169 = 1.0 / t77;
-    const real t170 = t168 * t169;
-    const real t171 = t168 * t170;
-    const real t172 = t156 - t171;
-    const real t173 = t157 < t172;
-    if (!(t173 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t174 = H[2] * S[0];
-    const real t175 = H[6] * S[1];
-    const real t176 = t174 + t175;
-    const real t177 = H[10] * S[2];
-    const real t178 = t176 + t177;
-    const real t179 = H[14] * S[3];
-    const real t180 = t178 + t179;
-    const real t181 = H[18] * S[4];
-    const real t182 = t180 + t181;
-    const real t183 = H[22] * S[5];
-    const real t184 = t182 + t183;
-    const real t185 = H[2] * t184;
-    const real t186 = H[2] * S[1];
-    const real t187 = H[6] * S[6];
-    const real t188 = t186 + t187;
-    const real t189 = H[10] * S[7];
-    const real t190 = t188 + t189;
-    const real t191 = H[14] * S[8];
-    const real t192 = t190 + t191;
-    const real t193 = H[18] * S[9];
-    const real t194 = t192 + t193;
-    const real t195 = H[22] * S[10];
-    const real t196 = t194 + t195;
-    const real t197 = H[6] * t196;
-    const real t198 = t185 + t197;
-    const real t199 = H[2] * S[2];
-    const real t200 = H[6] * S[7];
-    const real t201 = t199 + t200;
-    const real t202 = H[10] * S[11];
-    const real t203 = t201 + t202;
-    const real t204 = H[14] * S[12];
-    const real t205 = t203 + t204;
-    const real t206 = H[18] * S[13];
-    const real t207 = t205 + t206;
-    const real t208 = H[22] * S[14];
-    const real t209 = t207 + t208;
-    const real t210 = H[10] * t209;
-    const real t211 = t198 + t210;
-    const real t212 = H[2] * S[3];
-    const real t213 = H[6] * S[8];
-    const real t214 = t212 + t213;
-    const real t215 = H[10] * S[12];
-    const real t216 = t214 + t215;
-    const real t217 = H[14] * S[15];
-    const real t218 = t216 + t217;
-    const real t219 = H[18] * S[16];
-    const real t220 = t218 + t219;
-    const real t221 = H[22] * S[17];
-    const real t222 = t220 + t221;
-    const real t223 = H[14] * t222;
-    const real t224 = t211 + t223;
-    const real t225 = H[2] * S[4];
-    const real t226 = H[6] * S[9];
-    const real t227 = t225 + t226;
-    const real t228 = H[10] * S[13];
-    const real t229 = t227 + t228;
-    const real t230 = H[14] * S[16];
-    const real t231 = t229 + t230;
-    const real t232 = H[18] * S[18];
-    const real t233 = t231 + t232;
-    const real t234 = H[22] * S[19];
-    const real t235 = t233 + t234;
-    const real t236 = H[18] * t235;
-    const real t237 = t224 + t236;
-    const real t238 = H[2] * S[5];
-    const real t239 = H[6] * S[10];
-    const real t240 = t238 + t239;
-    const real t241 = H[10] * S[14];
-    const real t242 = t240 + t241;
-    const real t243 = H[14] * S[17];
-    const real t244 = t242 + t243;
-    const real t245 = H[18] * S[19];
-    const real t246 = t244 + t245;
-    const real t247 = H[22] * S[20];
-    const real t248 = t246 + t247;
-    const real t249 = H[22] * t248;
-    const real t250 = t237 + t249;
-    const real t251 = J[2] + t250;
-    const real t252 = t251 * ((real)1 / (real)10000000000000);
-    const real t253 = H[0] * t184;
-    const real t254 = H[4] * t196;
-    const real t255 = t253 + t254;
-    const real t256 = H[8] * t209;
-    const real t257 = t255 + t256;
-    const real t258 = H[12] * t222;
-    const real t259 = t257 + t258;
-    const real t260 = H[16] * t235;
-    const real t261 = t259 + t260;
-    const real t262 = H[20] * t248;
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t169;
-    const real t265 = t263 * t264;
-    const real t266 = t251 - t265;
-    const real t267 = H[1] * t184;
-    const real t268 = H[5] * t196;
-    const real t269 = t267 + t268;
-    const real t270 = H[9] * t209;
-    const real t271 = t269 + t270;
-    const real t272 = H[13] * t222;
-    const real t273 = t271 + t272;
-    const real t274 = H[17] * t235;
-    const real t275 = t273 + t274;
-    const real t276 = H[21] * t248;
-    const real t277 = t275 + t276;
-    const real t278 = t263 * t170;
-    const real t279 = t277 - t278;
-    const real t280 = 1.0 / t172;
-    const real t281 = t280 * t279;
-    const real t282 = t279 * t281;
-    const real t283 = t266 - t282;
-    const real t284 = t252 < t283;
-    if (!(t284 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t285 = H[3] * S[0];
-    const real t286 = H[7] * S[1];
-    const real t287 = t285 + t286;
-    const real t288 = H[11] * S[2];
-    const real t289 = t287 + t288;
-    const real t290 = H[15] * S[3];
-    const real t291 = t289 + t290;
-    const real t292 = H[19] * S[4];
-    const real t293 = t291 + t292;
-    const real t294 = H[23] * S[5];
-    const real t295 = t293 + t294;
-    const real t296 = H[3] * t295;
-    const real t297 = H[3] * S[1];
-    const real t298 = H[7] * S[6];
-    const real t299 = t297 + t298;
-    const real t300 = H[11] * S[7];
-    const real t301 = t299 + t300;
-    const real t302 = H[15] * S[8];
-    const real t303 = t301 + t302;
-    const real t304 = H[19] * S[9];
-    const real t305 = t303 + t304;
-    const real t306 = H[23] * S[10];
-    const real t307 = t305 + t306;
-    const real t308 = H[7] * t307;
-    const real t309 = t296 + t308;
-    const real t310 = H[3] * S[2];
-    const real t311 = H[7] * S[7];
-    const real t312 = t310 + t311;
-    const real t313 = H[11] * S[11];
-    const real t314 = t312 + t313;
-    const real t315 = H[15] * S[12];
-    const real t316 = t314 + t315;
-    const real t317 = H[19] * S[13];
-    const real t318 = t316 + t317;
-    const real t319 = H[23] * S[14];
-    const real t320 = t318 + t319;
-    const real t321 = H[11] * t320;
-    const real t322 = t309 + t321;
-    const real t323 = H[3] * S[3];
-    const real t324 = H[7] * S[8];
-    const real t325 = t323 + t324;
-    const real t326 = H[11] * S[12];
-    const real t327 = t325 + t326;
-    const real t328 = H[15] * S[15];
-    const real t329 = t327 + t328;
-    const real t330 = H[19] * S[16];
-    const real t331 = t329 + t330;
-    const real t332 = H[23] * S[17];
-    const real t333 = t331 + t332;
-    const real t334 = H[15] * t333;
-    const real t335 = t322 + t334;
-    const real t336 = H[3] * S[4];
-    const real t337 = H[7] * S[9];
-    const real t338 = t336 + t337;
-    const real t339 = H[11] * S[13];
-    const real t340 = t338 + t339;
-    const real t341 = H[15] * S[16];
-    const real t342 = t340 + t341;
-    const real t343 = H[19] * S[18];
-    const real t344 = t342 + t343;
-    const real t345 = H[23] * S[19];
-    const real t346 = t344 + t345;
-    const real t347 = H[19] * t346;
-    const real t348 = t335 + t347;
-    const real t349 = H[3] * S[5];
-    const real t350 = H[7] * S[10];
-    const real t351 = t349 + t350;
-    const real t352 = H[11] * S[14];
-    const real t353 = t351 + t352;
-    const real t354 = H[15] * S[17];
-    const real t355 = t353 + t354;
-    const real t356 = H[19] * S[19];
-    const real t357 = t355 + t356;
-    const real t358 = H[23] * S[20];
-    const real t359 = t357 + t358;
-    const real t360 = H[23] * t359;
-    const real t361 = t348 + t360;
-    const real t362 = J[3] + t361;
-    const real t363 = t362 * ((real)1 / (real)10000000000000);
-    const real t364 = H[0] * t295;
-    const real t365 = H[4] * t307;
-    const real t366 = t364 + t365;
-    const real t367 = H[8] * t320;
-    const real t368 = t366 + t367;
-    const real t369 = H[12] * t333;
-    const real t370 = t368 + t369;
-    const real t371 = H[16] * t346;
-    const real t372 = t370 + t371;
-    const real t373 = H[20] * t359;
-    const real t374 = t372 + t373;
-    const real t375 = t374 * t169;
-    const real t376 = t374 * t375;
-    const real t377 = t362 - t376;
-    const real t378 = H[1] * t295;
-    const real t379 = H[5] * t307;
-    const real t380 = t378 + t379;
-    const real t381 = H[9] * t320;
-    const real t382 = t380 + t381;
-    const real t383 = H[13] * t333;
-    const real t384 = t382 + t383;
-    const real t385 = H[17] * t346;
-    const real t386 = t384 + t385;
-    const real t387 = H[21] * t359;
-    const real t388 = t386 + t387;
-    const real t389 = t374 * t170;
-    const real t390 = t388 - t389;
-    const real t391 = t280 * t390;
-    const real t392 = t390 * t391;
-    const real t393 = t377 - t392;
-    const real t394 = H[2] * t295;
-    const real t395 = H[6] * t307;
-    const real t396 = t394 + t395;
-    const real t397 = H[10] * t320;
-    const real t398 = t396 + t397;
-    const real t399 = H[14] * t333;
-    const real t400 = t398 + t399;
-    const real t401 = H[18] * t346;
-    const real t402 = t400 + t401;
-    const real t403 = H[22] * t359;
-    const real t404 = t402 + t403;
-    const real t405 = t374 * t264;
-    const real t406 = t404 - t405;
-    const real t407 = t281 * t390;
-    const real t408 = t406 - t407;
-    const real t409 = 1.0 / t283;
-    const real t410 = t409 * t408;
-    const real t411 = t408 * t410;
-    const real t412 = t393 - t411;
-    const real t413 = t363 < t412;
-    if (!(t413 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
-    if (!(t284 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
-    if (!(t413 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t414 = H[8] * H[8];
-    const real t415 = H[0] * H[0];
-    const real t416 = H[4] * H[4];
-    const real t417 = t415 + t416;
-    const real t418 = t414 + t417;
-    const real t419 = 0.0 < floor_[0];
-    const real t420 = S[0] + S[6];
-    const real t421 = S[11] + t420;
-    const real t422 = ((real)1 / (real)300000000000000) * t421;
-    const real t423 = t419 != 0 ? floor_[0] : t422;
-    const real t424 = t418 * t423;
-    const real t425 = H[20] * H[20];
-    const real t426 = H[12] * H[12];
-    const real t427 = H[16] * H[16];
-    const real t428 = t426 + t427;
-    const real t429 = t425 + t428;
-    const real t430 = 0.0 < floor_[1];
-    const real t431 = S[15] + S[18];
-    const real t432 = S[20] + t431;
-    const real t433 = ((real)1 / (real)300000000000000) * t432;
-    const real t434 = t430 != 0 ? floor_[1] : t433;
-    const real t435 = t429 * t434;
-    const real t436 = t424 + t435;
-    const real t437 = t436 < t77;
-    if (!(t437 != 0)) return 1; /* speed 1 of 4 moves no inertia: its acceleration is undetermined */
-    const real t438 = H[9] * H[9];
-    const real t439 = H[1] * H[1];
-    const real t440 = H[5] * H[5];
-    const real t441 = t439 + t440;
-    const real t442 = t438 + t441;
-    const real t443 = t423 * t442;
-    const real t444 = H[21] * H[21];
-    const real t445 = H[13] * H[13];
-    const real t446 = H[17] * H[17];
-    const real t447 = t445 + t446;
-    const real t448 = t444 + t447;
-    const real t449 = t434 * t448;
-    const real t450 = t443 + t449;
-    const real t451 = t450 < t156;
-    if (!(t451 != 0)) return 1; /* speed 2 of 4 moves no inertia: its acceleration is undetermined */
-    const real t452 = H[10] * H[10];
-    const real t453 = H[2] * H[2];
-    const real t454 = H[6] * H[6];
-    const real t455 = t453 + t454;
-    const real t456 = t452 + t455;
-    const real t457 = t423 * t456;
-    const real t458 = H[22] * H[22];
-    const real t459 = H[14] * H[14];
-    const real t460 = H[18] * H[18];
-    const real t461 = t459 + t460;
-    const real t462 = t458 + t461;
-    const real t463 = t434 * t462;
-    const real t464 = t457 + t463;
-    const real t465 = t464 < t251;
-    if (!(t465 != 0)) return 1; /* speed 3 of 4 moves no inertia: its acceleration is undetermined */
-    const real t466 = H[11] * H[11];
-    const real t467 = H[3] * H[3];
-    const real t468 = H[7] * H[7];
-    const real t469 = t467 + t468;
-    const real t470 = t466 + t469;
-    const real t471 = t423 * t470;
-    const real t472 = H[23] * H[23];
-    const real t473 = H[15] * H[15];
-    const real t474 = H[19] * H[19];
-    const real t475 = t473 + t474;
-    const real t476 = t472 + t475;
-    const real t477 = t434 * t476;
-    const real t478 = t471 + t477;
-    const real t479 = t478 < t362;
-    if (!(t479 != 0)) return 1; /* speed 4 of 4 moves no inertia: its acceleration is undetermined */
-    const real t480 = t10 * t169;
-    const real t481 = t10 * t170;
-    const real t482 = t89 - t481;
-    const real t483 = t280 * t482;
-    const real t484 = t10 * t264;
-    const real t485 = t184 - t484;
-    const real t486 = t281 * t482;
-    const real t487 = t485 - t486;
-    const real t488 = t409 * t487;
-    const real t489 = 1.0 / t412;
-    const real t490 = t10 * t375;
-    const real t491 = t295 - t490;
-    const real t492 = t391 * t482;
-    const real t493 = t491 - t492;
-    const real t494 = t410 * t487;
-    const real t495 = t493 - t494;
-    const real t496 = t489 * t495;
-    const real t497 = t410 * t496;
-    const real t498 = t488 - t497;
-    const real t499 = t281 * t498;
-    const real t500 = t483 - t499;
-    const real t501 = t391 * t496;
-    const real t502 = t500 - t501;
-    const real t503 = t170 * t502;
-    const real t504 = t480 - t503;
-    const real t505 = t264 * t498;
-    const real t506 = t504 - t505;
-    const real t507 = t375 * t496;
-    const real t508 = t506 - t507;
-    G[0] = t508;
-    const real t509 = t22 * t169;
-    const real t510 = t22 * t170;
-    const real t511 = t101 - t510;
-    const real t512 = t280 * t511;
-    const real t513 = t22 * t264;
-    const real t514 = t196 - t513;
-    const real t515 = t281 * t511;
-    const real t516 = t514 - t515;
-    const real t517 = t409 * t516;
-    const real t518 = t22 * t375;
-    const real t519 = t307 - t518;
-    const real t520 = t391 * t511;
-    const real t521 = t519 - t520;
-    const real t522 = t410 * t516;
-    const real t523 = t521 - t522;
-    const real t524 = t489 * t523;
-    const real t525 = t410 * t524;
-    const real t526 = t517 - t525;
-    const real t527 = t281 * t526;
-    const real t528 = t512 - t527;
-    const real t529 = t391 * t524;
-    const real t530 = t528 - t529;
-    const real t531 = t170 * t530;
-    const real t532 = t509 - t531;
-    const real t533 = t264 * t526;
-    const real t534 = t532 - t533;
-    const real t535 = t375 * t524;
-    const real t536 = t534 - t535;
-    G[1] = t536;
-    const real t537 = t35 * t169;
-    const real t538 = t35 * t170;
-    const real t539 = t114 - t538;
-    const real t540 = t280 * t539;
-    const real t541 = t35 * t264;
-    const real t542 = t209 - t541;
-    const real t543 = t281 * t539;
-    const real t544 = t542 - t543;
-    const real t545 = t409 * t544;
-    const real t546 = t35 * t375;
-    const real t547 = t320 - t546;
-    const real t548 = t391 * t539;
-    const real t549 = t547 - t548;
-    const real t550 = t410 * t544;
-    const real t551 = t549 - t550;
-    const real t552 = t489 * t551;
-    const real t553 = t410 * t552;
-    const real t554 = t545 - t553;
-    const real t555 = t281 * t554;
-    const real t556 = t540 - t555;
-    const real t557 = t391 * t552;
-    const real t558 = t556 - t557;
-    const real t559 = t170 * t558;
-    const real t560 = t537 - t559;
-    const real t561 = t264 * t554;
-    const real t562 = t560 - t561;
-    const real t563 = t375 * t552;
-    const real t564 = t562 - t563;
-    G[2] = t564;
-    const real t565 = t48 * t169;
-    const real t566 = t48 * t170;
-    const real t567 = t127 - t566;
-    const real t568 = t280 * t567;
-    const real t569 = t48 * t264;
-    const real t570 = t222 - t569;
-    const real t571 = t281 * t567;
-    const real t572 = t570 - t571;
-    const real t573 = t409 * t572;
-    const real t574 = t48 * t375;
-    const real t575 = t333 - t574;
-    const real t576 = t391 * t567;
-    const real t577 = t575 - t576;
-    const real t578 = t410 * t572;
-    const real t579 = t577 - t578;
-    const real t580 = t489 * t579;
-    const real t581 = t410 * t580;
-    const real t582 = t573 - t581;
-    const real t583 = t281 * t582;
-    const real t584 = t568 - t583;
-    const real t585 = t391 * t580;
-    const real t586 = t584 - t585;
-    const real t587 = t170 * t586;
-    const real t588 = t565 - t587;
-    const real t589 = t264 * t582;
-    const real t590 = t588 - t589;
-    const real t591 = t375 * t580;
-    const real t592 = t590 - t591;
-    G[3] = t592;
-    const real t593 = t61 * t169;
-    const real t594 = t61 * t170;
-    const real t595 = t140 - t594;
-    const real t596 = t280 * t595;
-    const real t597 = t61 * t264;
-    const real t598 = t235 - t597;
-    const real t599 = t281 * t595;
-    const real t600 = t598 - t599;
-    const real t601 = t409 * t600;
-    const real t602 = t61 * t375;
-    const real t603 = t346 - t602;
-    const real t604 = t391 * t595;
-    const real t605 = t603 - t604;
-    const real t606 = t410 * t600;
-    const real t607 = t605 - t606;
-    const real t608 = t489 * t607;
-    const real t609 = t410 * t608;
-    const real t610 = t601 - t609;
-    const real t611 = t281 * t610;
-    const real t612 = t596 - t611;
-    const real t613 = t391 * t608;
-    const real t614 = t612 - t613;
-    const real t615 = t170 * t614;
-    const real t616 = t593 - t615;
-    const real t617 = t264 * t610;
-    const real t618 = t616 - t617;
-    const real t619 = t375 * t608;
-    const real t620 = t618 - t619;
-    G[4] = t620;
-    const real t621 = t74 * t169;
-    const real t622 = t74 * t170;
-    const real t623 = t153 - t622;
-    const real t624 = t280 * t623;
-    const real t625 = t74 * t264;
-    const real t626 = t248 - t625;
-    const real t627 = t281 * t623;
-    const real t628 = t626 - t627;
-    const real t629 = t409 * t628;
-    const real t630 = t74 * t375;
-    const real t631 = t359 - t630;
-    const real t632 = t391 * t623;
-    const real t633 = t631 - t632;
-    const real t634 = t410 * t628;
-    const real t635 = t633 - t634;
-    const real t636 = t489 * t635;
-    const real t637 = t410 * t636;
-    const real t638 = t629 - t637;
-    const real t639 = t281 * t638;
-    const real t640 = t624 - t639;
-    const real t641 = t391 * t636;
-    const real t642 = t640 - t641;
-    const real t643 = t170 * t642;
-    const real t644 = t621 - t643;
-    const real t645 = t264 * t638;
-    const real t646 = t644 - t645;
-    const real t647 = t375 * t636;
-    const real t648 = t646 - t647;
-    G[5] = t648;
-    G[6] = t502;
-    G[7] = t530;
-    G[8] = t558;
-    G[9] = t586;
-    G[10] = t614;
-    G[11] = t642;
-    G[12] = t498;
-    G[13] = t526;
-    G[14] = t554;
-    G[15] = t582;
-    G[16] = t610;
-    G[17] = t638;
-    G[18] = t496;
-    G[19] = t524;
-    G[20] = t552;
-    G[21] = t580;
-    G[22] = t608;
-    G[23] = t636;
-    const real t649 = H[0] * e[0];
-    const real t650 = H[4] * e[1];
-    const real t651 = t649 + t650;
-    const real t652 = H[8] * e[2];
-    const real t653 = t651 + t652;
-    const real t654 = H[12] * e[3];
-    const real t655 = t653 + t654;
-    const real t656 = H[16] * e[4];
-    const real t657 = t655 + t656;
-    const real t658 = H[20] * e[5];
-    const real t659 = t657 + t658;
-    const real t660 = tau[0] - t659;
-    const real t661 = t169 * t660;
-    const real t662 = H[1] * e[0];
-    const real t663 = H[5] * e[1];
-    const real t664 = t662 + t663;
-    const real t665 = H[9] * e[2];
-    const real t666 = t664 + t665;
-    const real t667 = H[13] * e[3];
-    const real t668 = t666 + t667;
-    const real t669 = H[17] * e[4];
-    const real t670 = t668 + t669;
-    const real t671 = H[21] * e[5];
-    const real t672 = t670 + t671;
-    const real t673 = tau[1] - t672;
-    const real t674 = t170 * t660;
-    const real t675 = t673 - t674;
-    const real t676 = t280 * t675;
-    const real t677 = H[2] * e[0];
-    const real t678 = H[6] * e[1];
-    const real t679 = t677 + t678;
-    const real t680 = H[10] * e[2];
-    const real t681 = t679 + t680;
-    const real t682 = H[14] * e[3];
-    const real t683 = t681 + t682;
-    const real t684 = H[18] * e[4];
-    const real t685 = t683 + t684;
-    const real t686 = H[22] * e[5];
-    const real t687 = t685 + t686;
-    const real t688 = tau[2] - t687;
-    const real t689 = t264 * t660;
-    const real t690 = t688 - t689;
-    const real t691 = t281 * t675;
-    const real t692 = t690 - t691;
-    const real t693 = t409 * t692;
-    const real t694 = H[3] * e[0];
-    const real t695 = H[7] * e[1];
-    const real t696 = t694 + t695;
-    const real t697 = H[11] * e[2];
-    const real t698 = t696 + t697;
-    const real t699 = H[15] * e[3];
-    const real t700 = t698 + t699;
-    const real t701 = H[19] * e[4];
-    const real t702 = t700 + t701;
-    const real t703 = H[23] * e[5];
-    const real t704 = t702 + t703;
-    const real t705 = tau[3] - t704;
-    const real t706 = t375 * t660;
-    const real t707 = t705 - t706;
-    const real t708 = t391 * t675;
-    const real t709 = t707 - t708;
-    const real t710 = t410 * t692;
-    const real t711 = t709 - t710;
-    const real t712 = t489 * t711;
-    const real t713 = t410 * t712;
-    const real t714 = t693 - t713;
-    const real t715 = t281 * t714;
-    const real t716 = t676 - t715;
-    const real t717 = t391 * t712;
-    const real t718 = t716 - t717;
-    const real t719 = t170 * t718;
-    const real t720 = t661 - t719;
-    const real t721 = t264 * t714;
-    const real t722 = t720 - t721;
-    const real t723 = t375 * t712;
-    const real t724 = t722 - t723;
-    g[0] = t724;
-    g[1] = t718;
-    g[2] = t714;
-    g[3] = t712;
-    const real t725 = t10 * t508;
-    const real t726 = t89 * t502;
-    const real t727 = t725 + t726;
-    const real t728 = t184 * t498;
-    const real t729 = t727 + t728;
-    const real t730 = t295 * t496;
-    const real t731 = t729 + t730;
-    const real t732 = S[0] - t731;
-    const real t733 = Rc[0] * t732;
-    const real t734 = t10 * t536;
-    const real t735 = t89 * t530;
-    const real t736 = t734 + t735;
-    const real t737 = t184 * t526;
-    const real t738 = t736 + t737;
-    const real t739 = t295 * t524;
-    const real t740 = t738 + t739;
-    const real t741 = S[1] - t740;
-    const real t742 = Rc[1] * t741;
-    const real t743 = t733 + t742;
-    const real t744 = t10 * t564;
-    const real t745 = t89 * t558;
-    const real t746 = t744 + t745;
-    const real t747 = t184 * t554;
-    const real t748 = t746 + t747;
-    const real t749 = t295 * t552;
-    const real t750 = t748 + t749;
-    const real t751 = S[2] - t750;
-    const real t752 = Rc[2] * t751;
-    const real t753 = t743 + t752;
-    const real t754 = Rc[0] * t753;
-    const real t755 = Rc[0] * t741;
-    const real t756 = t22 * t536;
-    const real t757 = t101 * t530;
-    const real t758 = t756 + t757;
-    const real t759 = t196 * t526;
-    const real t760 = t758 + t759;
-    const real t761 = t307 * t524;
-    const real t762 = t760 + t761;
-    const real t763 = S[6] - t762;
-    const real t764 = Rc[1] * t763;
-    const real t765 = t755 + t764;
-    const real t766 = t22 * t564;
-    const real t767 = t101 * t558;
-    const real t768 = t766 + t767;
-    const real t769 = t196 * t554;
-    const real t770 = t768 + t769;
-    const real t771 = t307 * t552;
-    const real t772 = t770 + t771;
-    const real t773 = S[7] - t772;
-    const real t774 = Rc[2] * t773;
-    const real t775 = t765 + t774;
-    const real t776 = Rc[1] * t775;
-    const real t777 = t754 + t776;
-    const real t778 = Rc[0] * t751;
-    const real t779 = Rc[1] * t773;
-    const real t780 = t778 + t779;
-    const real t781 = t35 * t564;
-    const real t782 = t114 * t558;
-    const real t783 = t781 + t782;
-    const real t784 = t209 * t554;
-    const real t785 = t783 + t784;
-    const real t786 = t320 * t552;
-    const real t787 = t785 + t786;
-    const real t788 = S[11] - t787;
-    const real t789 = Rc[2] * t788;
-    const real t790 = t780 + t789;
-    const real t791 = Rc[2] * t790;
-    const real t792 = t777 + t791;
-    S_I[0] += t792;
-    const real t793 = Rc[3] * t753;
-    const real t794 = Rc[4] * t775;
-    const real t795 = t793 + t794;
-    const real t796 = Rc[5] * t790;
-    const real t797 = t795 + t796;
-    S_I[1] += t797;
-    const real t798 = Rc[6] * t753;
-    const real t799 = Rc[7] * t775;
-    const real t800 = t798 + t799;
-    const real t801 = Rc[8] * t790;
-    const real t802 = t800 + t801;
-    S_I[2] += t802;
-    const real t803 = t10 * t592;
-    const real t804 = t89 * t586;
-    const real t805 = t803 + t804;
-    const real t806 = t184 * t582;
-    const real t807 = t805 + t806;
-    const real t808 = t295 * t580;
-    const real t809 = t807 + t808;
-    const real t810 = S[3] - t809;
-    const real t811 = Rc[0] * t810;
-    const real t812 = t22 * t592;
-    const real t813 = t101 * t586;
-    const real t814 = t812 + t813;
-    const real t815 = t196 * t582;
-    const real t816 = t814 + t815;
-    const real t817 = t307 * t580;
-    const real t818 = t816 + t817;
-    const real t819 = S[8] - t818;
-    const real t820 = Rc[1] * t819;
-    const real t821 = t811 + t820;
-    const real t822 = t35 * t592;
-    const real t823 = t114 * t586;
-    const real t824 = t822 + t823;
-    const real t825 = t209 * t582;
-    const real t826 = t824 + t825;
-    const real t827 = t320 * t580;
-    const real t828 = t826 + t827;
-    const real t829 = S[12] - t828;
-    const real t830 = Rc[2] * t829;
-    const real t831 = t821 + t830;
-    const real t832 = Rc[0] * t831;
-    const real t833 = t10 * t620;
-    const real t834 = t89 * t614;
-    const real t835 = t833 + t834;
-    const real t836 = t184 * t610;
-    const real t837 = t835 + t836;
-    const real t838 = t295 * t608;
-    const real t839 = t837 + t838;
-    const real t840 = S[4] - t839;
-    const real t841 = Rc[0] * t840;
-    const real t842 = t22 * t620;
-    const real t843 = t101 * t614;
-    const real t844 = t842 + t843;
-    const real t845 = t196 * t610;
-    const real t846 = t844 + t845;
-    const real t847 = t307 * t608;
-    const real t848 = t846 + t847;
-    const real t849 = S[9] - t848;
-    const real t850 = Rc[1] * t849;
-    const real t851 = t841 + t850;
-    const real t852 = t35 * t620;
-    const real t853 = t114 * t614;
-    const real t854 = t852 + t853;
-    const real t855 = t209 * t610;
-    const real t856 = t854 + t855;
-    const real t857 = t320 * t608;
-    const real t858 = t856 + t857;
-    const real t859 = S[13] - t858;
-    const real t860 = Rc[2] * t859;
-    const real t861 = t851 + t860;
-    const real t862 = Rc[1] * t861;
-    const real t863 = t832 + t862;
-    const real t864 = t10 * t648;
-    const real t865 = t89 * t642;
-    const real t866 = t864 + t865;
-    const real t867 = t184 * t638;
-    const real t868 = t866 + t867;
-    const real t869 = t295 * t636;
-    const real t870 = t868 + t869;
-    const real t871 = S[5] - t870;
-    const real t872 = Rc[0] * t871;
-    const real t873 = t22 * t648;
-    const real t874 = t101 * t642;
-    const real t875 = t873 + t874;
-    const real t876 = t196 * t638;
-    const real t877 = t875 + t876;
-    const real t878 = t307 * t636;
-    const real t879 = t877 + t878;
-    const real t880 = S[10] - t879;
-    const real t881 = Rc[1] * t880;
-    const real t882 = t872 + t881;
-    const real t883 = t35 * t648;
-    const real t884 = t114 * t642;
-    const real t885 = t883 + t884;
-    const real t886 = t209 * t638;
-    const real t887 = t885 + t886;
-    const real t888 = t320 * t636;
-    const real t889 = t887 + t888;
-    const real t890 = S[14] - t889;
-    const real t891 = Rc[2] * t890;
-    const real t892 = t882 + t891;
-    const real t893 = Rc[2] * t892;
-    const real t894 = t863 + t893;
-    const real t895 = r[1] * t802;
-    const real t896 = r[2] * t797;
-    const real t897 = t895 - t896;
-    const real t898 = t894 + t897;
-    S_I[3] += t898;
-    const real t899 = Rc[3] * t831;
-    const real t900 = Rc[4] * t861;
-    const real t901 = t899 + t900;
-    const real t902 = Rc[5] * t892;
-    const real t903 = t901 + t902;
-    const real t904 = r[2] * t792;
-    const real t905 = r[0] * t802;
-    const real t906 = t904 - t905;
-    const real t907 = t903 + t906;
-    S_I[4] += t907;
-    const real t908 = Rc[6] * t831;
-    const real t909 = Rc[7] * t861;
-    const real t910 = t908 + t909;
-    const real t911 = Rc[8] * t892;
-    const real t912 = t910 + t911;
-    const real t913 = r[0] * t797;
-    const real t914 = r[1] * t792;
-    const real t915 = t913 - t914;
-    const real t916 = t912 + t915;
-    S_I[5] += t916;
-    const real t917 = Rc[3] * t732;
-    const real t918 = Rc[4] * t741;
-    const real t919 = t917 + t918;
-    const real t920 = Rc[5] * t751;
-    const real t921 = t919 + t920;
-    const real t922 = Rc[3] * t921;
-    const real t923 = Rc[3] * t741;
-    const real t924 = Rc[4] * t763;
-    const real t925 = t923 + t924;
-    const real t926 = Rc[5] * t773;
-    const real t927 = t925 + t926;
-    const real t928 = Rc[4] * t927;
-    const real t929 = t922 + t928;
-    const real t930 = Rc[3] * t751;
-    const real t931 = Rc[4] * t773;
-    const real t932 = t930 + t931;
-    const real t933 = Rc[5] * t788;
-    const real t934 = t932 + t933;
-    const real t935 = Rc[5] * t934;
-    const real t936 = t929 + t935;
-    S_I[6] += t936;
-    const real t937 = Rc[6] * t921;
-    const real t938 = Rc[7] * t927;
-    const real t939 = t937 + t938;
-    const real t940 = Rc[8] * t934;
-    const real t941 = t939 + t940;
-    S_I[7] += t941;
-    const real t942 = Rc[3] * t810;
-    const real t943 = Rc[4] * t819;
-    const real t944 = t942 + t943;
-    const real t945 = Rc[5] * t829;
-    const real t946 = t944 + t945;
-    const real t947 = Rc[0] * t946;
-    const real t948 = Rc[3] * t840;
-    const real t949 = Rc[4] * t849;
-    const real t950 = t948 + t949;
-    const real t951 = Rc[5] * t859;
-    const real t952 = t950 + t951;
-    const real t953 = Rc[1] * t952;
-    const real t954 = t947 + t953;
-    const real t955 = Rc[3] * t871;
-    const real t956 = Rc[4] * t880;
-    const real t957 = t955 + t956;
-    const real t958 = Rc[5] * t890;
-    const real t959 = t957 + t958;
-    const real t960 = Rc[2] * t959;
-    const real t961 = t954 + t960;
-    const real t962 = r[1] * t941;
-    const real t963 = r[2] * t936;
-    const real t964 = t962 - t963;
-    const real t965 = t961 + t964;
-    S_I[8] += t965;
-    const real t966 = Rc[3] * t946;
-    const real t967 = Rc[4] * t952;
-    const real t968 = t966 + t967;
-    const real t969 = Rc[5] * t959;
-    const real t970 = t968 + t969;
-    const real t971 = r[0] * t941;
-    const real t972 = t896 - t971;
-    const real t973 = t970 + t972;
-    S_I[9] += t973;
-    const real t974 = Rc[6] * t946;
-    const real t975 = Rc[7] * t952;
-    const real t976 = t974 + t975;
-    const real t977 = Rc[8] * t959;
-    const real t978 = t976 + t977;
-    const real t979 = r[0] * t936;
-    const real t980 = r[1] * t797;
-    const real t981 = t979 - t980;
-    const real t982 = t978 + t981;
-    S_I[10] += t982;
-    const real t983 = Rc[6] * t732;
-    const real t984 = Rc[7] * t741;
-    const real t985 = t983 + t984;
-    const real t986 = Rc[8] * t751;
-    const real t987 = t985 + t986;
-    const real t988 = Rc[6] * t987;
-    const real t989 = Rc[6] * t741;
-    const real t990 = Rc[7] * t763;
-    const real t991 = t989 + t990;
-    const real t992 = Rc[8] * t773;
-    const real t993 = t991 + t992;
-    const real t994 = Rc[7] * t993;
-    const real t995 = t988 + t994;
-    const real t996 = Rc[6] * t751;
-    const real t997 = Rc[7] * t773;
-    const real t998 = t996 + t997;
-    const real t999 = Rc[8] * t788;
-    const real t1000 = t998 + t999;
-    const real t1001 = Rc[8] * t1000;
-    const real t1002 = t995 + t1001;
-    S_I[11] += t1002;
-    const real t1003 = Rc[6] * t810;
-    const real t1004 = Rc[7] * t819;
-    const real t1005 = t1003 + t1004;
-    const real t1006 = Rc[8] * t829;
-    const real t1007 = t1005 + t1006;
-    const real t1008 = Rc[0] * t1007;
-    const real t1009 = Rc[6] * t840;
-    const real t1010 = Rc[7] * t849;
-    const real t1011 = t1009 + t1010;
-    const real t1012 = Rc[8] * t859;
-    const real t1013 = t1011 + t1012;
-    const real t1014 = Rc[1] * t1013;
-    const real t1015 = t1008 + t1014;
-    const real t1016 = Rc[6] * t871;
-    const real t1017 = Rc[7] * t880;
-    const real t1018 = t1016 + t1017;
-    const real t1019 = Rc[8] * t890;
-    const real t1020 = t1018 + t1019;
-    const real t1021 = Rc[2] * t1020;
-    const real t1022 = t1015 + t1021;
-    const real t1023 = r[1] * t1002;
-    const real t1024 = r[2] * t941;
-    const real t1025 = t1023 - t1024;
-    const real t1026 = t1022 + t1025;
-    S_I[12] += t1026;
-    const real t1027 = Rc[3] * t1007;
-    const real t1028 = Rc[4] * t1013;
-    const real t1029 = t1027 + t1028;
-    const real t1030 = Rc[5] * t1020;
-    const real t1031 = t1029 + t1030;
-    const real t1032 = r[2] * t802;
-    const real t1033 = r[0] * t1002;
-    const real t1034 = t1032 - t1033;
-    const real t1035 = t1031 + t1034;
-    S_I[13] += t1035;
-    const real t1036 = Rc[6] * t1007;
-    const real t1037 = Rc[7] * t1013;
-    const real t1038 = t1036 + t1037;
-    const real t1039 = Rc[8] * t1020;
-    const real t1040 = t1038 + t1039;
-    const real t1041 = t971 - t895;
-    const real t1042 = t1040 + t1041;
-    S_I[14] += t1042;
-    const real t1043 = t48 * t592;
-    const real t1044 = t127 * t586;
-    const real t1045 = t1043 + t1044;
-    const real t1046 = t222 * t582;
-    const real t1047 = t1045 + t1046;
-    const real t1048 = t333 * t580;
-    const real t1049 = t1047 + t1048;
-    const real t1050 = S[15] - t1049;
-    const real t1051 = Rc[0] * t1050;
-    const real t1052 = t48 * t620;
-    const real t1053 = t127 * t614;
-    const real t1054 = t1052 + t1053;
-    const real t1055 = t222 * t610;
-    const real t1056 = t1054 + t1055;
-    const real t1057 = t333 * t608;
-    const real t1058 = t1056 + t1057;
-    const real t1059 = S[16] - t1058;
-    const real t1060 = Rc[1] * t1059;
-    const real t1061 = t1051 + t1060;
-    const real t1062 = t48 * t648;
-    const real t1063 = t127 * t642;
-    const real t1064 = t1062 + t1063;
-    const real t1065 = t222 * t638;
-    const real t1066 = t1064 + t1065;
-    const real t1067 = t333 * t636;
-    const real t1068 = t1066 + t1067;
-    const real t1069 = S[17] - t1068;
-    const real t1070 = Rc[2] * t1069;
-    const real t1071 = t1061 + t1070;
-    const real t1072 = Rc[0] * t1071;
-    const real t1073 = Rc[0] * t1059;
-    const real t1074 = t61 * t620;
-    const real t1075 = t140 * t614;
-    const real t1076 = t1074 + t1075;
-    const real t1077 = t235 * t610;
-    const real t1078 = t1076 + t1077;
-    const real t1079 = t346 * t608;
-    const real t1080 = t1078 + t1079;
-    const real t1081 = S[18] - t1080;
-    const real t1082 = Rc[1] * t1081;
-    const real t1083 = t1073 + t1082;
-    const real t1084 = t61 * t648;
-    const real t1085 = t140 * t642;
-    const real t1086 = t1084 + t1085;
-    const real t1087 = t235 * t638;
-    const real t1088 = t1086 + t1087;
-    const real t1089 = t346 * t636;
-    const real t1090 = t1088 + t1089;
-    const real t1091 = S[19] - t1090;
-    const real t1092 = Rc[2] * t1091;
-    const real t1093 = t1083 + t1092;
-    const real t1094 = Rc[1] * t1093;
-    const real t1095 = t1072 + t1094;
-    const real t1096 = Rc[0] * t1069;
-    const real t1097 = Rc[1] * t1091;
-    const real t1098 = t1096 + t1097;
-    const real t1099 = t74 * t648;
-    const real t1100 = t153 * t642;
-    const real t1101 = t1099 + t1100;
-    const real t1102 = t248 * t638;
-    const real t1103 = t1101 + t1102;
-    const real t1104 = t359 * t636;
-    const real t1105 = t1103 + t1104;
-    const real t1106 = S[20] - t1105;
-    const real t1107 = Rc[2] * t1106;
-    const real t1108 = t1098 + t1107;
-    const real t1109 = Rc[2] * t1108;
-    const real t1110 = t1095 + t1109;
-    const real t1111 = r[1] * t1026;
-    const real t1112 = r[2] * t965;
-    const real t1113 = t1111 - t1112;
-    const real t1114 = r[1] * t1022;
-    const real t1115 = r[2] * t961;
-    const real t1116 = t1114 - t1115;
-    const real t1117 = t1113 + t1116;
-    const real t1118 = t1110 + t1117;
-    S_I[15] += t1118;
-    const real t1119 = Rc[3] * t1071;
-    const real t1120 = Rc[4] * t1093;
-    const real t1121 = t1119 + t1120;
-    const real t1122 = Rc[5] * t1108;
-    const real t1123 = t1121 + t1122;
-    const real t1124 = r[1] * t1035;
-    const real t1125 = r[2] * t973;
-    const real t1126 = t1124 - t1125;
-    const real t1127 = r[2] * t894;
-    const real t1128 = r[0] * t1022;
-    const real t1129 = t1127 - t1128;
-    const real t1130 = t1126 + t1129;
-    const real t1131 = t1123 + t1130;
-    S_I[16] += t1131;
-    const real t1132 = Rc[6] * t1071;
-    const real t1133 = Rc[7] * t1093;
-    const real t1134 = t1132 + t1133;
-    const real t1135 = Rc[8] * t1108;
-    const real t1136 = t1134 + t1135;
-    const real t1137 = r[1] * t1042;
-    const real t1138 = r[2] * t982;
-    const real t1139 = t1137 - t1138;
-    const real t1140 = r[0] * t961;
-    const real t1141 = r[1] * t894;
-    const real t1142 = t1140 - t1141;
-    const real t1143 = t1139 + t1142;
-    const real t1144 = t1136 + t1143;
-    S_I[17] += t1144;
-    const real t1145 = Rc[3] * t1050;
-    const real t1146 = Rc[4] * t1059;
-    const real t1147 = t1145 + t1146;
-    const real t1148 = Rc[5] * t1069;
-    const real t1149 = t1147 + t1148;
-    const real t1150 = Rc[3] * t1149;
-    const real t1151 = Rc[3] * t1059;
-    const real t1152 = Rc[4] * t1081;
-    const real t1153 = t1151 + t1152;
-    const real t1154 = Rc[5] * t1091;
-    const real t1155 = t1153 + t1154;
-    const real t1156 = Rc[4] * t1155;
-    const real t1157 = t1150 + t1156;
-    const real t1158 = Rc[3] * t1069;
-    const real t1159 = Rc[4] * t1091;
-    const real t1160 = t1158 + t1159;
-    const real t1161 = Rc[5] * t1106;
-    const real t1162 = t1160 + t1161;
-    const real t1163 = Rc[5] * t1162;
-    const real t1164 = t1157 + t1163;
-    const real t1165 = r[2] * t907;
-    const real t1166 = r[0] * t1035;
-    const real t1167 = t1165 - t1166;
-    const real t1168 = r[2] * t903;
-    const real t1169 = r[0] * t1031;
-    const real t1170 = t1168 - t1169;
-    const real t1171 = t1167 + t1170;
-    const real t1172 = t1164 + t1171;
-    S_I[18] += t1172;
-    const real t1173 = Rc[6] * t1149;
-    const real t1174 = Rc[7] * t1155;
-    const real t1175 = t1173 + t1174;
-    const real t1176 = Rc[8] * t1162;
-    const real t1177 = t1175 + t1176;
-    const real t1178 = r[2] * t916;
-    const real t1179 = r[0] * t1042;
-    const real t1180 = t1178 - t1179;
-    const real t1181 = r[0] * t970;
-    const real t1182 = r[1] * t903;
-    const real t1183 = t1181 - t1182;
-    const real t1184 = t1180 + t1183;
-    const real t1185 = t1177 + t1184;
-    S_I[19] += t1185;
-    const real t1186 = Rc[6] * t1050;
-    const real t1187 = Rc[7] * t1059;
-    const real t1188 = t1186 + t1187;
-    const real t1189 = Rc[8] * t1069;
-    const real t1190 = t1188 + t1189;
-    const real t1191 = Rc[6] * t1190;
-    const real t1192 = Rc[6] * t1059;
-    const real t1193 = Rc[7] * t1081;
-    const real t1194 = t1192 + t1193;
-    const real t1195 = Rc[8] * t1091;
-    const real t1196 = t1194 + t1195;
-    const real t1197 = Rc[7] * t1196;
-    const real t1198 = t1191 + t1197;
-    const real t1199 = Rc[6] * t1069;
-    const real t1200 = Rc[7] * t1091;
-    const real t1201 = t1199 + t1200;
-    const real t1202 = Rc[8] * t1106;
-    const real t1203 = t1201 + t1202;
-    const real t1204 = Rc[8] * t1203;
-    const real t1205 = t1198 + t1204;
-    const real t1206 = r[0] * t982;
-    const real t1207 = r[1] * t916;
-    const real t1208 = t1206 - t1207;
-    const real t1209 = r[0] * t978;
-    const real t1210 = r[1] * t912;
-    const real t1211 = t1209 - t1210;
-    const real t1212 = t1208 + t1211;
-    const real t1213 = t1205 + t1212;
-    S_I[20] += t1213;
-    const real t1214 = t10 * t724;
-    const real t1215 = t89 * t718;
-    const real t1216 = t1214 + t1215;
-    const real t1217 = t184 * t714;
-    const real t1218 = t1216 + t1217;
-    const real t1219 = t295 * t712;
-    const real t1220 = t1218 + t1219;
-    const real t1221 = e[0] + t1220;
-    const real t1222 = Rc[0] * t1221;
-    const real t1223 = t22 * t724;
-    const real t1224 = t101 * t718;
-    const real t1225 = t1223 + t1224;
-    const real t1226 = t196 * t714;
-    const real t1227 = t1225 + t1226;
-    const real t1228 = t307 * t712;
-    const real t1229 = t1227 + t1228;
-    const real t1230 = e[1] + t1229;
-    const real t1231 = Rc[1] * t1230;
-    const real t1232 = t1222 + t1231;
-    const real t1233 = t35 * t724;
-    const real t1234 = t114 * t718;
-    const real t1235 = t1233 + t1234;
-    const real t1236 = t209 * t714;
-    const real t1237 = t1235 + t1236;
-    const real t1238 = t320 * t712;
-    const real t1239 = t1237 + t1238;
-    const real t1240 = e[2] + t1239;
-    const real t1241 = Rc[2] * t1240;
-    const real t1242 = t1232 + t1241;
-    e_I[0] += t1242;
-    const real t1243 = Rc[3] * t1221;
-    const real t1244 = Rc[4] * t1230;
-    const real t1245 = t1243 + t1244;
-    const real t1246 = Rc[5] * t1240;
-    const real t1247 = t1245 + t1246;
-    e_I[1] += t1247;
-    const real t1248 = Rc[6] * t1221;
-    const real t1249 = Rc[7] * t1230;
-    const real t1250 = t1248 + t1249;
-    const real t1251 = Rc[8] * t1240;
-    const real t1252 = t1250 + t1251;
-    e_I[2] += t1252;
-    const real t1253 = t48 * t724;
-    const real t1254 = t127 * t718;
-    const real t1255 = t1253 + t1254;
-    const real t1256 = t222 * t714;
-    const real t1257 = t1255 + t1256;
-    const real t1258 = t333 * t712;
-    const real t1259 = t1257 + t1258;
-    const real t1260 = e[3] + t1259;
-    const real t1261 = Rc[0] * t1260;
-    const real t1262 = t61 * t724;
-    const real t1263 = t140 * t718;
-    const real t1264 = t1262 + t1263;
-    const real t1265 = t235 * t714;
-    const real t1266 = t1264 + t1265;
-    const real t1267 = t346 * t712;
-    const real t1268 = t1266 + t1267;
-    const real t1269 = e[4] + t1268;
-    const real t1270 = Rc[1] * t1269;
-    const real t1271 = t1261 + t1270;
-    const real t1272 = t74 * t724;
-    const real t1273 = t153 * t718;
-    const real t1274 = t1272 + t1273;
-    const real t1275 = t248 * t714;
-    const real t1276 = t1274 + t1275;
-    const real t1277 = t359 * t712;
-    const real t1278 = t1276 + t1277;
-    const real t1279 = e[5] + t1278;
-    const real t1280 = Rc[2] * t1279;
-    const real t1281 = t1271 + t1280;
-    const real t1282 = Rc[6] * r[1];
-    const real t1283 = Rc[3] * r[2];
-    const real t1284 = t1282 - t1283;
-    const real t1285 = t1221 * t1284;
-    const real t1286 = Rc[7] * r[1];
-    const real t1287 = Rc[4] * r[2];
-    const real t1288 = t1286 - t1287;
-    const real t1289 = t1230 * t1288;
-    const real t1290 = t1285 + t1289;
-    const real t1291 = Rc[8] * r[1];
-    const real t1292 = Rc[5] * r[2];
-    const real t1293 = t1291 - t1292;
-    const real t1294 = t1240 * t1293;
-    const real t1295 = t1290 + t1294;
-    const real t1296 = t1281 + t1295;
-    e_I[3] += t1296;
-    const real t1297 = Rc[3] * t1260;
-    const real t1298 = Rc[4] * t1269;
-    const real t1299 = t1297 + t1298;
-    const real t1300 = Rc[5] * t1279;
-    const real t1301 = t1299 + t1300;
-    const real t1302 = Rc[0] * r[2];
-    const real t1303 = Rc[6] * r[0];
-    const real t1304 = t1302 - t1303;
-    const real t1305 = t1221 * t1304;
-    const real t1306 = Rc[1] * r[2];
-    const real t1307 = Rc[7] * r[0];
-    const real t1308 = t1306 - t1307;
-    const real t1309 = t1230 * t1308;
-    const real t1310 = t1305 + t1309;
-    const real t1311 = Rc[2] * r[2];
-    const real t1312 = Rc[8] * r[0];
-    const real t1313 = t1311 - t1312;
-    const real t1314 = t1240 * t1313;
-    const real t1315 = t1310 + t1314;
-    const real t1316 = t1301 + t1315;
-    e_I[4] += t1316;
-    const real t1317 = Rc[6] * t1260;
-    const real t1318 = Rc[7] * t1269;
-    const real t1319 = t1317 + t1318;
-    const real t1320 = Rc[8] * t1279;
-    const real t1321 = t1319 + t1320;
-    const real t1322 = Rc[3] * r[0];
-    const real t1323 = Rc[0] * r[1];
-    const real t1324 = t1322 - t1323;
-    const real t1325 = t1221 * t1324;
-    const real t1326 = Rc[4] * r[0];
-    const real t1327 = Rc[1] * r[1];
-    const real t1328 = t1326 - t1327;
-    const real t1329 = t1230 * t1328;
-    const real t1330 = t1325 + t1329;
-    const real t1331 = Rc[5] * r[0];
-    const real t1332 = Rc[2] * r[1];
-    const real t1333 = t1331 - t1332;
-    const real t1334 = t1240 * t1333;
-    const real t1335 = t1330 + t1334;
-    const real t1336 = t1321 + t1335;
-    e_I[5] += t1336;
-    return 0;
+  real t10 = H[0] * S[0] + H[4] * S[1] + H[8] * S[2] + H[12] * S[3] + H[16] * S[4] + H[20] * S[5];
+  real t22 = H[0] * S[1] + H[4] * S[6] + H[8] * S[7] + H[12] * S[8] + H[16] * S[9] + H[20] * S[10];
+  real t35 = H[0] * S[2] + H[4] * S[7] + H[8] * S[11] + H[12] * S[12] + H[16] * S[13] + H[20] *
+    S[14];
+  real t48 = H[0] * S[3] + H[4] * S[8] + H[8] * S[12] + H[12] * S[15] + H[16] * S[16] + H[20] *
+    S[17];
+  real t61 = H[0] * S[4] + H[4] * S[9] + H[8] * S[13] + H[12] * S[16] + H[16] * S[18] + H[20] *
+    S[19];
+  real t74 = H[0] * S[5] + H[4] * S[10] + H[8] * S[14] + H[12] * S[17] + H[16] * S[19] + H[20] *
+    S[20];
+  real t77 = J[0] + (H[0] * t10 + H[4] * t22 + H[8] * t35 + H[12] * t48 + H[16] * t61 + H[20] *
+    t74);
+  real t78 = 0.0 < t77;
+  if (!(t78 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+  real t89 = H[1] * S[0] + H[5] * S[1] + H[9] * S[2] + H[13] * S[3] + H[17] * S[4] + H[21] * S[5];
+  real t101 = H[1] * S[1] + H[5] * S[6] + H[9] * S[7] + H[13] * S[8] + H[17] * S[9] + H[21] * S[10];
+  real t114 = H[1] * S[2] + H[5] * S[7] + H[9] * S[11] + H[13] * S[12] + H[17] * S[13] + H[21] *
+    S[14];
+  real t127 = H[1] * S[3] + H[5] * S[8] + H[9] * S[12] + H[13] * S[15] + H[17] * S[16] + H[21] *
+    S[17];
+  real t140 = H[1] * S[4] + H[5] * S[9] + H[9] * S[13] + H[13] * S[16] + H[17] * S[18] + H[21] *
+    S[19];
+  real t153 = H[1] * S[5] + H[5] * S[10] + H[9] * S[14] + H[13] * S[17] + H[17] * S[19] + H[21] *
+    S[20];
+  real t156 = J[1] + (H[1] * t89 + H[5] * t101 + H[9] * t114 + H[13] * t127 + H[17] * t140 + H[21] *
+    t153);
+  real t168 = H[0] * t89 + H[4] * t101 + H[8] * t114 + H[12] * t127 + H[16] * t140 + H[20] * t153;
+  real t169 = 1.0 / t77;
+  real t170 = t168 * t169;
+  real t172 = t156 - t168 * t170;
+  real t173 = t156 * ((real)1 / (real)10000000000000) < t172;
+  if (!(t173 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+  real t184 = H[2] * S[0] + H[6] * S[1] + H[10] * S[2] + H[14] * S[3] + H[18] * S[4] + H[22] * S[5];
+  real t196 = H[2] * S[1] + H[6] * S[6] + H[10] * S[7] + H[14] * S[8] + H[18] * S[9] + H[22] *
+    S[10];
+  real t209 = H[2] * S[2] + H[6] * S[7] + H[10] * S[11] + H[14] * S[12] + H[18] * S[13] + H[22] *
+    S[14];
+  real t222 = H[2] * S[3] + H[6] * S[8] + H[10] * S[12] + H[14] * S[15] + H[18] * S[16] + H[22] *
+    S[17];
+  real t235 = H[2] * S[4] + H[6] * S[9] + H[10] * S[13] + H[14] * S[16] + H[18] * S[18] + H[22] *
+    S[19];
+  real t248 = H[2] * S[5] + H[6] * S[10] + H[10] * S[14] + H[14] * S[17] + H[18] * S[19] + H[22] *
+    S[20];
+  real t251 = J[2] + (H[2] * t184 + H[6] * t196 + H[10] * t209 + H[14] * t222 + H[18] * t235 + H[22]
+    * t248);
+  real t263 = H[0] * t184 + H[4] * t196 + H[8] * t209 + H[12] * t222 + H[16] * t235 + H[20] * t248;
+  real t264 = t263 * t169;
+  real t279 = H[1] * t184 + H[5] * t196 + H[9] * t209 + H[13] * t222 + H[17] * t235 + H[21] * t248 -
+    t263 * t170;
+  real t280 = 1.0 / t172;
+  real t281 = t280 * t279;
+  real t283 = t251 - t263 * t264 - t279 * t281;
+  real t284 = t251 * ((real)1 / (real)10000000000000) < t283;
+  if (!(t284 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+  real t295 = H[3] * S[0] + H[7] * S[1] + H[11] * S[2] + H[15] * S[3] + H[19] * S[4] + H[23] * S[5];
+  real t307 = H[3] * S[1] + H[7] * S[6] + H[11] * S[7] + H[15] * S[8] + H[19] * S[9] + H[23] *
+    S[10];
+  real t320 = H[3] * S[2] + H[7] * S[7] + H[11] * S[11] + H[15] * S[12] + H[19] * S[13] + H[23] *
+    S[14];
+  real t333 = H[3] * S[3] + H[7] * S[8] + H[11] * S[12] + H[15] * S[15] + H[19] * S[16] + H[23] *
+    S[17];
+  real t346 = H[3] * S[4] + H[7] * S[9] + H[11] * S[13] + H[15] * S[16] + H[19] * S[18] + H[23] *
+    S[19];
+  real t359 = H[3] * S[5] + H[7] * S[10] + H[11] * S[14] + H[15] * S[17] + H[19] * S[19] + H[23] *
+    S[20];
+  real t362 = J[3] + (H[3] * t295 + H[7] * t307 + H[11] * t320 + H[15] * t333 + H[19] * t346 + H[23]
+    * t359);
+  real t374 = H[0] * t295 + H[4] * t307 + H[8] * t320 + H[12] * t333 + H[16] * t346 + H[20] * t359;
+  real t375 = t374 * t169;
+  real t390 = H[1] * t295 + H[5] * t307 + H[9] * t320 + H[13] * t333 + H[17] * t346 + H[21] * t359 -
+    t374 * t170;
+  real t391 = t280 * t390;
+  real t408 = H[2] * t295 + H[6] * t307 + H[10] * t320 + H[14] * t333 + H[18] * t346 + H[22] * t359
+    - t374 * t264 - t281 * t390;
+  real t409 = 1.0 / t283;
+  real t410 = t409 * t408;
+  real t412 = t362 - t374 * t375 - t390 * t391 - t408 * t410;
+  real t413 = t362 * ((real)1 / (real)10000000000000) < t412;
+  if (!(t413 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+  if (!(t78 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+  if (!(t173 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+  if (!(t284 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+  if (!(t413 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+  real t422 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t423 = (0.0 < floor_[0]) ? floor_[0] : t422;
+  real t433 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t434 = (0.0 < floor_[1]) ? floor_[1] : t433;
+  if (!(((H[8] * H[8] + (H[0] * H[0] + H[4] * H[4])) * t423 + (H[20] * H[20] + (H[12] * H[12] + H[16] * H[16])) * t434 < t77))) return 1; /* speed 1 of 4 moves no inertia: its acceleration is undetermined */
+  if (!((t423 * (H[9] * H[9] + (H[1] * H[1] + H[5] * H[5])) + t434 * (H[21] * H[21] + (H[13] * H[13] + H[17] * H[17])) < t156))) return 1; /* speed 2 of 4 moves no inertia: its acceleration is undetermined */
+  if (!((t423 * (H[10] * H[10] + (H[2] * H[2] + H[6] * H[6])) + t434 * (H[22] * H[22] + (H[14] * H[14] + H[18] * H[18])) < t251))) return 1; /* speed 3 of 4 moves no inertia: its acceleration is undetermined */
+  if (!((t423 * (H[11] * H[11] + (H[3] * H[3] + H[7] * H[7])) + t434 * (H[23] * H[23] + (H[15] * H[15] + H[19] * H[19])) < t362))) return 1; /* speed 4 of 4 moves no inertia: its acceleration is undetermined */
+  real t482 = t89 - t10 * t170;
+  real t487 = t184 - t10 * t264 - t281 * t482;
+  real t489 = 1.0 / t412;
+  real t496 = t489 * (t295 - t10 * t375 - t391 * t482 - t410 * t487);
+  real t498 = t409 * t487 - t410 * t496;
+  real t502 = t280 * t482 - t281 * t498 - t391 * t496;
+  real t508 = t10 * t169 - t170 * t502 - t264 * t498 - t375 * t496;
+  G[0] = t508;
+  real t511 = t101 - t22 * t170;
+  real t516 = t196 - t22 * t264 - t281 * t511;
+  real t524 = t489 * (t307 - t22 * t375 - t391 * t511 - t410 * t516);
+  real t526 = t409 * t516 - t410 * t524;
+  real t530 = t280 * t511 - t281 * t526 - t391 * t524;
+  real t536 = t22 * t169 - t170 * t530 - t264 * t526 - t375 * t524;
+  G[1] = t536;
+  real t539 = t114 - t35 * t170;
+  real t544 = t209 - t35 * t264 - t281 * t539;
+  real t552 = t489 * (t320 - t35 * t375 - t391 * t539 - t410 * t544);
+  real t554 = t409 * t544 - t410 * t552;
+  real t558 = t280 * t539 - t281 * t554 - t391 * t552;
+  real t564 = t35 * t169 - t170 * t558 - t264 * t554 - t375 * t552;
+  G[2] = t564;
+  real t567 = t127 - t48 * t170;
+  real t572 = t222 - t48 * t264 - t281 * t567;
+  real t580 = t489 * (t333 - t48 * t375 - t391 * t567 - t410 * t572);
+  real t582 = t409 * t572 - t410 * t580;
+  real t586 = t280 * t567 - t281 * t582 - t391 * t580;
+  real t592 = t48 * t169 - t170 * t586 - t264 * t582 - t375 * t580;
+  G[3] = t592;
+  real t595 = t140 - t61 * t170;
+  real t600 = t235 - t61 * t264 - t281 * t595;
+  real t608 = t489 * (t346 - t61 * t375 - t391 * t595 - t410 * t600);
+  real t610 = t409 * t600 - t410 * t608;
+  real t614 = t280 * t595 - t281 * t610 - t391 * t608;
+  real t620 = t61 * t169 - t170 * t614 - t264 * t610 - t375 * t608;
+  G[4] = t620;
+  real t623 = t153 - t74 * t170;
+  real t628 = t248 - t74 * t264 - t281 * t623;
+  real t636 = t489 * (t359 - t74 * t375 - t391 * t623 - t410 * t628);
+  real t638 = t409 * t628 - t410 * t636;
+  real t642 = t280 * t623 - t281 * t638 - t391 * t636;
+  real t648 = t74 * t169 - t170 * t642 - t264 * t638 - t375 * t636;
+  G[5] = t648;
+  G[6] = t502;
+  G[7] = t530;
+  G[8] = t558;
+  G[9] = t586;
+  G[10] = t614;
+  G[11] = t642;
+  G[12] = t498;
+  G[13] = t526;
+  G[14] = t554;
+  G[15] = t582;
+  G[16] = t610;
+  G[17] = t638;
+  G[18] = t496;
+  G[19] = t524;
+  G[20] = t552;
+  G[21] = t580;
+  G[22] = t608;
+  G[23] = t636;
+  real t660 = tau[0] - (H[0] * e[0] + H[4] * e[1] + H[8] * e[2] + H[12] * e[3] + H[16] * e[4] +
+    H[20] * e[5]);
+  real t675 = tau[1] - (H[1] * e[0] + H[5] * e[1] + H[9] * e[2] + H[13] * e[3] + H[17] * e[4] +
+    H[21] * e[5]) - t170 * t660;
+  real t692 = tau[2] - (H[2] * e[0] + H[6] * e[1] + H[10] * e[2] + H[14] * e[3] + H[18] * e[4] +
+    H[22] * e[5]) - t264 * t660 - t281 * t675;
+  real t712 = t489 * (tau[3] - (H[3] * e[0] + H[7] * e[1] + H[11] * e[2] + H[15] * e[3] + H[19] *
+    e[4] + H[23] * e[5]) - t375 * t660 - t391 * t675 - t410 * t692);
+  real t714 = t409 * t692 - t410 * t712;
+  real t718 = t280 * t675 - t281 * t714 - t391 * t712;
+  real t724 = t169 * t660 - t170 * t718 - t264 * t714 - t375 * t712;
+  g[0] = t724;
+  g[1] = t718;
+  g[2] = t714;
+  g[3] = t712;
+  real t732 = S[0] - (t10 * t508 + t89 * t502 + t184 * t498 + t295 * t496);
+  real t741 = S[1] - (t10 * t536 + t89 * t530 + t184 * t526 + t295 * t524);
+  real t751 = S[2] - (t10 * t564 + t89 * t558 + t184 * t554 + t295 * t552);
+  real t753 = Rc[0] * t732 + Rc[1] * t741 + Rc[2] * t751;
+  real t763 = S[6] - (t22 * t536 + t101 * t530 + t196 * t526 + t307 * t524);
+  real t773 = S[7] - (t22 * t564 + t101 * t558 + t196 * t554 + t307 * t552);
+  real t775 = Rc[0] * t741 + Rc[1] * t763 + Rc[2] * t773;
+  real t788 = S[11] - (t35 * t564 + t114 * t558 + t209 * t554 + t320 * t552);
+  real t790 = Rc[0] * t751 + Rc[1] * t773 + Rc[2] * t788;
+  real t792 = Rc[0] * t753 + Rc[1] * t775 + Rc[2] * t790;
+  S_I[0] += t792;
+  real t797 = Rc[3] * t753 + Rc[4] * t775 + Rc[5] * t790;
+  S_I[1] += t797;
+  real t802 = Rc[6] * t753 + Rc[7] * t775 + Rc[8] * t790;
+  S_I[2] += t802;
+  real t810 = S[3] - (t10 * t592 + t89 * t586 + t184 * t582 + t295 * t580);
+  real t819 = S[8] - (t22 * t592 + t101 * t586 + t196 * t582 + t307 * t580);
+  real t829 = S[12] - (t35 * t592 + t114 * t586 + t209 * t582 + t320 * t580);
+  real t831 = Rc[0] * t810 + Rc[1] * t819 + Rc[2] * t829;
+  real t840 = S[4] - (t10 * t620 + t89 * t614 + t184 * t610 + t295 * t608);
+  real t849 = S[9] - (t22 * t620 + t101 * t614 + t196 * t610 + t307 * t608);
+  real t859 = S[13] - (t35 * t620 + t114 * t614 + t209 * t610 + t320 * t608);
+  real t861 = Rc[0] * t840 + Rc[1] * t849 + Rc[2] * t859;
+  real t871 = S[5] - (t10 * t648 + t89 * t642 + t184 * t638 + t295 * t636);
+  real t880 = S[10] - (t22 * t648 + t101 * t642 + t196 * t638 + t307 * t636);
+  real t890 = S[14] - (t35 * t648 + t114 * t642 + t209 * t638 + t320 * t636);
+  real t892 = Rc[0] * t871 + Rc[1] * t880 + Rc[2] * t890;
+  real t894 = Rc[0] * t831 + Rc[1] * t861 + Rc[2] * t892;
+  real t895 = r[1] * t802;
+  real t896 = r[2] * t797;
+  S_I[3] += t894 + (t895 - t896);
+  real t903 = Rc[3] * t831 + Rc[4] * t861 + Rc[5] * t892;
+  real t907 = t903 + (r[2] * t792 - r[0] * t802);
+  S_I[4] += t907;
+  real t912 = Rc[6] * t831 + Rc[7] * t861 + Rc[8] * t892;
+  real t916 = t912 + (r[0] * t797 - r[1] * t792);
+  S_I[5] += t916;
+  real t921 = Rc[3] * t732 + Rc[4] * t741 + Rc[5] * t751;
+  real t927 = Rc[3] * t741 + Rc[4] * t763 + Rc[5] * t773;
+  real t934 = Rc[3] * t751 + Rc[4] * t773 + Rc[5] * t788;
+  real t936 = Rc[3] * t921 + Rc[4] * t927 + Rc[5] * t934;
+  S_I[6] += t936;
+  real t941 = Rc[6] * t921 + Rc[7] * t927 + Rc[8] * t934;
+  S_I[7] += t941;
+  real t946 = Rc[3] * t810 + Rc[4] * t819 + Rc[5] * t829;
+  real t952 = Rc[3] * t840 + Rc[4] * t849 + Rc[5] * t859;
+  real t959 = Rc[3] * t871 + Rc[4] * t880 + Rc[5] * t890;
+  real t961 = Rc[0] * t946 + Rc[1] * t952 + Rc[2] * t959;
+  real t965 = t961 + (r[1] * t941 - r[2] * t936);
+  S_I[8] += t965;
+  real t970 = Rc[3] * t946 + Rc[4] * t952 + Rc[5] * t959;
+  real t971 = r[0] * t941;
+  real t973 = t970 + (t896 - t971);
+  S_I[9] += t973;
+  real t978 = Rc[6] * t946 + Rc[7] * t952 + Rc[8] * t959;
+  real t982 = t978 + (r[0] * t936 - r[1] * t797);
+  S_I[10] += t982;
+  real t1002 = Rc[6] * (Rc[6] * t732 + Rc[7] * t741 + Rc[8] * t751) + Rc[7] * (Rc[6] * t741 + Rc[7]
+    * t763 + Rc[8] * t773) + Rc[8] * (Rc[6] * t751 + Rc[7] * t773 + Rc[8] * t788);
+  S_I[11] += t1002;
+  real t1007 = Rc[6] * t810 + Rc[7] * t819 + Rc[8] * t829;
+  real t1013 = Rc[6] * t840 + Rc[7] * t849 + Rc[8] * t859;
+  real t1020 = Rc[6] * t871 + Rc[7] * t880 + Rc[8] * t890;
+  real t1022 = Rc[0] * t1007 + Rc[1] * t1013 + Rc[2] * t1020;
+  real t1026 = t1022 + (r[1] * t1002 - r[2] * t941);
+  S_I[12] += t1026;
+  real t1031 = Rc[3] * t1007 + Rc[4] * t1013 + Rc[5] * t1020;
+  real t1035 = t1031 + (r[2] * t802 - r[0] * t1002);
+  S_I[13] += t1035;
+  real t1042 = Rc[6] * t1007 + Rc[7] * t1013 + Rc[8] * t1020 + (t971 - t895);
+  S_I[14] += t1042;
+  real t1050 = S[15] - (t48 * t592 + t127 * t586 + t222 * t582 + t333 * t580);
+  real t1059 = S[16] - (t48 * t620 + t127 * t614 + t222 * t610 + t333 * t608);
+  real t1069 = S[17] - (t48 * t648 + t127 * t642 + t222 * t638 + t333 * t636);
+  real t1071 = Rc[0] * t1050 + Rc[1] * t1059 + Rc[2] * t1069;
+  real t1081 = S[18] - (t61 * t620 + t140 * t614 + t235 * t610 + t346 * t608);
+  real t1091 = S[19] - (t61 * t648 + t140 * t642 + t235 * t638 + t346 * t636);
+  real t1093 = Rc[0] * t1059 + Rc[1] * t1081 + Rc[2] * t1091;
+  real t1106 = S[20] - (t74 * t648 + t153 * t642 + t248 * t638 + t359 * t636);
+  real t1108 = Rc[0] * t1069 + Rc[1] * t1091 + Rc[2] * t1106;
+  S_I[15] += Rc[0] * t1071 + Rc[1] * t1093 + Rc[2] * t1108 + (r[1] * t1026 - r[2] * t965 + (r[1] *
+    t1022 - r[2] * t961));
+  S_I[16] += Rc[3] * t1071 + Rc[4] * t1093 + Rc[5] * t1108 + (r[1] * t1035 - r[2] * t973 + (r[2] *
+    t894 - r[0] * t1022));
+  S_I[17] += Rc[6] * t1071 + Rc[7] * t1093 + Rc[8] * t1108 + (r[1] * t1042 - r[2] * t982 + (r[0] *
+    t961 - r[1] * t894));
+  real t1149 = Rc[3] * t1050 + Rc[4] * t1059 + Rc[5] * t1069;
+  real t1155 = Rc[3] * t1059 + Rc[4] * t1081 + Rc[5] * t1091;
+  real t1162 = Rc[3] * t1069 + Rc[4] * t1091 + Rc[5] * t1106;
+  S_I[18] += Rc[3] * t1149 + Rc[4] * t1155 + Rc[5] * t1162 + (r[2] * t907 - r[0] * t1035 + (r[2] *
+    t903 - r[0] * t1031));
+  S_I[19] += Rc[6] * t1149 + Rc[7] * t1155 + Rc[8] * t1162 + (r[2] * t916 - r[0] * t1042 + (r[0] *
+    t970 - r[1] * t903));
+  S_I[20] += Rc[6] * (Rc[6] * t1050 + Rc[7] * t1059 + Rc[8] * t1069) + Rc[7] * (Rc[6] * t1059 +
+    Rc[7] * t1081 + Rc[8] * t1091) + Rc[8] * (Rc[6] * t1069 + Rc[7] * t1091 + Rc[8] * t1106) + (r[0]
+    * t982 - r[1] * t916 + (r[0] * t978 - r[1] * t912));
+  real t1221 = e[0] + (t10 * t724 + t89 * t718 + t184 * t714 + t295 * t712);
+  real t1230 = e[1] + (t22 * t724 + t101 * t718 + t196 * t714 + t307 * t712);
+  real t1240 = e[2] + (t35 * t724 + t114 * t718 + t209 * t714 + t320 * t712);
+  e_I[0] += Rc[0] * t1221 + Rc[1] * t1230 + Rc[2] * t1240;
+  e_I[1] += Rc[3] * t1221 + Rc[4] * t1230 + Rc[5] * t1240;
+  e_I[2] += Rc[6] * t1221 + Rc[7] * t1230 + Rc[8] * t1240;
+  real t1260 = e[3] + (t48 * t724 + t127 * t718 + t222 * t714 + t333 * t712);
+  real t1269 = e[4] + (t61 * t724 + t140 * t718 + t235 * t714 + t346 * t712);
+  real t1279 = e[5] + (t74 * t724 + t153 * t718 + t248 * t714 + t359 * t712);
+  e_I[3] += Rc[0] * t1260 + Rc[1] * t1269 + Rc[2] * t1279 + (t1221 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t1230 * (Rc[7] * r[1] - Rc[4] * r[2]) + t1240 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t1260 + Rc[4] * t1269 + Rc[5] * t1279 + (t1221 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t1230 * (Rc[1] * r[2] - Rc[7] * r[0]) + t1240 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t1260 + Rc[7] * t1269 + Rc[8] * t1279 + (t1221 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t1230 * (Rc[4] * r[0] - Rc[1] * r[1]) + t1240 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"J", 4, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 4, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_condense_outputs[] = {
-    {"G", 24, "", 0, 0},
-    {"g", 4, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic4_condense_guards[] = {
-    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 4 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic4_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 4 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the free coordinates
@@ -1904,253 +416,54 @@ static const mstmm_guard mstmm_sweep_generic4_condense_guards[] = {
  * out udot[4] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic4_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic4_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    const real t78 = G[18] * t16;
-    const real t79 = G[19] * t22;
-    const real t80 = t78 + t79;
-    const real t81 = G[20] * t29;
-    const real t82 = t80 + t81;
-    const real t83 = G[21] * t36;
-    const real t84 = t82 + t83;
-    const real t85 = G[22] * t43;
-    const real t86 = t84 + t85;
-    const real t87 = G[23] * t50;
-    const real t88 = t86 + t87;
-    const real t89 = g[3] - t88;
-    udot[3] = t89;
-    const real t90 = H[0] * t53;
-    const real t91 = H[1] * t65;
-    const real t92 = t90 + t91;
-    const real t93 = H[2] * t77;
-    const real t94 = t92 + t93;
-    const real t95 = H[3] * t89;
-    const real t96 = t94 + t95;
-    const real t97 = t16 + t96;
-    delta[0] = t97;
-    const real t98 = H[4] * t53;
-    const real t99 = H[5] * t65;
-    const real t100 = t98 + t99;
-    const real t101 = H[6] * t77;
-    const real t102 = t100 + t101;
-    const real t103 = H[7] * t89;
-    const real t104 = t102 + t103;
-    const real t105 = t22 + t104;
-    delta[1] = t105;
-    const real t106 = H[8] * t53;
-    const real t107 = H[9] * t65;
-    const real t108 = t106 + t107;
-    const real t109 = H[10] * t77;
-    const real t110 = t108 + t109;
-    const real t111 = H[11] * t89;
-    const real t112 = t110 + t111;
-    const real t113 = t29 + t112;
-    delta[2] = t113;
-    const real t114 = H[12] * t53;
-    const real t115 = H[13] * t65;
-    const real t116 = t114 + t115;
-    const real t117 = H[14] * t77;
-    const real t118 = t116 + t117;
-    const real t119 = H[15] * t89;
-    const real t120 = t118 + t119;
-    const real t121 = t36 + t120;
-    delta[3] = t121;
-    const real t122 = H[16] * t53;
-    const real t123 = H[17] * t65;
-    const real t124 = t122 + t123;
-    const real t125 = H[18] * t77;
-    const real t126 = t124 + t125;
-    const real t127 = H[19] * t89;
-    const real t128 = t126 + t127;
-    const real t129 = t43 + t128;
-    delta[4] = t129;
-    const real t130 = H[20] * t53;
-    const real t131 = H[21] * t65;
-    const real t132 = t130 + t131;
-    const real t133 = H[22] * t77;
-    const real t134 = t132 + t133;
-    const real t135 = H[23] * t89;
-    const real t136 = t134 + t135;
-    const real t137 = t50 + t136;
-    delta[5] = t137;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  real t89 = g[3] - (G[18] * t16 + G[19] * t22 + G[20] * t29 + G[21] * t36 + G[22] * t43 + G[23] *
+    t50);
+  udot[3] = t89;
+  delta[0] = t16 + (H[0] * t53 + H[1] * t65 + H[2] * t77 + H[3] * t89);
+  delta[1] = t22 + (H[4] * t53 + H[5] * t65 + H[6] * t77 + H[7] * t89);
+  delta[2] = t29 + (H[8] * t53 + H[9] * t65 + H[10] * t77 + H[11] * t89);
+  delta[3] = t36 + (H[12] * t53 + H[13] * t65 + H[14] * t77 + H[15] * t89);
+  delta[4] = t43 + (H[16] * t53 + H[17] * t65 + H[18] * t77 + H[19] * t89);
+  delta[5] = t50 + (H[20] * t53 + H[21] * t65 + H[22] * t77 + H[23] * t89);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"G", 24, "", 0, 0},
-    {"g", 4, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_recover_outputs[] = {
-    {"udot", 4, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 4 speeds
  * in  H[6][4] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[4] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic4_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic4_effort(in_t H, in_t f, out_t tau)
 {
-    const real t0 = H[0] * f[0];
-    const real t1 = H[4] * f[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * f[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * f[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * f[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * f[5];
-    const real t10 = t8 + t9;
-    tau[0] = t10;
-    const real t11 = H[1] * f[0];
-    const real t12 = H[5] * f[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[9] * f[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[13] * f[3];
-    const real t17 = t15 + t16;
-    const real t18 = H[17] * f[4];
-    const real t19 = t17 + t18;
-    const real t20 = H[21] * f[5];
-    const real t21 = t19 + t20;
-    tau[1] = t21;
-    const real t22 = H[2] * f[0];
-    const real t23 = H[6] * f[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[10] * f[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[14] * f[3];
-    const real t28 = t26 + t27;
-    const real t29 = H[18] * f[4];
-    const real t30 = t28 + t29;
-    const real t31 = H[22] * f[5];
-    const real t32 = t30 + t31;
-    tau[2] = t32;
-    const real t33 = H[3] * f[0];
-    const real t34 = H[7] * f[1];
-    const real t35 = t33 + t34;
-    const real t36 = H[11] * f[2];
-    const real t37 = t35 + t36;
-    const real t38 = H[15] * f[3];
-    const real t39 = t37 + t38;
-    const real t40 = H[19] * f[4];
-    const real t41 = t39 + t40;
-    const real t42 = H[23] * f[5];
-    const real t43 = t41 + t42;
-    tau[3] = t43;
-    return 0;
+  tau[0] = H[0] * f[0] + H[4] * f[1] + H[8] * f[2] + H[12] * f[3] + H[16] * f[4] + H[20] * f[5];
+  tau[1] = H[1] * f[0] + H[5] * f[1] + H[9] * f[2] + H[13] * f[3] + H[17] * f[4] + H[21] * f[5];
+  tau[2] = H[2] * f[0] + H[6] * f[1] + H[10] * f[2] + H[14] * f[3] + H[18] * f[4] + H[22] * f[5];
+  tau[3] = H[3] * f[0] + H[7] * f[1] + H[11] * f[2] + H[15] * f[3] + H[19] * f[4] + H[23] * f[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_effort_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_effort_outputs[] = {
-    {"tau", 4, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 4 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2160,316 +473,72 @@ static const mstmm_port mstmm_sweep_generic4_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[4] accelerations of the coordinates
  */
-int mstmm_sweep_generic4_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic4_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    const real t0 = H[0] * H[0];
-    const real t1 = H[4] * H[4];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * H[8];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * H[12];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * H[16];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * H[20];
-    const real t10 = t8 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[5] * H[5];
-    const real t14 = t12 + t13;
-    const real t15 = H[9] * H[9];
-    const real t16 = t14 + t15;
-    const real t17 = H[13] * H[13];
-    const real t18 = t16 + t17;
-    const real t19 = H[17] * H[17];
-    const real t20 = t18 + t19;
-    const real t21 = H[21] * H[21];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[0] * H[1];
-    const real t25 = H[4] * H[5];
-    const real t26 = t24 + t25;
-    const real t27 = H[8] * H[9];
-    const real t28 = t26 + t27;
-    const real t29 = H[12] * H[13];
-    const real t30 = t28 + t29;
-    const real t31 = H[16] * H[17];
-    const real t32 = t30 + t31;
-    const real t33 = H[20] * H[21];
-    const real t34 = t32 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[6] * H[6];
-    const real t42 = t40 + t41;
-    const real t43 = H[10] * H[10];
-    const real t44 = t42 + t43;
-    const real t45 = H[14] * H[14];
-    const real t46 = t44 + t45;
-    const real t47 = H[18] * H[18];
-    const real t48 = t46 + t47;
-    const real t49 = H[22] * H[22];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[0] * H[2];
-    const real t53 = H[4] * H[6];
-    const real t54 = t52 + t53;
-    const real t55 = H[8] * H[10];
-    const real t56 = t54 + t55;
-    const real t57 = H[12] * H[14];
-    const real t58 = t56 + t57;
-    const real t59 = H[16] * H[18];
-    const real t60 = t58 + t59;
-    const real t61 = H[20] * H[22];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[5] * H[6];
-    const real t68 = t66 + t67;
-    const real t69 = H[9] * H[10];
-    const real t70 = t68 + t69;
-    const real t71 = H[13] * H[14];
-    const real t72 = t70 + t71;
-    const real t73 = H[17] * H[18];
-    const real t74 = t72 + t73;
-    const real t75 = H[21] * H[22];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[3] * H[3];
-    const real t85 = H[7] * H[7];
-    const real t86 = t84 + t85;
-    const real t87 = H[11] * H[11];
-    const real t88 = t86 + t87;
-    const real t89 = H[15] * H[15];
-    const real t90 = t88 + t89;
-    const real t91 = H[19] * H[19];
-    const real t92 = t90 + t91;
-    const real t93 = H[23] * H[23];
-    const real t94 = t92 + t93;
-    const real t95 = t94 * ((real)1 / (real)10000000000000);
-    const real t96 = H[0] * H[3];
-    const real t97 = H[4] * H[7];
-    const real t98 = t96 + t97;
-    const real t99 = H[8] * H[11];
-    const real t100 = t98 + t99;
-    const real t101 = H[12] * H[15];
-    const real t102 = t100 + t101;
-    const real t103 = H[16] * H[19];
-    const real t104 = t102 + t103;
-    const real t105 = H[20] * H[23];
-    const real t106 = t104 + t105;
-    const real t107 = t106 * t35;
-    const real t108 = t106 * t107;
-    const real t109 = t94 - t108;
-    const real t110 = H[1] * H[3];
-    const real t111 = H[5] * H[7];
-    const real t112 = t110 + t111;
-    const real t113 = H[9] * H[11];
-    const real t114 = t112 + t113;
-    const real t115 = H[13] * H[15];
-    const real t116 = t114 + t115;
-    const real t117 = H[17] * H[19];
-    const real t118 = t116 + t117;
-    const real t119 = H[21] * H[23];
-    const real t120 = t118 + t119;
-    const real t121 = t106 * t36;
-    const real t122 = t120 - t121;
-    const real t123 = t79 * t122;
-    const real t124 = t122 * t123;
-    const real t125 = t109 - t124;
-    const real t126 = H[2] * H[3];
-    const real t127 = H[6] * H[7];
-    const real t128 = t126 + t127;
-    const real t129 = H[10] * H[11];
-    const real t130 = t128 + t129;
-    const real t131 = H[14] * H[15];
-    const real t132 = t130 + t131;
-    const real t133 = H[18] * H[19];
-    const real t134 = t132 + t133;
-    const real t135 = H[22] * H[23];
-    const real t136 = t134 + t135;
-    const real t137 = t106 * t63;
-    const real t138 = t136 - t137;
-    const real t139 = t80 * t122;
-    const real t140 = t138 - t139;
-    const real t141 = 1.0 / t82;
-    const real t142 = t141 * t140;
-    const real t143 = t140 * t142;
-    const real t144 = t125 - t143;
-    const real t145 = t95 < t144;
-    if (!(t145 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t146 = r[2] * delta_I[4];
-    const real t147 = r[1] * delta_I[5];
-    const real t148 = t146 - t147;
-    const real t149 = delta_I[0] + t148;
-    const real t150 = Rc[0] * t149;
-    const real t151 = r[0] * delta_I[5];
-    const real t152 = r[2] * delta_I[3];
-    const real t153 = t151 - t152;
-    const real t154 = delta_I[1] + t153;
-    const real t155 = Rc[3] * t154;
-    const real t156 = t150 + t155;
-    const real t157 = r[1] * delta_I[3];
-    const real t158 = r[0] * delta_I[4];
-    const real t159 = t157 - t158;
-    const real t160 = delta_I[2] + t159;
-    const real t161 = Rc[6] * t160;
-    const real t162 = t156 + t161;
-    const real t163 = delta[0] - t162;
-    const real t164 = H[0] * t163;
-    const real t165 = Rc[1] * t149;
-    const real t166 = Rc[4] * t154;
-    const real t167 = t165 + t166;
-    const real t168 = Rc[7] * t160;
-    const real t169 = t167 + t168;
-    const real t170 = delta[1] - t169;
-    const real t171 = H[4] * t170;
-    const real t172 = t164 + t171;
-    const real t173 = Rc[2] * t149;
-    const real t174 = Rc[5] * t154;
-    const real t175 = t173 + t174;
-    const real t176 = Rc[8] * t160;
-    const real t177 = t175 + t176;
-    const real t178 = delta[2] - t177;
-    const real t179 = H[8] * t178;
-    const real t180 = t172 + t179;
-    const real t181 = Rc[0] * delta_I[3];
-    const real t182 = Rc[3] * delta_I[4];
-    const real t183 = t181 + t182;
-    const real t184 = Rc[6] * delta_I[5];
-    const real t185 = t183 + t184;
-    const real t186 = delta[3] - t185;
-    const real t187 = H[12] * t186;
-    const real t188 = t180 + t187;
-    const real t189 = Rc[1] * delta_I[3];
-    const real t190 = Rc[4] * delta_I[4];
-    const real t191 = t189 + t190;
-    const real t192 = Rc[7] * delta_I[5];
-    const real t193 = t191 + t192;
-    const real t194 = delta[4] - t193;
-    const real t195 = H[16] * t194;
-    const real t196 = t188 + t195;
-    const real t197 = Rc[2] * delta_I[3];
-    const real t198 = Rc[5] * delta_I[4];
-    const real t199 = t197 + t198;
-    const real t200 = Rc[8] * delta_I[5];
-    const real t201 = t199 + t200;
-    const real t202 = delta[5] - t201;
-    const real t203 = H[20] * t202;
-    const real t204 = t196 + t203;
-    const real t205 = t204 * t35;
-    const real t206 = H[1] * t163;
-    const real t207 = H[5] * t170;
-    const real t208 = t206 + t207;
-    const real t209 = H[9] * t178;
-    const real t210 = t208 + t209;
-    const real t211 = H[13] * t186;
-    const real t212 = t210 + t211;
-    const real t213 = H[17] * t194;
-    const real t214 = t212 + t213;
-    const real t215 = H[21] * t202;
-    const real t216 = t214 + t215;
-    const real t217 = t204 * t36;
-    const real t218 = t216 - t217;
-    const real t219 = t79 * t218;
-    const real t220 = H[2] * t163;
-    const real t221 = H[6] * t170;
-    const real t222 = t220 + t221;
-    const real t223 = H[10] * t178;
-    const real t224 = t222 + t223;
-    const real t225 = H[14] * t186;
-    const real t226 = t224 + t225;
-    const real t227 = H[18] * t194;
-    const real t228 = t226 + t227;
-    const real t229 = H[22] * t202;
-    const real t230 = t228 + t229;
-    const real t231 = t204 * t63;
-    const real t232 = t230 - t231;
-    const real t233 = t80 * t218;
-    const real t234 = t232 - t233;
-    const real t235 = t141 * t234;
-    const real t236 = 1.0 / t144;
-    const real t237 = H[3] * t163;
-    const real t238 = H[7] * t170;
-    const real t239 = t237 + t238;
-    const real t240 = H[11] * t178;
-    const real t241 = t239 + t240;
-    const real t242 = H[15] * t186;
-    const real t243 = t241 + t242;
-    const real t244 = H[19] * t194;
-    const real t245 = t243 + t244;
-    const real t246 = H[23] * t202;
-    const real t247 = t245 + t246;
-    const real t248 = t204 * t107;
-    const real t249 = t247 - t248;
-    const real t250 = t123 * t218;
-    const real t251 = t249 - t250;
-    const real t252 = t142 * t234;
-    const real t253 = t251 - t252;
-    const real t254 = t236 * t253;
-    const real t255 = t142 * t254;
-    const real t256 = t235 - t255;
-    const real t257 = t80 * t256;
-    const real t258 = t219 - t257;
-    const real t259 = t123 * t254;
-    const real t260 = t258 - t259;
-    const real t261 = t36 * t260;
-    const real t262 = t205 - t261;
-    const real t263 = t63 * t256;
-    const real t264 = t262 - t263;
-    const real t265 = t107 * t254;
-    const real t266 = t264 - t265;
-    udot[0] = t266;
-    udot[1] = t260;
-    udot[2] = t256;
-    udot[3] = t254;
-    return 0;
+  real t10 = H[0] * H[0] + H[4] * H[4] + H[8] * H[8] + H[12] * H[12] + H[16] * H[16] + H[20] *
+    H[20];
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[5] * H[5] + H[9] * H[9] + H[13] * H[13] + H[17] * H[17] + H[21] *
+    H[21];
+  real t34 = H[0] * H[1] + H[4] * H[5] + H[8] * H[9] + H[12] * H[13] + H[16] * H[17] + H[20] *
+    H[21];
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[6] * H[6] + H[10] * H[10] + H[14] * H[14] + H[18] * H[18] + H[22] *
+    H[22];
+  real t62 = H[0] * H[2] + H[4] * H[6] + H[8] * H[10] + H[12] * H[14] + H[16] * H[18] + H[20] *
+    H[22];
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[5] * H[6] + H[9] * H[10] + H[13] * H[14] + H[17] * H[18] + H[21] *
+    H[22] - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+  real t94 = H[3] * H[3] + H[7] * H[7] + H[11] * H[11] + H[15] * H[15] + H[19] * H[19] + H[23] *
+    H[23];
+  real t106 = H[0] * H[3] + H[4] * H[7] + H[8] * H[11] + H[12] * H[15] + H[16] * H[19] + H[20] *
+    H[23];
+  real t107 = t106 * t35;
+  real t122 = H[1] * H[3] + H[5] * H[7] + H[9] * H[11] + H[13] * H[15] + H[17] * H[19] + H[21] *
+    H[23] - t106 * t36;
+  real t123 = t79 * t122;
+  real t140 = H[2] * H[3] + H[6] * H[7] + H[10] * H[11] + H[14] * H[15] + H[18] * H[19] + H[22] *
+    H[23] - t106 * t63 - t80 * t122;
+  real t141 = 1.0 / t82;
+  real t142 = t141 * t140;
+  real t144 = t94 - t106 * t107 - t122 * t123 - t140 * t142;
+  if (!((t94 * ((real)1 / (real)10000000000000) < t144))) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+  real t149 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t154 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t160 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t163 = delta[0] - (Rc[0] * t149 + Rc[3] * t154 + Rc[6] * t160);
+  real t170 = delta[1] - (Rc[1] * t149 + Rc[4] * t154 + Rc[7] * t160);
+  real t178 = delta[2] - (Rc[2] * t149 + Rc[5] * t154 + Rc[8] * t160);
+  real t186 = delta[3] - (Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5]);
+  real t194 = delta[4] - (Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5]);
+  real t202 = delta[5] - (Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5]);
+  real t204 = H[0] * t163 + H[4] * t170 + H[8] * t178 + H[12] * t186 + H[16] * t194 + H[20] * t202;
+  real t218 = H[1] * t163 + H[5] * t170 + H[9] * t178 + H[13] * t186 + H[17] * t194 + H[21] * t202 -
+    t204 * t36;
+  real t234 = H[2] * t163 + H[6] * t170 + H[10] * t178 + H[14] * t186 + H[18] * t194 + H[22] * t202
+    - t204 * t63 - t80 * t218;
+  real t254 = 1.0 / t144 * (H[3] * t163 + H[7] * t170 + H[11] * t178 + H[15] * t186 + H[19] * t194 +
+    H[23] * t202 - t204 * t107 - t123 * t218 - t142 * t234);
+  real t256 = t141 * t234 - t142 * t254;
+  real t260 = t79 * t218 - t80 * t256 - t123 * t254;
+  udot[0] = t204 * t35 - t36 * t260 - t63 * t256 - t107 * t254;
+  udot[1] = t260;
+  udot[2] = t256;
+  udot[3] = t254;
+  return 0;
 }
 
-static int mstmm_sweep_generic4_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_project_outputs[] = {
-    {"udot", 4, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic4_project_guards[] = {
-    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic4_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 4 free speeds, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the free coordinates
@@ -2481,1279 +550,290 @@ static const mstmm_guard mstmm_sweep_generic4_project_guards[] = {
  * out G[4][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic4_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic4_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[4] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[4] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[8] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[12] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[16] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[20] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[4] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[4] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[8] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[12] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[16] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[20] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[8] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[4] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[8] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[12] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[16] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[20] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[12] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[4] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[8] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[12] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[16] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[20] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[16] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[4] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[8] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[12] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[16] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[20] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[20] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] - W[0];
-    const real t78 = t76 + t77;
-    const real t79 = 0.0 < t78;
-    if (!(t79 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t80 = H[1] * S[0];
-    const real t81 = H[5] * S[1];
-    const real t82 = t80 + t81;
-    const real t83 = H[9] * S[2];
-    const real t84 = t82 + t83;
-    const real t85 = H[13] * S[3];
-    const real t86 = t84 + t85;
-    const real t87 = H[17] * S[4];
-    const real t88 = t86 + t87;
-    const real t89 = H[21] * S[5];
-    const real t90 = t88 + t89;
-    const real t91 = H[1] * t90;
-    const real t92 = H[1] * S[1];
-    const real t93 = H[5] * S[6];
-    const real t94 = t92 + t93;
-    const real t95 = H[9] * S[7];
-    const real t96 = t94 + t95;
-    const real t97 = H[13] * S[8];
-    const real t98 = t96 + t97;
-    const real t99 = H[17] * S[9];
-    const real t100 = t98 + t99;
-    const real t101 = H[21] * S[10];
-    const real t102 = t100 + t101;
-    const real t103 = H[5] * t102;
-    const real t104 = t91 + t103;
-    const real t105 = H[1] * S[2];
-    const real t106 = H[5] * S[7];
-    const real t107 = t105 + t106;
-    const real t108 = H[9] * S[11];
-    const real t109 = t107 + t108;
-    const real t110 = H[13] * S[12];
-    const real t111 = t109 + t110;
-    const real t112 = H[17] * S[13];
-    const real t113 = t111 + t112;
-    const real t114 = H[21] * S[14];
-    const real t115 = t113 + t114;
-    const real t116 = H[9] * t115;
-    const real t117 = t104 + t116;
-    const real t118 = H[1] * S[3];
-    const real t119 = H[5] * S[8];
-    const real t120 = t118 + t119;
-    const real t121 = H[9] * S[12];
-    const real t122 = t120 + t121;
-    const real t123 = H[13] * S[15];
-    const real t124 = t122 + t123;
-    const real t125 = H[17] * S[16];
-    const real t126 = t124 + t125;
-    const real t127 = H[21] * S[17];
-    const real t128 = t126 + t127;
-    const real t129 = H[13] * t128;
-    const real t130 = t117 + t129;
-    const real t131 = H[1] * S[4];
-    const real t132 = H[5] * S[9];
-    const real t133 = t131 + t132;
-    const real t134 = H[9] * S[13];
-    const real t135 = t133 + t134;
-    const real t136 = H[13] * S[16];
-    const real t137 = t135 + t136;
-    const real t138 = H[17] * S[18];
-    const real t139 = t137 + t138;
-    const real t140 = H[21] * S[19];
-    const real t141 = t139 + t140;
-    const real t142 = H[17] * t141;
-    const real t143 = t130 + t142;
-    const real t144 = H[1] * S[5];
-    const real t145 = H[5] * S[10];
-    const real t146 = t144 + t145;
-    const real t147 = H[9] * S[14];
-    const real t148 = t146 + t147;
-    const real t149 = H[13] * S[17];
-    const real t150 = t148 + t149;
-    const real t151 = H[17] * S[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[21] * S[20];
-    const real t154 = t152 + t153;
-    const real t155 = H[21] * t154;
-    const real t156 = t143 + t155;
-    const real t157 = J[1] - W[5];
-    const real t158 = t156 + t157;
-    const real t159 = t158 * ((real)1 / (real)10000000000000);
-    const real t160 = H[0] * t90;
-    const real t161 = H[4] * t102;
-    const real t162 = t160 + t161;
-    const real t163 = H[8] * t115;
-    const real t164 = t162 + t163;
-    const real t165 = H[12] * t128;
-    const real t166 = t164 + t165;
-    const real t167 = H[16] * t141;
-    const real t168 = t166 + t167;
-    const real t169 = H[20] * t154;
-    const real t170 = t168 + t169;
-    const real t171 = W[1] + W[4];
-    const real t172 = 0.5 * t171;
-    const real t173 = t170 - t172;
-    const real t174 = 1.0 / t78;
-    const real t175 = t173 * t174;
-    const real t176 = t173 * t175;
-    const real t177 = t158 - t176;
-    const real t178 = t159 < t177;
-    if (!(t178 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t179 = H[2] * S[0];
-    const real t180 = H[6] * S[1];
-    const real t181 = t179 + t180;
-    const real t182 = H[10] * S[2];
-    const real t183 = t181 + t182;
-    const real t184 = H[14] * S[3];
-    const real t185 = t183 + t184;
-    const real t186 = H[18] * S[4];
-    const real t187 = t185 + t186;
-    const real t188 = H[22] * S[5];
-    const real t189 = t187 + t188;
-    const real t190 = H[2] * t189;
-    const real t191 = H[2] * S[1];
-    const real t192 = H[6] * S[6];
-    const real t193 = t191 + t192;
-    const real t194 = H[10] * S[7];
-    const real t195 = t193 + t194;
-    const real t196 = H[14] * S[8];
-    const real t197 = t195 + t196;
-    const real t198 = H[18] * S[9];
-    const real t199 = t197 + t198;
-    const real t200 = H[22] * S[10];
-    const real t201 = t199 + t200;
-    const real t202 = H[6] * t201;
-    const real t203 = t190 + t202;
-    const real t204 = H[2] * S[2];
-    const real t205 = H[6] * S[7];
-    const real t206 = t204 + t205;
-    const real t207 = H[10] * S[11];
-    const real t208 = t206 + t207;
-    const real t209 = H[14] * S[12];
-    const real t210 = t208 + t209;
-    const real t211 = H[18] * S[13];
-    const real t212 = t210 + t211;
-    const real t213 = H[22] * S[14];
-    const real t214 = t212 + t213;
-    const real t215 = H[10] * t214;
-    const real t216 = t203 + t215;
-    const real t217 = H[2] * S[3];
-    const real t218 = H[6] * S[8];
-    const real t219 = t217 + t218;
-    const real t220 = H[10] * S[12];
-    const real t221 = t219 + t220;
-    const real t222 = H[14] * S[15];
-    const real t223 = t221 + t222;
-    const real t224 = H[18] * S[16];
-    const real t225 = t223 + t224;
-    const real t226 = H[22] * S[17];
-    const real t227 = t225 + t226;
-    const real t228 = H[14] * t227;
-    const real t229 = t216 + t228;
-    const real t230 = H[2] * S[4];
-    const real t231 = H[6] * S[9];
-    const real t232 = t230 + t231;
-    const real t233 = H[10] * S[13];
-    const real t234 = t232 + t233;
-    const real t235 = H[14] * S[16];
-    const real t236 = t234 + t235;
-    const real t237 = H[18] * S[18];
-    const real t238 = t236 + t237;
-    const real t239 = H[22] * S[19];
-    const real t240 = t238 + t239;
-    const real t241 = H[18] * t240;
-    const real t242 = t229 + t241;
-    const real t243 = H[2] * S[5];
-    const real t244 = H[6] * S[10];
-    const real t245 = t243 + t244;
-    const real t246 = H[10] * S[14];
-    const real t247 = t245 + t246;
-    const real t248 = H[14] * S[17];
-    const real t249 = t247 + t248;
-    const real t250 = H[18] * S[19];
-    const real t251 = t249 + t250;
-    const real t252 = H[22] * S[20];
-    const real t253 = t251 + t252;
-    const real t254 = H[22] * t253;
-    const real t255 = t242 + t254;
-    const real t256 = J[2] - W[10];
-    const real t257 = t255 + t256;
-    const real t258 = t257 * ((real)1 / (real)10000000000000);
-    const real t259 = H[0] * t189;
-    const real t260 = H[4] * t201;
-    const real t261 = t259 + t260;
-    const real t262 = H[8] * t214;
-    const real t263 = t261 + t262;
-    const real t264 = H[12] * t227;
-    const real t265 = t263 + t264;
-    const real t266 = H[16] * t240;
-    const real t267 = t265 + t266;
-    const real t268 = H[20] * t253;
-    const real t269 = t267 + t268;
-    const real t270 = W[2] + W[8];
-    const real t271 = 0.5 * t270;
-    const real t272 = t269 - t271;
-    const real t273 = t272 * t174;
-    const real t274 = t272 * t273;
-    const real t275 = t257 - t274;
-    const real t276 = H[1] * t189;
-    const real t277 = H[5] * t201;
-    const real t278 = t276 + t277;
-    const real t279 = H[9] * t214;
-    const real t280 = t278 + t279;
-    const real t281 = H[13] * t227;
-    const real t282 = t280 + t281;
-    const real t283 = H[17] * t240;
-    const real t284 = t282 + t283;
-    const real t285 = H[21] * t253;
-    const real t286 = t284 + t285;
-    const real t287 = W[6] + W[9];
-    const real t288 = 0.5 * t287;
-    const real t289 = t286 - t288;
-    const real t290 = t272 * t175;
-    const real t291 = t289 - t290;
-    const real t292 = 1.0 / t177;
-    const real t293 = t292 * t291;
-    const real t294 = t291 * t293;
-    const real t295 = t275 - t294;
-    const real t296 = t258 < t295;
-    if (!(t296 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t297 = H[3] * S[0];
-    const real t298 = H[7] * S[1];
-    const real t299 = t297 + t298;
-    const real t300 = H[11] * S[2];
-    const real t301 = t299 + t300;
-    const real t302 = H[15] * S[3];
-    const real t303 = t301 + t302;
-    const real t304 = H[19] * S[4];
-    const real t305 = t303 + t304;
-    const real t306 = H[23] * S[5];
-    const real t307 = t305 + t306;
-    const real t308 = H[3] * t307;
-    const real t309 = H[3] * S[1];
-    const real t310 = H[7] * S[6];
-    const real t311 = t309 + t310;
-    const real t312 = H[11] * S[7];
-    const real t313 = t311 + t312;
-    const real t314 = H[15] * S[8];
-    const real t315 = t313 + t314;
-    const real t316 = H[19] * S[9];
-    const real t317 = t315 + t316;
-    const real t318 = H[23] * S[10];
-    const real t319 = t317 + t318;
-    const real t320 = H[7] * t319;
-    const real t321 = t308 + t320;
-    const real t322 = H[3] * S[2];
-    const real t323 = H[7] * S[7];
-    const real t324 = t322 + t323;
-    const real t325 = H[11] * S[11];
-    const real t326 = t324 + t325;
-    const real t327 = H[15] * S[12];
-    const real t328 = t326 + t327;
-    const real t329 = H[19] * S[13];
-    const real t330 = t328 + t329;
-    const real t331 = H[23] * S[14];
-    const real t332 = t330 + t331;
-    const real t333 = H[11] * t332;
-    const real t334 = t321 + t333;
-    const real t335 = H[3] * S[3];
-    const real t336 = H[7] * S[8];
-    const real t337 = t335 + t336;
-    const real t338 = H[11] * S[12];
-    const real t339 = t337 + t338;
-    const real t340 = H[15] * S[15];
-    const real t341 = t339 + t340;
-    const real t342 = H[19] * S[16];
-    const real t343 = t341 + t342;
-    const real t344 = H[23] * S[17];
-    const real t345 = t343 + t344;
-    const real t346 = H[15] * t345;
-    const real t347 = t334 + t346;
-    const real t348 = H[3] * S[4];
-    const real t349 = H[7] * S[9];
-    const real t350 = t348 + t349;
-    const real t351 = H[11] * S[13];
-    const real t352 = t350 + t351;
-    const real t353 = H[15] * S[16];
-    const real t354 = t352 + t353;
-    const real t355 = H[19] * S[18];
-    const real t356 = t354 + t355;
-    const real t357 = H[23] * S[19];
-    const real t358 = t356 + t357;
-    const real t359 = H[19] * t358;
-    const real t360 = t347 + t359;
-    const real t361 = H[3] * S[5];
-    const real t362 = H[7] * S[10];
-    const real t363 = t361 + t362;
-    const real t364 = H[11] * S[14];
-    const real t365 = t363 + t364;
-    const real t366 = H[15] * S[17];
-    const real t367 = t365 + t366;
-    const real t368 = H[19] * S[19];
-    const real t369 = t367 + t368;
-    const real t370 = H[23] * S[20];
-    const real t371 = t369 + t370;
-    const real t372 = H[23] * t371;
-    const real t373 = t360 + t372;
-    const real t374 = J[3] - W[15];
-    const real t375 = t373 + t374;
-    const real t376 = t375 * ((real)1 / (real)10000000000000);
-    const real t377 = H[0] * t307;
-    const real t378 = H[4] * t319;
-    const real t379 = t377 + t378;
-    const real t380 = H[8] * t332;
-    const real t381 = t379 + t380;
-    const real t382 = H[12] * t345;
-    const real t383 = t381 + t382;
-    const real t384 = H[16] * t358;
-    const real t385 = t383 + t384;
-    const real t386 = H[20] * t371;
-    const real t387 = t385 + t386;
-    const real t388 = W[3] + W[12];
-    const real t389 = 0.5 * t388;
-    const real t390 = t387 - t389;
-    const real t391 = t390 * t174;
-    const real t392 = t390 * t391;
-    const real t393 = t375 - t392;
-    const real t394 = H[1] * t307;
-    const real t395 = H[5] * t319;
-    const real t396 = t394 + t395;
-    const real t397 = H[9] * t332;
-    const real t398 = t396 + t397;
-    const real t399 = H[13] * t345;
-    const real t400 = t398 + t399;
-    const real t401 = H[17] * t358;
-    const real t402 = t400 + t401;
-    const real t403 = H[21] * t371;
-    const real t404 = t402 + t403;
-    const real t405 = W[7] + W[13];
-    const real t406 = 0.5 * t405;
-    const real t407 = t404 - t406;
-    const real t408 = t390 * t175;
-    const real t409 = t407 - t408;
-    const real t410 = t292 * t409;
-    const real t411 = t409 * t410;
-    const real t412 = t393 - t411;
-    const real t413 = H[2] * t307;
-    const real t414 = H[6] * t319;
-    const real t415 = t413 + t414;
-    const real t416 = H[10] * t332;
-    const real t417 = t415 + t416;
-    const real t418 = H[14] * t345;
-    const real t419 = t417 + t418;
-    const real t420 = H[18] * t358;
-    const real t421 = t419 + t420;
-    const real t422 = H[22] * t371;
-    const real t423 = t421 + t422;
-    const real t424 = W[11] + W[14];
-    const real t425 = 0.5 * t424;
-    const real t426 = t423 - t425;
-    const real t427 = t390 * t273;
-    const real t428 = t426 - t427;
-    const real t429 = t293 * t409;
-    const real t430 = t428 - t429;
-    const real t431 = 1.0 / t295;
-    const real t432 = t431 * t430;
-    const real t433 = t430 * t432;
-    const real t434 = t412 - t433;
-    const real t435 = t376 < t434;
-    if (!(t435 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t436 = H[8] * H[8];
-    const real t437 = H[0] * H[0];
-    const real t438 = H[4] * H[4];
-    const real t439 = t437 + t438;
-    const real t440 = t436 + t439;
-    const real t441 = 0.0 < floor_[0];
-    const real t442 = S[0] + S[6];
-    const real t443 = S[11] + t442;
-    const real t444 = ((real)1 / (real)300000000000000) * t443;
-    const real t445 = t441 != 0 ? floor_[0] : t444;
-    const real t446 = t440 * t445;
-    const real t447 = H[20] * H[20];
-    const real t448 = H[12] * H[12];
-    const real t449 = H[16] * H[16];
-    const real t450 = t448 + t449;
-    const real t451 = t447 + t450;
-    const real t452 = 0.0 < floor_[1];
-    const real t453 = S[15] + S[18];
-    const real t454 = S[20] + t453;
-    const real t455 = ((real)1 / (real)300000000000000) * t454;
-    const real t456 = t452 != 0 ? floor_[1] : t455;
-    const real t457 = t451 * t456;
-    const real t458 = t446 + t457;
-    const real t459 = t458 < t78;
-    if (!(t459 != 0)) return 1; /* speed 1 of 4 moves no inertia: its acceleration is undetermined */
-    const real t460 = H[9] * H[9];
-    const real t461 = H[1] * H[1];
-    const real t462 = H[5] * H[5];
-    const real t463 = t461 + t462;
-    const real t464 = t460 + t463;
-    const real t465 = t445 * t464;
-    const real t466 = H[21] * H[21];
-    const real t467 = H[13] * H[13];
-    const real t468 = H[17] * H[17];
-    const real t469 = t467 + t468;
-    const real t470 = t466 + t469;
-    const real t471 = t456 * t470;
-    const real t472 = t465 + t471;
-    const real t473 = t472 < t158;
-    if (!(t473 != 0)) return 1; /* speed 2 of 4 moves no inertia: its acceleration is undetermined */
-    const real t474 = H[10] * H[10];
-    const real t475 = H[2] * H[2];
-    const real t476 = H[6] * H[6];
-    const real t477 = t475 + t476;
-    const real t478 = t474 + t477;
-    const real t479 = t445 * t478;
-    const real t480 = H[22] * H[22];
-    const real t481 = H[14] * H[14];
-    const real t482 = H[18] * H[18];
-    const real t483 = t481 + t482;
-    const real t484 = t480 + t483;
-    const real t485 = t456 * t484;
-    const real t486 = t479 + t485;
-    const real t487 = t486 < t257;
-    if (!(t487 != 0)) return 1; /* speed 3 of 4 moves no inertia: its acceleration is undetermined */
-    const real t488 = H[11] * H[11];
-    const real t489 = H[3] * H[3];
-    const real t490 = H[7] * H[7];
-    const real t491 = t489 + t490;
-    const real t492 = t488 + t491;
-    const real t493 = t445 * t492;
-    const real t494 = H[23] * H[23];
-    const real t495 = H[15] * H[15];
-    const real t496 = H[19] * H[19];
-    const real t497 = t495 + t496;
-    const real t498 = t494 + t497;
-    const real t499 = t456 * t498;
-    const real t500 = t493 + t499;
-    const real t501 = t500 < t375;
-    if (!(t501 != 0)) return 1; /* speed 4 of 4 moves no inertia: its acceleration is undetermined */
-    F[0] = t174;
-    F[1] = 0.0;
-    F[2] = 0.0;
-    F[3] = 0.0;
-    F[4] = t175;
-    F[5] = t292;
-    F[6] = 0.0;
-    F[7] = 0.0;
-    F[8] = t273;
-    F[9] = t293;
-    F[10] = t431;
-    F[11] = 0.0;
-    F[12] = t391;
-    F[13] = t410;
-    F[14] = t432;
-    const real t502 = 1.0 / t434;
-    F[15] = t502;
-    const real t503 = t10 * t174;
-    const real t504 = t10 * t175;
-    const real t505 = t90 - t504;
-    const real t506 = t292 * t505;
-    const real t507 = t10 * t273;
-    const real t508 = t189 - t507;
-    const real t509 = t293 * t505;
-    const real t510 = t508 - t509;
-    const real t511 = t431 * t510;
-    const real t512 = t10 * t391;
-    const real t513 = t307 - t512;
-    const real t514 = t410 * t505;
-    const real t515 = t513 - t514;
-    const real t516 = t432 * t510;
-    const real t517 = t515 - t516;
-    const real t518 = t502 * t517;
-    const real t519 = t432 * t518;
-    const real t520 = t511 - t519;
-    const real t521 = t293 * t520;
-    const real t522 = t506 - t521;
-    const real t523 = t410 * t518;
-    const real t524 = t522 - t523;
-    const real t525 = t175 * t524;
-    const real t526 = t503 - t525;
-    const real t527 = t273 * t520;
-    const real t528 = t526 - t527;
-    const real t529 = t391 * t518;
-    const real t530 = t528 - t529;
-    G[0] = t530;
-    const real t531 = t22 * t174;
-    const real t532 = t22 * t175;
-    const real t533 = t102 - t532;
-    const real t534 = t292 * t533;
-    const real t535 = t22 * t273;
-    const real t536 = t201 - t535;
-    const real t537 = t293 * t533;
-    const real t538 = t536 - t537;
-    const real t539 = t431 * t538;
-    const real t540 = t22 * t391;
-    const real t541 = t319 - t540;
-    const real t542 = t410 * t533;
-    const real t543 = t541 - t542;
-    const real t544 = t432 * t538;
-    const real t545 = t543 - t544;
-    const real t546 = t502 * t545;
-    const real t547 = t432 * t546;
-    const real t548 = t539 - t547;
-    const real t549 = t293 * t548;
-    const real t550 = t534 - t549;
-    const real t551 = t410 * t546;
-    const real t552 = t550 - t551;
-    const real t553 = t175 * t552;
-    const real t554 = t531 - t553;
-    const real t555 = t273 * t548;
-    const real t556 = t554 - t555;
-    const real t557 = t391 * t546;
-    const real t558 = t556 - t557;
-    G[1] = t558;
-    const real t559 = t35 * t174;
-    const real t560 = t35 * t175;
-    const real t561 = t115 - t560;
-    const real t562 = t292 * t561;
-    const real t563 = t35 * t273;
-    const real t564 = t214 - t563;
-    const real t565 = t293 * t561;
-    const real t566 = t564 - t565;
-    const real t567 = t431 * t566;
-    const real t568 = t35 * t391;
-    const real t569 = t332 - t568;
-    const real t570 = t410 * t561;
-    const real t571 = t569 - t570;
-    const real t572 = t432 * t566;
-    const real t573 = t571 - t572;
-    const real t574 = t502 * t573;
-    const real t575 = t432 * t574;
-    const real t576 = t567 - t575;
-    const real t577 = t293 * t576;
-    const real t578 = t562 - t577;
-    const real t579 = t410 * t574;
-    const real t580 = t578 - t579;
-    const real t581 = t175 * t580;
-    const real t582 = t559 - t581;
-    const real t583 = t273 * t576;
-    const real t584 = t582 - t583;
-    const real t585 = t391 * t574;
-    const real t586 = t584 - t585;
-    G[2] = t586;
-    const real t587 = t48 * t174;
-    const real t588 = t48 * t175;
-    const real t589 = t128 - t588;
-    const real t590 = t292 * t589;
-    const real t591 = t48 * t273;
-    const real t592 = t227 - t591;
-    const real t593 = t293 * t589;
-    const real t594 = t592 - t593;
-    const real t595 = t431 * t594;
-    const real t596 = t48 * t391;
-    const real t597 = t345 - t596;
-    const real t598 = t410 * t589;
-    const real t599 = t597 - t598;
-    const real t600 = t432 * t594;
-    const real t601 = t599 - t600;
-    const real t602 = t502 * t601;
-    const real t603 = t432 * t602;
-    const real t604 = t595 - t603;
-    const real t605 = t293 * t604;
-    const real t606 = t590 - t605;
-    const real t607 = t410 * t602;
-    const real t608 = t606 - t607;
-    const real t609 = t175 * t608;
-    const real t610 = t587 - t609;
-    const real t611 = t273 * t604;
-    const real t612 = t610 - t611;
-    const real t613 = t391 * t602;
-    const real t614 = t612 - t613;
-    G[3] = t614;
-    const real t615 = t61 * t174;
-    const real t616 = t61 * t175;
-    const real t617 = t141 - t616;
-    const real t618 = t292 * t617;
-    const real t619 = t61 * t273;
-    const real t620 = t240 - t619;
-    const real t621 = t293 * t617;
-    const real t622 = t620 - t621;
-    const real t623 = t431 * t622;
-    const real t624 = t61 * t391;
-    const real t625 = t358 - t624;
-    const real t626 = t410 * t617;
-    const real t627 = t625 - t626;
-    const real t628 = t432 * t622;
-    const real t629 = t627 - t628;
-    const real t630 = t502 * t629;
-    const real t631 = t432 * t630;
-    const real t632 = t623 - t631;
-    const real t633 = t293 * t632;
-    const real t634 = t618 - t633;
-    const real t635 = t410 * t630;
-    const real t636 = t634 - t635;
-    const real t637 = t175 * t636;
-    const real t638 = t615 - t637;
-    const real t639 = t273 * t632;
-    const real t640 = t638 - t639;
-    const real t641 = t391 * t630;
-    const real t642 = t640 - t641;
-    G[4] = t642;
-    const real t643 = t74 * t174;
-    const real t644 = t74 * t175;
-    const real t645 = t154 - t644;
-    const real t646 = t292 * t645;
-    const real t647 = t74 * t273;
-    const real t648 = t253 - t647;
-    const real t649 = t293 * t645;
-    const real t650 = t648 - t649;
-    const real t651 = t431 * t650;
-    const real t652 = t74 * t391;
-    const real t653 = t371 - t652;
-    const real t654 = t410 * t645;
-    const real t655 = t653 - t654;
-    const real t656 = t432 * t650;
-    const real t657 = t655 - t656;
-    const real t658 = t502 * t657;
-    const real t659 = t432 * t658;
-    const real t660 = t651 - t659;
-    const real t661 = t293 * t660;
-    const real t662 = t646 - t661;
-    const real t663 = t410 * t658;
-    const real t664 = t662 - t663;
-    const real t665 = t175 * t664;
-    const real t666 = t643 - t665;
-    const real t667 = t273 * t660;
-    const real t668 = t666 - t667;
-    const real t669 = t391 * t658;
-    const real t670 = t668 - t669;
-    G[5] = t670;
-    G[6] = t524;
-    G[7] = t552;
-    G[8] = t580;
-    G[9] = t608;
-    G[10] = t636;
-    G[11] = t664;
-    G[12] = t520;
-    G[13] = t548;
-    G[14] = t576;
-    G[15] = t604;
-    G[16] = t632;
-    G[17] = t660;
-    G[18] = t518;
-    G[19] = t546;
-    G[20] = t574;
-    G[21] = t602;
-    G[22] = t630;
-    G[23] = t658;
-    const real t671 = t10 * t503;
-    const real t672 = t505 * t506;
-    const real t673 = t671 + t672;
-    const real t674 = t510 * t511;
-    const real t675 = t673 + t674;
-    const real t676 = t517 * t518;
-    const real t677 = t675 + t676;
-    const real t678 = S[0] - t677;
-    const real t679 = Rc[0] * t678;
-    const real t680 = t10 * t531;
-    const real t681 = t505 * t534;
-    const real t682 = t680 + t681;
-    const real t683 = t510 * t539;
-    const real t684 = t682 + t683;
-    const real t685 = t517 * t546;
-    const real t686 = t684 + t685;
-    const real t687 = S[1] - t686;
-    const real t688 = Rc[1] * t687;
-    const real t689 = t679 + t688;
-    const real t690 = t10 * t559;
-    const real t691 = t505 * t562;
-    const real t692 = t690 + t691;
-    const real t693 = t510 * t567;
-    const real t694 = t692 + t693;
-    const real t695 = t517 * t574;
-    const real t696 = t694 + t695;
-    const real t697 = S[2] - t696;
-    const real t698 = Rc[2] * t697;
-    const real t699 = t689 + t698;
-    const real t700 = Rc[0] * t699;
-    const real t701 = Rc[0] * t687;
-    const real t702 = t22 * t531;
-    const real t703 = t533 * t534;
-    const real t704 = t702 + t703;
-    const real t705 = t538 * t539;
-    const real t706 = t704 + t705;
-    const real t707 = t545 * t546;
-    const real t708 = t706 + t707;
-    const real t709 = S[6] - t708;
-    const real t710 = Rc[1] * t709;
-    const real t711 = t701 + t710;
-    const real t712 = t22 * t559;
-    const real t713 = t533 * t562;
-    const real t714 = t712 + t713;
-    const real t715 = t538 * t567;
-    const real t716 = t714 + t715;
-    const real t717 = t545 * t574;
-    const real t718 = t716 + t717;
-    const real t719 = S[7] - t718;
-    const real t720 = Rc[2] * t719;
-    const real t721 = t711 + t720;
-    const real t722 = Rc[1] * t721;
-    const real t723 = t700 + t722;
-    const real t724 = Rc[0] * t697;
-    const real t725 = Rc[1] * t719;
-    const real t726 = t724 + t725;
-    const real t727 = t35 * t559;
-    const real t728 = t561 * t562;
-    const real t729 = t727 + t728;
-    const real t730 = t566 * t567;
-    const real t731 = t729 + t730;
-    const real t732 = t573 * t574;
-    const real t733 = t731 + t732;
-    const real t734 = S[11] - t733;
-    const real t735 = Rc[2] * t734;
-    const real t736 = t726 + t735;
-    const real t737 = Rc[2] * t736;
-    const real t738 = t723 + t737;
-    S_I[0] += t738;
-    const real t739 = Rc[3] * t699;
-    const real t740 = Rc[4] * t721;
-    const real t741 = t739 + t740;
-    const real t742 = Rc[5] * t736;
-    const real t743 = t741 + t742;
-    S_I[1] += t743;
-    const real t744 = Rc[6] * t699;
-    const real t745 = Rc[7] * t721;
-    const real t746 = t744 + t745;
-    const real t747 = Rc[8] * t736;
-    const real t748 = t746 + t747;
-    S_I[2] += t748;
-    const real t749 = t10 * t587;
-    const real t750 = t505 * t590;
-    const real t751 = t749 + t750;
-    const real t752 = t510 * t595;
-    const real t753 = t751 + t752;
-    const real t754 = t517 * t602;
-    const real t755 = t753 + t754;
-    const real t756 = S[3] - t755;
-    const real t757 = Rc[0] * t756;
-    const real t758 = t22 * t587;
-    const real t759 = t533 * t590;
-    const real t760 = t758 + t759;
-    const real t761 = t538 * t595;
-    const real t762 = t760 + t761;
-    const real t763 = t545 * t602;
-    const real t764 = t762 + t763;
-    const real t765 = S[8] - t764;
-    const real t766 = Rc[1] * t765;
-    const real t767 = t757 + t766;
-    const real t768 = t35 * t587;
-    const real t769 = t561 * t590;
-    const real t770 = t768 + t769;
-    const real t771 = t566 * t595;
-    const real t772 = t770 + t771;
-    const real t773 = t573 * t602;
-    const real t774 = t772 + t773;
-    const real t775 = S[12] - t774;
-    const real t776 = Rc[2] * t775;
-    const real t777 = t767 + t776;
-    const real t778 = Rc[0] * t777;
-    const real t779 = t10 * t615;
-    const real t780 = t505 * t618;
-    const real t781 = t779 + t780;
-    const real t782 = t510 * t623;
-    const real t783 = t781 + t782;
-    const real t784 = t517 * t630;
-    const real t785 = t783 + t784;
-    const real t786 = S[4] - t785;
-    const real t787 = Rc[0] * t786;
-    const real t788 = t22 * t615;
-    const real t789 = t533 * t618;
-    const real t790 = t788 + t789;
-    const real t791 = t538 * t623;
-    const real t792 = t790 + t791;
-    const real t793 = t545 * t630;
-    const real t794 = t792 + t793;
-    const real t795 = S[9] - t794;
-    const real t796 = Rc[1] * t795;
-    const real t797 = t787 + t796;
-    const real t798 = t35 * t615;
-    const real t799 = t561 * t618;
-    const real t800 = t798 + t799;
-    const real t801 = t566 * t623;
-    const real t802 = t800 + t801;
-    const real t803 = t573 * t630;
-    const real t804 = t802 + t803;
-    const real t805 = S[13] - t804;
-    const real t806 = Rc[2] * t805;
-    const real t807 = t797 + t806;
-    const real t808 = Rc[1] * t807;
-    const real t809 = t778 + t808;
-    const real t810 = t10 * t643;
-    const real t811 = t505 * t646;
-    const real t812 = t810 + t811;
-    const real t813 = t510 * t651;
-    const real t814 = t812 + t813;
-    const real t815 = t517 * t658;
-    const real t816 = t814 + t815;
-    const real t817 = S[5] - t816;
-    const real t818 = Rc[0] * t817;
-    const real t819 = t22 * t643;
-    const real t820 = t533 * t646;
-    const real t821 = t819 + t820;
-    const real t822 = t538 * t651;
-    const real t823 = t821 + t822;
-    const real t824 = t545 * t658;
-    const real t825 = t823 + t824;
-    const real t826 = S[10] - t825;
-    const real t827 = Rc[1] * t826;
-    const real t828 = t818 + t827;
-    const real t829 = t35 * t643;
-    const real t830 = t561 * t646;
-    const real t831 = t829 + t830;
-    const real t832 = t566 * t651;
-    const real t833 = t831 + t832;
-    const real t834 = t573 * t658;
-    const real t835 = t833 + t834;
-    const real t836 = S[14] - t835;
-    const real t837 = Rc[2] * t836;
-    const real t838 = t828 + t837;
-    const real t839 = Rc[2] * t838;
-    const real t840 = t809 + t839;
-    const real t841 = r[1] * t748;
-    const real t842 = r[2] * t743;
-    const real t843 = t841 - t842;
-    const real t844 = t840 + t843;
-    S_I[3] += t844;
-    const real t845 = Rc[3] * t777;
-    const real t846 = Rc[4] * t807;
-    const real t847 = t845 + t846;
-    const real t848 = Rc[5] * t838;
-    const real t849 = t847 + t848;
-    const real t850 = r[2] * t738;
-    const real t851 = r[0] * t748;
-    const real t852 = t850 - t851;
-    const real t853 = t849 + t852;
-    S_I[4] += t853;
-    const real t854 = Rc[6] * t777;
-    const real t855 = Rc[7] * t807;
-    const real t856 = t854 + t855;
-    const real t857 = Rc[8] * t838;
-    const real t858 = t856 + t857;
-    const real t859 = r[0] * t743;
-    const real t860 = r[1] * t738;
-    const real t861 = t859 - t860;
-    const real t862 = t858 + t861;
-    S_I[5] += t862;
-    const real t863 = Rc[3] * t678;
-    const real t864 = Rc[4] * t687;
-    const real t865 = t863 + t864;
-    const real t866 = Rc[5] * t697;
-    const real t867 = t865 + t866;
-    const real t868 = Rc[3] * t867;
-    const real t869 = Rc[3] * t687;
-    const real t870 = Rc[4] * t709;
-    const real t871 = t869 + t870;
-    const real t872 = Rc[5] * t719;
-    const real t873 = t871 + t872;
-    const real t874 = Rc[4] * t873;
-    const real t875 = t868 + t874;
-    const real t876 = Rc[3] * t697;
-    const real t877 = Rc[4] * t719;
-    const real t878 = t876 + t877;
-    const real t879 = Rc[5] * t734;
-    const real t880 = t878 + t879;
-    const real t881 = Rc[5] * t880;
-    const real t882 = t875 + t881;
-    S_I[6] += t882;
-    const real t883 = Rc[6] * t867;
-    const real t884 = Rc[7] * t873;
-    const real t885 = t883 + t884;
-    const real t886 = Rc[8] * t880;
-    const real t887 = t885 + t886;
-    S_I[7] += t887;
-    const real t888 = Rc[3] * t756;
-    const real t889 = Rc[4] * t765;
-    const real t890 = t888 + t889;
-    const real t891 = Rc[5] * t775;
-    const real t892 = t890 + t891;
-    const real t893 = Rc[0] * t892;
-    const real t894 = Rc[3] * t786;
-    const real t895 = Rc[4] * t795;
-    const real t896 = t894 + t895;
-    const real t897 = Rc[5] * t805;
-    const real t898 = t896 + t897;
-    const real t899 = Rc[1] * t898;
-    const real t900 = t893 + t899;
-    const real t901 = Rc[3] * t817;
-    const real t902 = Rc[4] * t826;
-    const real t903 = t901 + t902;
-    const real t904 = Rc[5] * t836;
-    const real t905 = t903 + t904;
-    const real t906 = Rc[2] * t905;
-    const real t907 = t900 + t906;
-    const real t908 = r[1] * t887;
-    const real t909 = r[2] * t882;
-    const real t910 = t908 - t909;
-    const real t911 = t907 + t910;
-    S_I[8] += t911;
-    const real t912 = Rc[3] * t892;
-    const real t913 = Rc[4] * t898;
-    const real t914 = t912 + t913;
-    const real t915 = Rc[5] * t905;
-    const real t916 = t914 + t915;
-    const real t917 = r[0] * t887;
-    const real t918 = t842 - t917;
-    const real t919 = t916 + t918;
-    S_I[9] += t919;
-    const real t920 = Rc[6] * t892;
-    const real t921 = Rc[7] * t898;
-    const real t922 = t920 + t921;
-    const real t923 = Rc[8] * t905;
-    const real t924 = t922 + t923;
-    const real t925 = r[0] * t882;
-    const real t926 = r[1] * t743;
-    const real t927 = t925 - t926;
-    const real t928 = t924 + t927;
-    S_I[10] += t928;
-    const real t929 = Rc[6] * t678;
-    const real t930 = Rc[7] * t687;
-    const real t931 = t929 + t930;
-    const real t932 = Rc[8] * t697;
-    const real t933 = t931 + t932;
-    const real t934 = Rc[6] * t933;
-    const real t935 = Rc[6] * t687;
-    const real t936 = Rc[7] * t709;
-    const real t937 = t935 + t936;
-    const real t938 = Rc[8] * t719;
-    const real t939 = t937 + t938;
-    const real t940 = Rc[7] * t939;
-    const real t941 = t934 + t940;
-    const real t942 = Rc[6] * t697;
-    const real t943 = Rc[7] * t719;
-    const real t944 = t942 + t943;
-    const real t945 = Rc[8] * t734;
-    const real t946 = t944 + t945;
-    const real t947 = Rc[8] * t946;
-    const real t948 = t941 + t947;
-    S_I[11] += t948;
-    const real t949 = Rc[6] * t756;
-    const real t950 = Rc[7] * t765;
-    const real t951 = t949 + t950;
-    const real t952 = Rc[8] * t775;
-    const real t953 = t951 + t952;
-    const real t954 = Rc[0] * t953;
-    const real t955 = Rc[6] * t786;
-    const real t956 = Rc[7] * t795;
-    const real t957 = t955 + t956;
-    const real t958 = Rc[8] * t805;
-    const real t959 = t957 + t958;
-    const real t960 = Rc[1] * t959;
-    const real t961 = t954 + t960;
-    const real t962 = Rc[6] * t817;
-    const real t963 = Rc[7] * t826;
-    const real t964 = t962 + t963;
-    const real t965 = Rc[8] * t836;
-    const real t966 = t964 + t965;
-    const real t967 = Rc[2] * t966;
-    const real t968 = t961 + t967;
-    const real t969 = r[1] * t948;
-    const real t970 = r[2] * t887;
-    const real t971 = t969 - t970;
-    const real t972 = t968 + t971;
-    S_I[12] += t972;
-    const real t973 = Rc[3] * t953;
-    const real t974 = Rc[4] * t959;
-    const real t975 = t973 + t974;
-    const real t976 = Rc[5] * t966;
-    const real t977 = t975 + t976;
-    const real t978 = r[2] * t748;
-    const real t979 = r[0] * t948;
-    const real t980 = t978 - t979;
-    const real t981 = t977 + t980;
-    S_I[13] += t981;
-    const real t982 = Rc[6] * t953;
-    const real t983 = Rc[7] * t959;
-    const real t984 = t982 + t983;
-    const real t985 = Rc[8] * t966;
-    const real t986 = t984 + t985;
-    const real t987 = t917 - t841;
-    const real t988 = t986 + t987;
-    S_I[14] += t988;
-    const real t989 = t48 * t587;
-    const real t990 = t589 * t590;
-    const real t991 = t989 + t990;
-    const real t992 = t594 * t595;
-    const real t993 = t991 + t992;
-    const real t994 = t601 * t602;
-    const real t995 = t993 + t994;
-    const real t996 = S[15] - t995;
-    const real t997 = Rc[0] * t996;
-    const real t998 = t48 * t615;
-    const real t999 = t589 * t618;
-    const real t1000 = t998 + t999;
-    const real t1001 = t594 * t623;
-    const real t1002 = t1000 + t1001;
-    const real t1003 = t601 * t630;
-    const real t1004 = t1002 + t1003;
-    const real t1005 = S[16] - t1004;
-    const real t1006 = Rc[1] * t1005;
-    const real t1007 = t997 + t1006;
-    const real t1008 = t48 * t643;
-    const real t1009 = t589 * t646;
-    const real t1010 = t1008 + t1009;
-    const real t1011 = t594 * t651;
-    const real t1012 = t1010 + t1011;
-    const real t1013 = t601 * t658;
-    const real t1014 = t1012 + t1013;
-    const real t1015 = S[17] - t1014;
-    const real t1016 = Rc[2] * t1015;
-    const real t1017 = t1007 + t1016;
-    const real t1018 = Rc[0] * t1017;
-    const real t1019 = Rc[0] * t1005;
-    const real t1020 = t61 * t615;
-    const real t1021 = t617 * t618;
-    const real t1022 = t1020 + t1021;
-    const real t1023 = t622 * t623;
-    const real t1024 = t1022 + t1023;
-    const real t1025 = t629 * t630;
-    const real t1026 = t1024 + t1025;
-    const real t1027 = S[18] - t1026;
-    const real t1028 = Rc[1] * t1027;
-    const real t1029 = t1019 + t1028;
-    const real t1030 = t61 * t643;
-    const real t1031 = t617 * t646;
-    const real t1032 = t1030 + t1031;
-    const real t1033 = t622 * t651;
-    const real t1034 = t1032 + t1033;
-    const real t1035 = t629 * t658;
-    const real t1036 = t1034 + t1035;
-    const real t1037 = S[19] - t1036;
-    const real t1038 = Rc[2] * t1037;
-    const real t1039 = t1029 + t1038;
-    const real t1040 = Rc[1] * t1039;
-    const real t1041 = t1018 + t1040;
-    const real t1042 = Rc[0] * t1015;
-    const real t1043 = Rc[1] * t1037;
-    const real t1044 = t1042 + t1043;
-    const real t1045 = t74 * t643;
-    const real t1046 = t645 * t646;
-    const real t1047 = t1045 + t1046;
-    const real t1048 = t650 * t651;
-    const real t1049 = t1047 + t1048;
-    const real t1050 = t657 * t658;
-    const real t1051 = t1049 + t1050;
-    const real t1052 = S[20] - t1051;
-    const real t1053 = Rc[2] * t1052;
-    const real t1054 = t1044 + t1053;
-    const real t1055 = Rc[2] * t1054;
-    const real t1056 = t1041 + t1055;
-    const real t1057 = r[1] * t972;
-    const real t1058 = r[2] * t911;
-    const real t1059 = t1057 - t1058;
-    const real t1060 = r[1] * t968;
-    const real t1061 = r[2] * t907;
-    const real t1062 = t1060 - t1061;
-    const real t1063 = t1059 + t1062;
-    const real t1064 = t1056 + t1063;
-    S_I[15] += t1064;
-    const real t1065 = Rc[3] * t1017;
-    const real t1066 = Rc[4] * t1039;
-    const real t1067 = t1065 + t1066;
-    const real t1068 = Rc[5] * t1054;
-    const real t1069 = t1067 + t1068;
-    const real t1070 = r[1] * t981;
-    const real t1071 = r[2] * t919;
-    const real t1072 = t1070 - t1071;
-    const real t1073 = r[2] * t840;
-    const real t1074 = r[0] * t968;
-    const real t1075 = t1073 - t1074;
-    const real t1076 = t1072 + t1075;
-    const real t1077 = t1069 + t1076;
-    S_I[16] += t1077;
-    const real t1078 = Rc[6] * t1017;
-    const real t1079 = Rc[7] * t1039;
-    const real t1080 = t1078 + t1079;
-    const real t1081 = Rc[8] * t1054;
-    const real t1082 = t1080 + t1081;
-    const real t1083 = r[1] * t988;
-    const real t1084 = r[2] * t928;
-    const real t1085 = t1083 - t1084;
-    const real t1086 = r[0] * t907;
-    const real t1087 = r[1] * t840;
-    const real t1088 = t1086 - t1087;
-    const real t1089 = t1085 + t1088;
-    const real t1090 = t1082 + t1089;
-    S_I[17] += t1090;
-    const real t1091 = Rc[3] * t996;
-    const real t1092 = Rc[4] * t1005;
-    const real t1093 = t1091 + t1092;
-    const real t1094 = Rc[5] * t1015;
-    const real t1095 = t1093 + t1094;
-    const real t1096 = Rc[3] * t1095;
-    const real t1097 = Rc[3] * t1005;
-    const real t1098 = Rc[4] * t1027;
-    const real t1099 = t1097 + t1098;
-    const real t1100 = Rc[5] * t1037;
-    const real t1101 = t1099 + t1100;
-    const real t1102 = Rc[4] * t1101;
-    const real t1103 = t1096 + t1102;
-    const real t1104 = Rc[3] * t1015;
-    const real t1105 = Rc[4] * t1037;
-    const real t1106 = t1104 + t1105;
-    const real t1107 = Rc[5] * t1052;
-    const real t1108 = t1106 + t1107;
-    const real t1109 = Rc[5] * t1108;
-    const real t1110 = t1103 + t1109;
-    const real t1111 = r[2] * t853;
-    const real t1112 = r[0] * t981;
-    const real t1113 = t1111 - t1112;
-    const real t1114 = r[2] * t849;
-    const real t1115 = r[0] * t977;
-    const real t1116 = t1114 - t1115;
-    const real t1117 = t1113 + t1116;
-    const real t1118 = t1110 + t1117;
-    S_I[18] += t1118;
-    const real t1119 = Rc[6] * t1095;
-    const real t1120 = Rc[7] * t1101;
-    const real t1121 = t1119 + t1120;
-    const real t1122 = Rc[8] * t1108;
-    const real t1123 = t1121 + t1122;
-    const real t1124 = r[2] * t862;
-    const real t1125 = r[0] * t988;
-    const real t1126 = t1124 - t1125;
-    const real t1127 = r[0] * t916;
-    const real t1128 = r[1] * t849;
-    const real t1129 = t1127 - t1128;
-    const real t1130 = t1126 + t1129;
-    const real t1131 = t1123 + t1130;
-    S_I[19] += t1131;
-    const real t1132 = Rc[6] * t996;
-    const real t1133 = Rc[7] * t1005;
-    const real t1134 = t1132 + t1133;
-    const real t1135 = Rc[8] * t1015;
-    const real t1136 = t1134 + t1135;
-    const real t1137 = Rc[6] * t1136;
-    const real t1138 = Rc[6] * t1005;
-    const real t1139 = Rc[7] * t1027;
-    const real t1140 = t1138 + t1139;
-    const real t1141 = Rc[8] * t1037;
-    const real t1142 = t1140 + t1141;
-    const real t1143 = Rc[7] * t1142;
-    const real t1144 = t1137 + t1143;
-    const real t1145 = Rc[6] * t1015;
-    const real t1146 = Rc[7] * t1037;
-    const real t1147 = t1145 + t1146;
-    const real t1148 = Rc[8] * t1052;
-    const real t1149 = t1147 + t1148;
-    const real t1150 = Rc[8] * t1149;
-    const real t1151 = t1144 + t1150;
-    const real t1152 = r[0] * t928;
-    const real t1153 = r[1] * t862;
-    const real t1154 = t1152 - t1153;
-    const real t1155 = r[0] * t924;
-    const real t1156 = r[1] * t858;
-    const real t1157 = t1155 - t1156;
-    const real t1158 = t1154 + t1157;
-    const real t1159 = t1151 + t1158;
-    S_I[20] += t1159;
-    return 0;
+  real t10 = H[0] * S[0] + H[4] * S[1] + H[8] * S[2] + H[12] * S[3] + H[16] * S[4] + H[20] * S[5];
+  real t22 = H[0] * S[1] + H[4] * S[6] + H[8] * S[7] + H[12] * S[8] + H[16] * S[9] + H[20] * S[10];
+  real t35 = H[0] * S[2] + H[4] * S[7] + H[8] * S[11] + H[12] * S[12] + H[16] * S[13] + H[20] *
+    S[14];
+  real t48 = H[0] * S[3] + H[4] * S[8] + H[8] * S[12] + H[12] * S[15] + H[16] * S[16] + H[20] *
+    S[17];
+  real t61 = H[0] * S[4] + H[4] * S[9] + H[8] * S[13] + H[12] * S[16] + H[16] * S[18] + H[20] *
+    S[19];
+  real t74 = H[0] * S[5] + H[4] * S[10] + H[8] * S[14] + H[12] * S[17] + H[16] * S[19] + H[20] *
+    S[20];
+  real t78 = H[0] * t10 + H[4] * t22 + H[8] * t35 + H[12] * t48 + H[16] * t61 + H[20] * t74 + (J[0]
+    - W[0]);
+  if (!((0.0 < t78))) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+  real t90 = H[1] * S[0] + H[5] * S[1] + H[9] * S[2] + H[13] * S[3] + H[17] * S[4] + H[21] * S[5];
+  real t102 = H[1] * S[1] + H[5] * S[6] + H[9] * S[7] + H[13] * S[8] + H[17] * S[9] + H[21] * S[10];
+  real t115 = H[1] * S[2] + H[5] * S[7] + H[9] * S[11] + H[13] * S[12] + H[17] * S[13] + H[21] *
+    S[14];
+  real t128 = H[1] * S[3] + H[5] * S[8] + H[9] * S[12] + H[13] * S[15] + H[17] * S[16] + H[21] *
+    S[17];
+  real t141 = H[1] * S[4] + H[5] * S[9] + H[9] * S[13] + H[13] * S[16] + H[17] * S[18] + H[21] *
+    S[19];
+  real t154 = H[1] * S[5] + H[5] * S[10] + H[9] * S[14] + H[13] * S[17] + H[17] * S[19] + H[21] *
+    S[20];
+  real t158 = H[1] * t90 + H[5] * t102 + H[9] * t115 + H[13] * t128 + H[17] * t141 + H[21] * t154 +
+    (J[1] - W[5]);
+  real t173 = H[0] * t90 + H[4] * t102 + H[8] * t115 + H[12] * t128 + H[16] * t141 + H[20] * t154 -
+    0.5 * (W[1] + W[4]);
+  real t174 = 1.0 / t78;
+  real t175 = t173 * t174;
+  real t177 = t158 - t173 * t175;
+  if (!((t158 * ((real)1 / (real)10000000000000) < t177))) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+  real t189 = H[2] * S[0] + H[6] * S[1] + H[10] * S[2] + H[14] * S[3] + H[18] * S[4] + H[22] * S[5];
+  real t201 = H[2] * S[1] + H[6] * S[6] + H[10] * S[7] + H[14] * S[8] + H[18] * S[9] + H[22] *
+    S[10];
+  real t214 = H[2] * S[2] + H[6] * S[7] + H[10] * S[11] + H[14] * S[12] + H[18] * S[13] + H[22] *
+    S[14];
+  real t227 = H[2] * S[3] + H[6] * S[8] + H[10] * S[12] + H[14] * S[15] + H[18] * S[16] + H[22] *
+    S[17];
+  real t240 = H[2] * S[4] + H[6] * S[9] + H[10] * S[13] + H[14] * S[16] + H[18] * S[18] + H[22] *
+    S[19];
+  real t253 = H[2] * S[5] + H[6] * S[10] + H[10] * S[14] + H[14] * S[17] + H[18] * S[19] + H[22] *
+    S[20];
+  real t257 = H[2] * t189 + H[6] * t201 + H[10] * t214 + H[14] * t227 + H[18] * t240 + H[22] * t253
+    + (J[2] - W[10]);
+  real t272 = H[0] * t189 + H[4] * t201 + H[8] * t214 + H[12] * t227 + H[16] * t240 + H[20] * t253 -
+    0.5 * (W[2] + W[8]);
+  real t273 = t272 * t174;
+  real t291 = H[1] * t189 + H[5] * t201 + H[9] * t214 + H[13] * t227 + H[17] * t240 + H[21] * t253 -
+    0.5 * (W[6] + W[9]) - t272 * t175;
+  real t292 = 1.0 / t177;
+  real t293 = t292 * t291;
+  real t295 = t257 - t272 * t273 - t291 * t293;
+  if (!((t257 * ((real)1 / (real)10000000000000) < t295))) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+  real t307 = H[3] * S[0] + H[7] * S[1] + H[11] * S[2] + H[15] * S[3] + H[19] * S[4] + H[23] * S[5];
+  real t319 = H[3] * S[1] + H[7] * S[6] + H[11] * S[7] + H[15] * S[8] + H[19] * S[9] + H[23] *
+    S[10];
+  real t332 = H[3] * S[2] + H[7] * S[7] + H[11] * S[11] + H[15] * S[12] + H[19] * S[13] + H[23] *
+    S[14];
+  real t345 = H[3] * S[3] + H[7] * S[8] + H[11] * S[12] + H[15] * S[15] + H[19] * S[16] + H[23] *
+    S[17];
+  real t358 = H[3] * S[4] + H[7] * S[9] + H[11] * S[13] + H[15] * S[16] + H[19] * S[18] + H[23] *
+    S[19];
+  real t371 = H[3] * S[5] + H[7] * S[10] + H[11] * S[14] + H[15] * S[17] + H[19] * S[19] + H[23] *
+    S[20];
+  real t375 = H[3] * t307 + H[7] * t319 + H[11] * t332 + H[15] * t345 + H[19] * t358 + H[23] * t371
+    + (J[3] - W[15]);
+  real t390 = H[0] * t307 + H[4] * t319 + H[8] * t332 + H[12] * t345 + H[16] * t358 + H[20] * t371 -
+    0.5 * (W[3] + W[12]);
+  real t391 = t390 * t174;
+  real t409 = H[1] * t307 + H[5] * t319 + H[9] * t332 + H[13] * t345 + H[17] * t358 + H[21] * t371 -
+    0.5 * (W[7] + W[13]) - t390 * t175;
+  real t410 = t292 * t409;
+  real t430 = H[2] * t307 + H[6] * t319 + H[10] * t332 + H[14] * t345 + H[18] * t358 + H[22] * t371
+    - 0.5 * (W[11] + W[14]) - t390 * t273 - t293 * t409;
+  real t431 = 1.0 / t295;
+  real t432 = t431 * t430;
+  real t434 = t375 - t390 * t391 - t409 * t410 - t430 * t432;
+  if (!((t375 * ((real)1 / (real)10000000000000) < t434))) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+  real t444 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t445 = (0.0 < floor_[0]) ? floor_[0] : t444;
+  real t455 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t456 = (0.0 < floor_[1]) ? floor_[1] : t455;
+  if (!(((H[8] * H[8] + (H[0] * H[0] + H[4] * H[4])) * t445 + (H[20] * H[20] + (H[12] * H[12] + H[16] * H[16])) * t456 < t78))) return 1; /* speed 1 of 4 moves no inertia: its acceleration is undetermined */
+  if (!((t445 * (H[9] * H[9] + (H[1] * H[1] + H[5] * H[5])) + t456 * (H[21] * H[21] + (H[13] * H[13] + H[17] * H[17])) < t158))) return 1; /* speed 2 of 4 moves no inertia: its acceleration is undetermined */
+  if (!((t445 * (H[10] * H[10] + (H[2] * H[2] + H[6] * H[6])) + t456 * (H[22] * H[22] + (H[14] * H[14] + H[18] * H[18])) < t257))) return 1; /* speed 3 of 4 moves no inertia: its acceleration is undetermined */
+  if (!((t445 * (H[11] * H[11] + (H[3] * H[3] + H[7] * H[7])) + t456 * (H[23] * H[23] + (H[15] * H[15] + H[19] * H[19])) < t375))) return 1; /* speed 4 of 4 moves no inertia: its acceleration is undetermined */
+  F[0] = t174;
+  F[1] = F[2] = F[3] = 0.0;
+  F[4] = t175;
+  F[5] = t292;
+  F[6] = F[7] = 0.0;
+  F[8] = t273;
+  F[9] = t293;
+  F[10] = t431;
+  F[11] = 0.0;
+  F[12] = t391;
+  F[13] = t410;
+  F[14] = t432;
+  real t502 = 1.0 / t434;
+  F[15] = t502;
+  real t503 = t10 * t174;
+  real t505 = t90 - t10 * t175;
+  real t506 = t292 * t505;
+  real t510 = t189 - t10 * t273 - t293 * t505;
+  real t511 = t431 * t510;
+  real t517 = t307 - t10 * t391 - t410 * t505 - t432 * t510;
+  real t518 = t502 * t517;
+  real t520 = t511 - t432 * t518;
+  real t524 = t506 - t293 * t520 - t410 * t518;
+  G[0] = t503 - t175 * t524 - t273 * t520 - t391 * t518;
+  real t531 = t22 * t174;
+  real t533 = t102 - t22 * t175;
+  real t534 = t292 * t533;
+  real t538 = t201 - t22 * t273 - t293 * t533;
+  real t539 = t431 * t538;
+  real t545 = t319 - t22 * t391 - t410 * t533 - t432 * t538;
+  real t546 = t502 * t545;
+  real t548 = t539 - t432 * t546;
+  real t552 = t534 - t293 * t548 - t410 * t546;
+  G[1] = t531 - t175 * t552 - t273 * t548 - t391 * t546;
+  real t559 = t35 * t174;
+  real t561 = t115 - t35 * t175;
+  real t562 = t292 * t561;
+  real t566 = t214 - t35 * t273 - t293 * t561;
+  real t567 = t431 * t566;
+  real t573 = t332 - t35 * t391 - t410 * t561 - t432 * t566;
+  real t574 = t502 * t573;
+  real t576 = t567 - t432 * t574;
+  real t580 = t562 - t293 * t576 - t410 * t574;
+  G[2] = t559 - t175 * t580 - t273 * t576 - t391 * t574;
+  real t587 = t48 * t174;
+  real t589 = t128 - t48 * t175;
+  real t590 = t292 * t589;
+  real t594 = t227 - t48 * t273 - t293 * t589;
+  real t595 = t431 * t594;
+  real t601 = t345 - t48 * t391 - t410 * t589 - t432 * t594;
+  real t602 = t502 * t601;
+  real t604 = t595 - t432 * t602;
+  real t608 = t590 - t293 * t604 - t410 * t602;
+  G[3] = t587 - t175 * t608 - t273 * t604 - t391 * t602;
+  real t615 = t61 * t174;
+  real t617 = t141 - t61 * t175;
+  real t618 = t292 * t617;
+  real t622 = t240 - t61 * t273 - t293 * t617;
+  real t623 = t431 * t622;
+  real t629 = t358 - t61 * t391 - t410 * t617 - t432 * t622;
+  real t630 = t502 * t629;
+  real t632 = t623 - t432 * t630;
+  real t636 = t618 - t293 * t632 - t410 * t630;
+  G[4] = t615 - t175 * t636 - t273 * t632 - t391 * t630;
+  real t643 = t74 * t174;
+  real t645 = t154 - t74 * t175;
+  real t646 = t292 * t645;
+  real t650 = t253 - t74 * t273 - t293 * t645;
+  real t651 = t431 * t650;
+  real t657 = t371 - t74 * t391 - t410 * t645 - t432 * t650;
+  real t658 = t502 * t657;
+  real t660 = t651 - t432 * t658;
+  real t664 = t646 - t293 * t660 - t410 * t658;
+  G[5] = t643 - t175 * t664 - t273 * t660 - t391 * t658;
+  G[6] = t524;
+  G[7] = t552;
+  G[8] = t580;
+  G[9] = t608;
+  G[10] = t636;
+  G[11] = t664;
+  G[12] = t520;
+  G[13] = t548;
+  G[14] = t576;
+  G[15] = t604;
+  G[16] = t632;
+  G[17] = t660;
+  G[18] = t518;
+  G[19] = t546;
+  G[20] = t574;
+  G[21] = t602;
+  G[22] = t630;
+  G[23] = t658;
+  real t678 = S[0] - (t10 * t503 + t505 * t506 + t510 * t511 + t517 * t518);
+  real t687 = S[1] - (t10 * t531 + t505 * t534 + t510 * t539 + t517 * t546);
+  real t697 = S[2] - (t10 * t559 + t505 * t562 + t510 * t567 + t517 * t574);
+  real t699 = Rc[0] * t678 + Rc[1] * t687 + Rc[2] * t697;
+  real t709 = S[6] - (t22 * t531 + t533 * t534 + t538 * t539 + t545 * t546);
+  real t719 = S[7] - (t22 * t559 + t533 * t562 + t538 * t567 + t545 * t574);
+  real t721 = Rc[0] * t687 + Rc[1] * t709 + Rc[2] * t719;
+  real t734 = S[11] - (t35 * t559 + t561 * t562 + t566 * t567 + t573 * t574);
+  real t736 = Rc[0] * t697 + Rc[1] * t719 + Rc[2] * t734;
+  real t738 = Rc[0] * t699 + Rc[1] * t721 + Rc[2] * t736;
+  S_I[0] += t738;
+  real t743 = Rc[3] * t699 + Rc[4] * t721 + Rc[5] * t736;
+  S_I[1] += t743;
+  real t748 = Rc[6] * t699 + Rc[7] * t721 + Rc[8] * t736;
+  S_I[2] += t748;
+  real t756 = S[3] - (t10 * t587 + t505 * t590 + t510 * t595 + t517 * t602);
+  real t765 = S[8] - (t22 * t587 + t533 * t590 + t538 * t595 + t545 * t602);
+  real t775 = S[12] - (t35 * t587 + t561 * t590 + t566 * t595 + t573 * t602);
+  real t777 = Rc[0] * t756 + Rc[1] * t765 + Rc[2] * t775;
+  real t786 = S[4] - (t10 * t615 + t505 * t618 + t510 * t623 + t517 * t630);
+  real t795 = S[9] - (t22 * t615 + t533 * t618 + t538 * t623 + t545 * t630);
+  real t805 = S[13] - (t35 * t615 + t561 * t618 + t566 * t623 + t573 * t630);
+  real t807 = Rc[0] * t786 + Rc[1] * t795 + Rc[2] * t805;
+  real t817 = S[5] - (t10 * t643 + t505 * t646 + t510 * t651 + t517 * t658);
+  real t826 = S[10] - (t22 * t643 + t533 * t646 + t538 * t651 + t545 * t658);
+  real t836 = S[14] - (t35 * t643 + t561 * t646 + t566 * t651 + t573 * t658);
+  real t838 = Rc[0] * t817 + Rc[1] * t826 + Rc[2] * t836;
+  real t840 = Rc[0] * t777 + Rc[1] * t807 + Rc[2] * t838;
+  real t841 = r[1] * t748;
+  real t842 = r[2] * t743;
+  S_I[3] += t840 + (t841 - t842);
+  real t849 = Rc[3] * t777 + Rc[4] * t807 + Rc[5] * t838;
+  real t853 = t849 + (r[2] * t738 - r[0] * t748);
+  S_I[4] += t853;
+  real t858 = Rc[6] * t777 + Rc[7] * t807 + Rc[8] * t838;
+  real t862 = t858 + (r[0] * t743 - r[1] * t738);
+  S_I[5] += t862;
+  real t867 = Rc[3] * t678 + Rc[4] * t687 + Rc[5] * t697;
+  real t873 = Rc[3] * t687 + Rc[4] * t709 + Rc[5] * t719;
+  real t880 = Rc[3] * t697 + Rc[4] * t719 + Rc[5] * t734;
+  real t882 = Rc[3] * t867 + Rc[4] * t873 + Rc[5] * t880;
+  S_I[6] += t882;
+  real t887 = Rc[6] * t867 + Rc[7] * t873 + Rc[8] * t880;
+  S_I[7] += t887;
+  real t892 = Rc[3] * t756 + Rc[4] * t765 + Rc[5] * t775;
+  real t898 = Rc[3] * t786 + Rc[4] * t795 + Rc[5] * t805;
+  real t905 = Rc[3] * t817 + Rc[4] * t826 + Rc[5] * t836;
+  real t907 = Rc[0] * t892 + Rc[1] * t898 + Rc[2] * t905;
+  real t911 = t907 + (r[1] * t887 - r[2] * t882);
+  S_I[8] += t911;
+  real t916 = Rc[3] * t892 + Rc[4] * t898 + Rc[5] * t905;
+  real t917 = r[0] * t887;
+  real t919 = t916 + (t842 - t917);
+  S_I[9] += t919;
+  real t924 = Rc[6] * t892 + Rc[7] * t898 + Rc[8] * t905;
+  real t928 = t924 + (r[0] * t882 - r[1] * t743);
+  S_I[10] += t928;
+  real t948 = Rc[6] * (Rc[6] * t678 + Rc[7] * t687 + Rc[8] * t697) + Rc[7] * (Rc[6] * t687 + Rc[7] *
+    t709 + Rc[8] * t719) + Rc[8] * (Rc[6] * t697 + Rc[7] * t719 + Rc[8] * t734);
+  S_I[11] += t948;
+  real t953 = Rc[6] * t756 + Rc[7] * t765 + Rc[8] * t775;
+  real t959 = Rc[6] * t786 + Rc[7] * t795 + Rc[8] * t805;
+  real t966 = Rc[6] * t817 + Rc[7] * t826 + Rc[8] * t836;
+  real t968 = Rc[0] * t953 + Rc[1] * t959 + Rc[2] * t966;
+  real t972 = t968 + (r[1] * t948 - r[2] * t887);
+  S_I[12] += t972;
+  real t977 = Rc[3] * t953 + Rc[4] * t959 + Rc[5] * t966;
+  real t981 = t977 + (r[2] * t748 - r[0] * t948);
+  S_I[13] += t981;
+  real t988 = Rc[6] * t953 + Rc[7] * t959 + Rc[8] * t966 + (t917 - t841);
+  S_I[14] += t988;
+  real t996 = S[15] - (t48 * t587 + t589 * t590 + t594 * t595 + t601 * t602);
+  real t1005 = S[16] - (t48 * t615 + t589 * t618 + t594 * t623 + t601 * t630);
+  real t1015 = S[17] - (t48 * t643 + t589 * t646 + t594 * t651 + t601 * t658);
+  real t1017 = Rc[0] * t996 + Rc[1] * t1005 + Rc[2] * t1015;
+  real t1027 = S[18] - (t61 * t615 + t617 * t618 + t622 * t623 + t629 * t630);
+  real t1037 = S[19] - (t61 * t643 + t617 * t646 + t622 * t651 + t629 * t658);
+  real t1039 = Rc[0] * t1005 + Rc[1] * t1027 + Rc[2] * t1037;
+  real t1052 = S[20] - (t74 * t643 + t645 * t646 + t650 * t651 + t657 * t658);
+  real t1054 = Rc[0] * t1015 + Rc[1] * t1037 + Rc[2] * t1052;
+  S_I[15] += Rc[0] * t1017 + Rc[1] * t1039 + Rc[2] * t1054 + (r[1] * t972 - r[2] * t911 + (r[1] *
+    t968 - r[2] * t907));
+  S_I[16] += Rc[3] * t1017 + Rc[4] * t1039 + Rc[5] * t1054 + (r[1] * t981 - r[2] * t919 + (r[2] *
+    t840 - r[0] * t968));
+  S_I[17] += Rc[6] * t1017 + Rc[7] * t1039 + Rc[8] * t1054 + (r[1] * t988 - r[2] * t928 + (r[0] *
+    t907 - r[1] * t840));
+  real t1095 = Rc[3] * t996 + Rc[4] * t1005 + Rc[5] * t1015;
+  real t1101 = Rc[3] * t1005 + Rc[4] * t1027 + Rc[5] * t1037;
+  real t1108 = Rc[3] * t1015 + Rc[4] * t1037 + Rc[5] * t1052;
+  S_I[18] += Rc[3] * t1095 + Rc[4] * t1101 + Rc[5] * t1108 + (r[2] * t853 - r[0] * t981 + (r[2] *
+    t849 - r[0] * t977));
+  S_I[19] += Rc[6] * t1095 + Rc[7] * t1101 + Rc[8] * t1108 + (r[2] * t862 - r[0] * t988 + (r[0] *
+    t916 - r[1] * t849));
+  S_I[20] += Rc[6] * (Rc[6] * t996 + Rc[7] * t1005 + Rc[8] * t1015) + Rc[7] * (Rc[6] * t1005 + Rc[7]
+    * t1027 + Rc[8] * t1037) + Rc[8] * (Rc[6] * t1015 + Rc[7] * t1037 + Rc[8] * t1052) + (r[0] *
+    t928 - r[1] * t862 + (r[0] * t924 - r[1] * t858));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"J", 4, "kg*m2 or kg", 0, 0},
-    {"W", 16, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_factor_outputs[] = {
-    {"F", 16, "", 0, 0},
-    {"G", 24, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic4_factor_guards[] = {
-    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 4 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic4_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with 4 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the free coordinates
@@ -3763,217 +843,43 @@ static const mstmm_guard mstmm_sweep_generic4_factor_guards[] = {
  * out y[4] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic4_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[4] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[5] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[9] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[13] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[17] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[21] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[6] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[10] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[14] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[18] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[22] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = H[3] * e[0];
-    const real t37 = H[7] * e[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[11] * e[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[15] * e[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[19] * e[4];
-    const real t44 = t42 + t43;
-    const real t45 = H[23] * e[5];
-    const real t46 = t44 + t45;
-    const real t47 = tau[3] - t46;
-    y[3] = t47;
-    const real t48 = G[0] * t11;
-    const real t49 = G[6] * t23;
-    const real t50 = t48 + t49;
-    const real t51 = G[12] * t35;
-    const real t52 = t50 + t51;
-    const real t53 = G[18] * t47;
-    const real t54 = t52 + t53;
-    const real t55 = e[0] + t54;
-    const real t56 = Rc[0] * t55;
-    const real t57 = G[1] * t11;
-    const real t58 = G[7] * t23;
-    const real t59 = t57 + t58;
-    const real t60 = G[13] * t35;
-    const real t61 = t59 + t60;
-    const real t62 = G[19] * t47;
-    const real t63 = t61 + t62;
-    const real t64 = e[1] + t63;
-    const real t65 = Rc[1] * t64;
-    const real t66 = t56 + t65;
-    const real t67 = G[2] * t11;
-    const real t68 = G[8] * t23;
-    const real t69 = t67 + t68;
-    const real t70 = G[14] * t35;
-    const real t71 = t69 + t70;
-    const real t72 = G[20] * t47;
-    const real t73 = t71 + t72;
-    const real t74 = e[2] + t73;
-    const real t75 = Rc[2] * t74;
-    const real t76 = t66 + t75;
-    e_I[0] += t76;
-    const real t77 = Rc[3] * t55;
-    const real t78 = Rc[4] * t64;
-    const real t79 = t77 + t78;
-    const real t80 = Rc[5] * t74;
-    const real t81 = t79 + t80;
-    e_I[1] += t81;
-    const real t82 = Rc[6] * t55;
-    const real t83 = Rc[7] * t64;
-    const real t84 = t82 + t83;
-    const real t85 = Rc[8] * t74;
-    const real t86 = t84 + t85;
-    e_I[2] += t86;
-    const real t87 = G[3] * t11;
-    const real t88 = G[9] * t23;
-    const real t89 = t87 + t88;
-    const real t90 = G[15] * t35;
-    const real t91 = t89 + t90;
-    const real t92 = G[21] * t47;
-    const real t93 = t91 + t92;
-    const real t94 = e[3] + t93;
-    const real t95 = Rc[0] * t94;
-    const real t96 = G[4] * t11;
-    const real t97 = G[10] * t23;
-    const real t98 = t96 + t97;
-    const real t99 = G[16] * t35;
-    const real t100 = t98 + t99;
-    const real t101 = G[22] * t47;
-    const real t102 = t100 + t101;
-    const real t103 = e[4] + t102;
-    const real t104 = Rc[1] * t103;
-    const real t105 = t95 + t104;
-    const real t106 = G[5] * t11;
-    const real t107 = G[11] * t23;
-    const real t108 = t106 + t107;
-    const real t109 = G[17] * t35;
-    const real t110 = t108 + t109;
-    const real t111 = G[23] * t47;
-    const real t112 = t110 + t111;
-    const real t113 = e[5] + t112;
-    const real t114 = Rc[2] * t113;
-    const real t115 = t105 + t114;
-    const real t116 = Rc[6] * r[1];
-    const real t117 = Rc[3] * r[2];
-    const real t118 = t116 - t117;
-    const real t119 = t55 * t118;
-    const real t120 = Rc[7] * r[1];
-    const real t121 = Rc[4] * r[2];
-    const real t122 = t120 - t121;
-    const real t123 = t64 * t122;
-    const real t124 = t119 + t123;
-    const real t125 = Rc[8] * r[1];
-    const real t126 = Rc[5] * r[2];
-    const real t127 = t125 - t126;
-    const real t128 = t74 * t127;
-    const real t129 = t124 + t128;
-    const real t130 = t115 + t129;
-    e_I[3] += t130;
-    const real t131 = Rc[3] * t94;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[5] * t113;
-    const real t135 = t133 + t134;
-    const real t136 = Rc[0] * r[2];
-    const real t137 = Rc[6] * r[0];
-    const real t138 = t136 - t137;
-    const real t139 = t55 * t138;
-    const real t140 = Rc[1] * r[2];
-    const real t141 = Rc[7] * r[0];
-    const real t142 = t140 - t141;
-    const real t143 = t64 * t142;
-    const real t144 = t139 + t143;
-    const real t145 = Rc[2] * r[2];
-    const real t146 = Rc[8] * r[0];
-    const real t147 = t145 - t146;
-    const real t148 = t74 * t147;
-    const real t149 = t144 + t148;
-    const real t150 = t135 + t149;
-    e_I[4] += t150;
-    const real t151 = Rc[6] * t94;
-    const real t152 = Rc[7] * t103;
-    const real t153 = t151 + t152;
-    const real t154 = Rc[8] * t113;
-    const real t155 = t153 + t154;
-    const real t156 = Rc[3] * r[0];
-    const real t157 = Rc[0] * r[1];
-    const real t158 = t156 - t157;
-    const real t159 = t55 * t158;
-    const real t160 = Rc[4] * r[0];
-    const real t161 = Rc[1] * r[1];
-    const real t162 = t160 - t161;
-    const real t163 = t64 * t162;
-    const real t164 = t159 + t163;
-    const real t165 = Rc[5] * r[0];
-    const real t166 = Rc[2] * r[1];
-    const real t167 = t165 - t166;
-    const real t168 = t74 * t167;
-    const real t169 = t164 + t168;
-    const real t170 = t155 + t169;
-    e_I[5] += t170;
-    return 0;
+  real t11 = tau[0] - (H[0] * e[0] + H[4] * e[1] + H[8] * e[2] + H[12] * e[3] + H[16] * e[4] + H[20]
+    * e[5]);
+  y[0] = t11;
+  real t23 = tau[1] - (H[1] * e[0] + H[5] * e[1] + H[9] * e[2] + H[13] * e[3] + H[17] * e[4] + H[21]
+    * e[5]);
+  y[1] = t23;
+  real t35 = tau[2] - (H[2] * e[0] + H[6] * e[1] + H[10] * e[2] + H[14] * e[3] + H[18] * e[4] +
+    H[22] * e[5]);
+  y[2] = t35;
+  real t47 = tau[3] - (H[3] * e[0] + H[7] * e[1] + H[11] * e[2] + H[15] * e[3] + H[19] * e[4] +
+    H[23] * e[5]);
+  y[3] = t47;
+  real t55 = e[0] + (G[0] * t11 + G[6] * t23 + G[12] * t35 + G[18] * t47);
+  real t64 = e[1] + (G[1] * t11 + G[7] * t23 + G[13] * t35 + G[19] * t47);
+  real t74 = e[2] + (G[2] * t11 + G[8] * t23 + G[14] * t35 + G[20] * t47);
+  e_I[0] += Rc[0] * t55 + Rc[1] * t64 + Rc[2] * t74;
+  e_I[1] += Rc[3] * t55 + Rc[4] * t64 + Rc[5] * t74;
+  e_I[2] += Rc[6] * t55 + Rc[7] * t64 + Rc[8] * t74;
+  real t94 = e[3] + (G[3] * t11 + G[9] * t23 + G[15] * t35 + G[21] * t47);
+  real t103 = e[4] + (G[4] * t11 + G[10] * t23 + G[16] * t35 + G[22] * t47);
+  real t113 = e[5] + (G[5] * t11 + G[11] * t23 + G[17] * t35 + G[23] * t47);
+  e_I[3] += Rc[0] * t94 + Rc[1] * t103 + Rc[2] * t113 + (t55 * (Rc[6] * r[1] - Rc[3] * r[2]) + t64 *
+    (Rc[7] * r[1] - Rc[4] * r[2]) + t74 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t94 + Rc[4] * t103 + Rc[5] * t113 + (t55 * (Rc[0] * r[2] - Rc[6] * r[0]) + t64 *
+    (Rc[1] * r[2] - Rc[7] * r[0]) + t74 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t94 + Rc[7] * t103 + Rc[8] * t113 + (t55 * (Rc[3] * r[0] - Rc[0] * r[1]) + t64 *
+    (Rc[4] * r[0] - Rc[1] * r[1]) + t74 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"G", 24, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 4, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_column_load_outputs[] = {
-    {"y", 4, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 4 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][4] motion subspace of the free coordinates
@@ -3984,213 +890,47 @@ static const mstmm_port mstmm_sweep_generic4_column_load_outputs[] = {
  * out udot[4] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic4_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic4_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[4] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[5] * t2;
-    const real t4 = F[8] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[9] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[10] * t7;
-    const real t9 = F[12] * y[0];
-    const real t10 = y[3] - t9;
-    const real t11 = F[13] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = F[14] * t7;
-    const real t14 = t12 - t13;
-    const real t15 = F[15] * t14;
-    const real t16 = F[14] * t15;
-    const real t17 = t8 - t16;
-    const real t18 = F[9] * t17;
-    const real t19 = t3 - t18;
-    const real t20 = F[13] * t15;
-    const real t21 = t19 - t20;
-    const real t22 = F[4] * t21;
-    const real t23 = t0 - t22;
-    const real t24 = F[8] * t17;
-    const real t25 = t23 - t24;
-    const real t26 = F[12] * t15;
-    const real t27 = t25 - t26;
-    const real t28 = r[2] * delta_I[4];
-    const real t29 = r[1] * delta_I[5];
-    const real t30 = t28 - t29;
-    const real t31 = delta_I[0] + t30;
-    const real t32 = Rc[0] * t31;
-    const real t33 = r[0] * delta_I[5];
-    const real t34 = r[2] * delta_I[3];
-    const real t35 = t33 - t34;
-    const real t36 = delta_I[1] + t35;
-    const real t37 = Rc[3] * t36;
-    const real t38 = t32 + t37;
-    const real t39 = r[1] * delta_I[3];
-    const real t40 = r[0] * delta_I[4];
-    const real t41 = t39 - t40;
-    const real t42 = delta_I[2] + t41;
-    const real t43 = Rc[6] * t42;
-    const real t44 = t38 + t43;
-    const real t45 = G[0] * t44;
-    const real t46 = Rc[1] * t31;
-    const real t47 = Rc[4] * t36;
-    const real t48 = t46 + t47;
-    const real t49 = Rc[7] * t42;
-    const real t50 = t48 + t49;
-    const real t51 = G[1] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = Rc[2] * t31;
-    const real t54 = Rc[5] * t36;
-    const real t55 = t53 + t54;
-    const real t56 = Rc[8] * t42;
-    const real t57 = t55 + t56;
-    const real t58 = G[2] * t57;
-    const real t59 = t52 + t58;
-    const real t60 = Rc[0] * delta_I[3];
-    const real t61 = Rc[3] * delta_I[4];
-    const real t62 = t60 + t61;
-    const real t63 = Rc[6] * delta_I[5];
-    const real t64 = t62 + t63;
-    const real t65 = G[3] * t64;
-    const real t66 = t59 + t65;
-    const real t67 = Rc[1] * delta_I[3];
-    const real t68 = Rc[4] * delta_I[4];
-    const real t69 = t67 + t68;
-    const real t70 = Rc[7] * delta_I[5];
-    const real t71 = t69 + t70;
-    const real t72 = G[4] * t71;
-    const real t73 = t66 + t72;
-    const real t74 = Rc[2] * delta_I[3];
-    const real t75 = Rc[5] * delta_I[4];
-    const real t76 = t74 + t75;
-    const real t77 = Rc[8] * delta_I[5];
-    const real t78 = t76 + t77;
-    const real t79 = G[5] * t78;
-    const real t80 = t73 + t79;
-    const real t81 = t27 - t80;
-    udot[0] = t81;
-    const real t82 = G[6] * t44;
-    const real t83 = G[7] * t50;
-    const real t84 = t82 + t83;
-    const real t85 = G[8] * t57;
-    const real t86 = t84 + t85;
-    const real t87 = G[9] * t64;
-    const real t88 = t86 + t87;
-    const real t89 = G[10] * t71;
-    const real t90 = t88 + t89;
-    const real t91 = G[11] * t78;
-    const real t92 = t90 + t91;
-    const real t93 = t21 - t92;
-    udot[1] = t93;
-    const real t94 = G[12] * t44;
-    const real t95 = G[13] * t50;
-    const real t96 = t94 + t95;
-    const real t97 = G[14] * t57;
-    const real t98 = t96 + t97;
-    const real t99 = G[15] * t64;
-    const real t100 = t98 + t99;
-    const real t101 = G[16] * t71;
-    const real t102 = t100 + t101;
-    const real t103 = G[17] * t78;
-    const real t104 = t102 + t103;
-    const real t105 = t17 - t104;
-    udot[2] = t105;
-    const real t106 = G[18] * t44;
-    const real t107 = G[19] * t50;
-    const real t108 = t106 + t107;
-    const real t109 = G[20] * t57;
-    const real t110 = t108 + t109;
-    const real t111 = G[21] * t64;
-    const real t112 = t110 + t111;
-    const real t113 = G[22] * t71;
-    const real t114 = t112 + t113;
-    const real t115 = G[23] * t78;
-    const real t116 = t114 + t115;
-    const real t117 = t15 - t116;
-    udot[3] = t117;
-    const real t118 = H[0] * t81;
-    const real t119 = H[1] * t93;
-    const real t120 = t118 + t119;
-    const real t121 = H[2] * t105;
-    const real t122 = t120 + t121;
-    const real t123 = H[3] * t117;
-    const real t124 = t122 + t123;
-    const real t125 = t44 + t124;
-    delta[0] = t125;
-    const real t126 = H[4] * t81;
-    const real t127 = H[5] * t93;
-    const real t128 = t126 + t127;
-    const real t129 = H[6] * t105;
-    const real t130 = t128 + t129;
-    const real t131 = H[7] * t117;
-    const real t132 = t130 + t131;
-    const real t133 = t50 + t132;
-    delta[1] = t133;
-    const real t134 = H[8] * t81;
-    const real t135 = H[9] * t93;
-    const real t136 = t134 + t135;
-    const real t137 = H[10] * t105;
-    const real t138 = t136 + t137;
-    const real t139 = H[11] * t117;
-    const real t140 = t138 + t139;
-    const real t141 = t57 + t140;
-    delta[2] = t141;
-    const real t142 = H[12] * t81;
-    const real t143 = H[13] * t93;
-    const real t144 = t142 + t143;
-    const real t145 = H[14] * t105;
-    const real t146 = t144 + t145;
-    const real t147 = H[15] * t117;
-    const real t148 = t146 + t147;
-    const real t149 = t64 + t148;
-    delta[3] = t149;
-    const real t150 = H[16] * t81;
-    const real t151 = H[17] * t93;
-    const real t152 = t150 + t151;
-    const real t153 = H[18] * t105;
-    const real t154 = t152 + t153;
-    const real t155 = H[19] * t117;
-    const real t156 = t154 + t155;
-    const real t157 = t71 + t156;
-    delta[4] = t157;
-    const real t158 = H[20] * t81;
-    const real t159 = H[21] * t93;
-    const real t160 = t158 + t159;
-    const real t161 = H[22] * t105;
-    const real t162 = t160 + t161;
-    const real t163 = H[23] * t117;
-    const real t164 = t162 + t163;
-    const real t165 = t78 + t164;
-    delta[5] = t165;
-    return 0;
+  real t2 = y[1] - F[4] * y[0];
+  real t7 = y[2] - F[8] * y[0] - F[9] * t2;
+  real t15 = F[15] * (y[3] - F[12] * y[0] - F[13] * t2 - F[14] * t7);
+  real t17 = F[10] * t7 - F[14] * t15;
+  real t21 = F[5] * t2 - F[9] * t17 - F[13] * t15;
+  real t31 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t36 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t42 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t44 = Rc[0] * t31 + Rc[3] * t36 + Rc[6] * t42;
+  real t50 = Rc[1] * t31 + Rc[4] * t36 + Rc[7] * t42;
+  real t57 = Rc[2] * t31 + Rc[5] * t36 + Rc[8] * t42;
+  real t64 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t71 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t78 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t81 = F[0] * y[0] - F[4] * t21 - F[8] * t17 - F[12] * t15 - (G[0] * t44 + G[1] * t50 + G[2] *
+    t57 + G[3] * t64 + G[4] * t71 + G[5] * t78);
+  udot[0] = t81;
+  real t93 = t21 - (G[6] * t44 + G[7] * t50 + G[8] * t57 + G[9] * t64 + G[10] * t71 + G[11] * t78);
+  udot[1] = t93;
+  real t105 = t17 - (G[12] * t44 + G[13] * t50 + G[14] * t57 + G[15] * t64 + G[16] * t71 + G[17] *
+    t78);
+  udot[2] = t105;
+  real t117 = t15 - (G[18] * t44 + G[19] * t50 + G[20] * t57 + G[21] * t64 + G[22] * t71 + G[23] *
+    t78);
+  udot[3] = t117;
+  delta[0] = t44 + (H[0] * t81 + H[1] * t93 + H[2] * t105 + H[3] * t117);
+  delta[1] = t50 + (H[4] * t81 + H[5] * t93 + H[6] * t105 + H[7] * t117);
+  delta[2] = t57 + (H[8] * t81 + H[9] * t93 + H[10] * t105 + H[11] * t117);
+  delta[3] = t64 + (H[12] * t81 + H[13] * t93 + H[14] * t105 + H[15] * t117);
+  delta[4] = t71 + (H[16] * t81 + H[17] * t93 + H[18] * t105 + H[19] * t117);
+  delta[5] = t78 + (H[20] * t81 + H[21] * t93 + H[22] * t105 + H[23] * t117);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"F", 16, "", 0, 0},
-    {"G", 24, "", 0, 0},
-    {"y", 4, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_column_acceleration_outputs[] = {
-    {"udot", 4, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with 4 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6][4] motion subspace of the free coordinates
@@ -4206,1763 +946,617 @@ static const mstmm_port mstmm_sweep_generic4_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic4_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic4_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    const real t0 = H[8] * H[8];
-    const real t1 = H[0] * H[0];
-    const real t2 = H[4] * H[4];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 0.0 < floor_[0];
-    const real t6 = U[11] * U[11];
-    const real t7 = U[7] * U[7];
-    const real t8 = U[6] * U[6];
-    const real t9 = U[2] * U[2];
-    const real t10 = U[0] * U[0];
-    const real t11 = U[1] * U[1];
-    const real t12 = t10 + t11;
-    const real t13 = t9 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = t7 + t14;
-    const real t16 = t6 + t15;
-    const real t17 = ((real)1 / (real)300000000000000) * t16;
-    const real t18 = t5 != 0 ? floor_[0] : t17;
-    const real t19 = t4 * t18;
-    const real t20 = H[20] * H[20];
-    const real t21 = H[12] * H[12];
-    const real t22 = H[16] * H[16];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    const real t25 = 0.0 < floor_[1];
-    const real t26 = U[20] * U[20];
-    const real t27 = U[19] * U[19];
-    const real t28 = U[18] * U[18];
-    const real t29 = U[17] * U[17];
-    const real t30 = U[16] * U[16];
-    const real t31 = U[15] * U[15];
-    const real t32 = U[14] * U[14];
-    const real t33 = U[13] * U[13];
-    const real t34 = U[12] * U[12];
-    const real t35 = U[10] * U[10];
-    const real t36 = U[9] * U[9];
-    const real t37 = U[8] * U[8];
-    const real t38 = U[5] * U[5];
-    const real t39 = U[3] * U[3];
-    const real t40 = U[4] * U[4];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = t36 + t43;
-    const real t45 = t35 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = t33 + t46;
-    const real t48 = t32 + t47;
-    const real t49 = t31 + t48;
-    const real t50 = t30 + t49;
-    const real t51 = t29 + t50;
-    const real t52 = t28 + t51;
-    const real t53 = t27 + t52;
-    const real t54 = t26 + t53;
-    const real t55 = ((real)1 / (real)300000000000000) * t54;
-    const real t56 = t25 != 0 ? floor_[1] : t55;
-    const real t57 = t24 * t56;
-    const real t58 = t19 + t57;
-    const real t59 = H[20] * U[20];
-    const real t60 = t59 * t59;
-    const real t61 = H[16] * U[18];
-    const real t62 = H[20] * U[19];
-    const real t63 = t61 + t62;
-    const real t64 = t63 * t63;
-    const real t65 = H[12] * U[15];
-    const real t66 = H[16] * U[16];
-    const real t67 = t65 + t66;
-    const real t68 = H[20] * U[17];
-    const real t69 = t67 + t68;
-    const real t70 = t69 * t69;
-    const real t71 = H[8] * U[11];
-    const real t72 = H[12] * U[12];
-    const real t73 = t71 + t72;
-    const real t74 = H[16] * U[13];
-    const real t75 = t73 + t74;
-    const real t76 = H[20] * U[14];
-    const real t77 = t75 + t76;
-    const real t78 = t77 * t77;
-    const real t79 = H[4] * U[6];
-    const real t80 = H[8] * U[7];
-    const real t81 = t79 + t80;
-    const real t82 = H[12] * U[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[16] * U[9];
-    const real t85 = t83 + t84;
-    const real t86 = H[20] * U[10];
-    const real t87 = t85 + t86;
-    const real t88 = t87 * t87;
-    const real t89 = H[0] * U[0];
-    const real t90 = H[4] * U[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[8] * U[2];
-    const real t93 = t91 + t92;
-    const real t94 = H[12] * U[3];
-    const real t95 = t93 + t94;
-    const real t96 = H[16] * U[4];
-    const real t97 = t95 + t96;
-    const real t98 = H[20] * U[5];
-    const real t99 = t97 + t98;
-    const real t100 = t99 * t99;
-    const real t101 = J[0] + t100;
-    const real t102 = t88 + t101;
-    const real t103 = t78 + t102;
-    const real t104 = t70 + t103;
-    const real t105 = t64 + t104;
-    const real t106 = t60 + t105;
-    const real t107 = t58 < t106;
-    if (!(t107 != 0)) return 1; /* speed 1 of 4 moves no inertia: its acceleration is undetermined */
-    const real t108 = H[9] * H[9];
-    const real t109 = H[1] * H[1];
-    const real t110 = H[5] * H[5];
-    const real t111 = t109 + t110;
-    const real t112 = t108 + t111;
-    const real t113 = t18 * t112;
-    const real t114 = H[21] * H[21];
-    const real t115 = H[13] * H[13];
-    const real t116 = H[17] * H[17];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    const real t119 = t56 * t118;
-    const real t120 = t113 + t119;
-    const real t121 = H[21] * U[20];
-    const real t122 = t121 * t121;
-    const real t123 = H[17] * U[18];
-    const real t124 = H[21] * U[19];
-    const real t125 = t123 + t124;
-    const real t126 = t125 * t125;
-    const real t127 = H[13] * U[15];
-    const real t128 = H[17] * U[16];
-    const real t129 = t127 + t128;
-    const real t130 = H[21] * U[17];
-    const real t131 = t129 + t130;
-    const real t132 = t131 * t131;
-    const real t133 = H[9] * U[11];
-    const real t134 = H[13] * U[12];
-    const real t135 = t133 + t134;
-    const real t136 = H[17] * U[13];
-    const real t137 = t135 + t136;
-    const real t138 = H[21] * U[14];
-    const real t139 = t137 + t138;
-    const real t140 = t139 * t139;
-    const real t141 = H[5] * U[6];
-    const real t142 = H[9] * U[7];
-    const real t143 = t141 + t142;
-    const real t144 = H[13] * U[8];
-    const real t145 = t143 + t144;
-    const real t146 = H[17] * U[9];
-    const real t147 = t145 + t146;
-    const real t148 = H[21] * U[10];
-    const real t149 = t147 + t148;
-    const real t150 = t149 * t149;
-    const real t151 = H[1] * U[0];
-    const real t152 = H[5] * U[1];
-    const real t153 = t151 + t152;
-    const real t154 = H[9] * U[2];
-    const real t155 = t153 + t154;
-    const real t156 = H[13] * U[3];
-    const real t157 = t155 + t156;
-    const real t158 = H[17] * U[4];
-    const real t159 = t157 + t158;
-    const real t160 = H[21] * U[5];
-    const real t161 = t159 + t160;
-    const real t162 = t161 * t161;
-    const real t163 = J[1] + t162;
-    const real t164 = t150 + t163;
-    const real t165 = t140 + t164;
-    const real t166 = t132 + t165;
-    const real t167 = t126 + t166;
-    const real t168 = t122 + t167;
-    const real t169 = t120 < t168;
-    if (!(t169 != 0)) return 1; /* speed 2 of 4 moves no inertia: its acceleration is undetermined */
-    const real t170 = H[10] * H[10];
-    const real t171 = H[2] * H[2];
-    const real t172 = H[6] * H[6];
-    const real t173 = t171 + t172;
-    const real t174 = t170 + t173;
-    const real t175 = t18 * t174;
-    const real t176 = H[22] * H[22];
-    const real t177 = H[14] * H[14];
-    const real t178 = H[18] * H[18];
-    const real t179 = t177 + t178;
-    const real t180 = t176 + t179;
-    const real t181 = t56 * t180;
-    const real t182 = t175 + t181;
-    const real t183 = H[22] * U[20];
-    const real t184 = t183 * t183;
-    const real t185 = H[18] * U[18];
-    const real t186 = H[22] * U[19];
-    const real t187 = t185 + t186;
-    const real t188 = t187 * t187;
-    const real t189 = H[14] * U[15];
-    const real t190 = H[18] * U[16];
-    const real t191 = t189 + t190;
-    const real t192 = H[22] * U[17];
-    const real t193 = t191 + t192;
-    const real t194 = t193 * t193;
-    const real t195 = H[10] * U[11];
-    const real t196 = H[14] * U[12];
-    const real t197 = t195 + t196;
-    const real t198 = H[18] * U[13];
-    const real t199 = t197 + t198;
-    const real t200 = H[22] * U[14];
-    const real t201 = t199 + t200;
-    const real t202 = t201 * t201;
-    const real t203 = H[6] * U[6];
-    const real t204 = H[10] * U[7];
-    const real t205 = t203 + t204;
-    const real t206 = H[14] * U[8];
-    const real t207 = t205 + t206;
-    const real t208 = H[18] * U[9];
-    const real t209 = t207 + t208;
-    const real t210 = H[22] * U[10];
-    const real t211 = t209 + t210;
-    const real t212 = t211 * t211;
-    const real t213 = H[2] * U[0];
-    const real t214 = H[6] * U[1];
-    const real t215 = t213 + t214;
-    const real t216 = H[10] * U[2];
-    const real t217 = t215 + t216;
-    const real t218 = H[14] * U[3];
-    const real t219 = t217 + t218;
-    const real t220 = H[18] * U[4];
-    const real t221 = t219 + t220;
-    const real t222 = H[22] * U[5];
-    const real t223 = t221 + t222;
-    const real t224 = t223 * t223;
-    const real t225 = J[2] + t224;
-    const real t226 = t212 + t225;
-    const real t227 = t202 + t226;
-    const real t228 = t194 + t227;
-    const real t229 = t188 + t228;
-    const real t230 = t184 + t229;
-    const real t231 = t182 < t230;
-    if (!(t231 != 0)) return 1; /* speed 3 of 4 moves no inertia: its acceleration is undetermined */
-    const real t232 = H[11] * H[11];
-    const real t233 = H[3] * H[3];
-    const real t234 = H[7] * H[7];
-    const real t235 = t233 + t234;
-    const real t236 = t232 + t235;
-    const real t237 = t18 * t236;
-    const real t238 = H[23] * H[23];
-    const real t239 = H[15] * H[15];
-    const real t240 = H[19] * H[19];
-    const real t241 = t239 + t240;
-    const real t242 = t238 + t241;
-    const real t243 = t56 * t242;
-    const real t244 = t237 + t243;
-    const real t245 = H[23] * U[20];
-    const real t246 = t245 * t245;
-    const real t247 = H[19] * U[18];
-    const real t248 = H[23] * U[19];
-    const real t249 = t247 + t248;
-    const real t250 = t249 * t249;
-    const real t251 = H[15] * U[15];
-    const real t252 = H[19] * U[16];
-    const real t253 = t251 + t252;
-    const real t254 = H[23] * U[17];
-    const real t255 = t253 + t254;
-    const real t256 = t255 * t255;
-    const real t257 = H[11] * U[11];
-    const real t258 = H[15] * U[12];
-    const real t259 = t257 + t258;
-    const real t260 = H[19] * U[13];
-    const real t261 = t259 + t260;
-    const real t262 = H[23] * U[14];
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t263;
-    const real t265 = H[7] * U[6];
-    const real t266 = H[11] * U[7];
-    const real t267 = t265 + t266;
-    const real t268 = H[15] * U[8];
-    const real t269 = t267 + t268;
-    const real t270 = H[19] * U[9];
-    const real t271 = t269 + t270;
-    const real t272 = H[23] * U[10];
-    const real t273 = t271 + t272;
-    const real t274 = t273 * t273;
-    const real t275 = H[3] * U[0];
-    const real t276 = H[7] * U[1];
-    const real t277 = t275 + t276;
-    const real t278 = H[11] * U[2];
-    const real t279 = t277 + t278;
-    const real t280 = H[15] * U[3];
-    const real t281 = t279 + t280;
-    const real t282 = H[19] * U[4];
-    const real t283 = t281 + t282;
-    const real t284 = H[23] * U[5];
-    const real t285 = t283 + t284;
-    const real t286 = t285 * t285;
-    const real t287 = J[3] + t286;
-    const real t288 = t274 + t287;
-    const real t289 = t264 + t288;
-    const real t290 = t256 + t289;
-    const real t291 = t250 + t290;
-    const real t292 = t246 + t291;
-    const real t293 = t244 < t292;
-    if (!(t293 != 0)) return 1; /* speed 4 of 4 moves no inertia: its acceleration is undetermined */
-    const real t294 = 1e-26 * t106;
-    const real t295 = sqrt(J[0]);
-    const real t296 = t295 * t295;
-    const real t297 = t60 + t296;
-    const real t298 = sqrt(t297);
-    const real t299 = t298 * t298;
-    const real t300 = t64 + t299;
-    const real t301 = sqrt(t300);
-    const real t302 = t301 * t301;
-    const real t303 = t70 + t302;
-    const real t304 = sqrt(t303);
-    const real t305 = t304 * t304;
-    const real t306 = t78 + t305;
-    const real t307 = sqrt(t306);
-    const real t308 = t307 * t307;
-    const real t309 = t88 + t308;
-    const real t310 = sqrt(t309);
-    const real t311 = t310 * t310;
-    const real t312 = t100 + t311;
-    const real t313 = sqrt(t312);
-    const real t314 = t313 * t313;
-    const real t315 = t294 < t314;
-    if (!(t315 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t316 = 1e-26 * t168;
-    const real t317 = 0.0 < t310;
-    const real t318 = t317 != 0 ? t310 : 1.0;
-    const real t319 = 1.0 / t318;
-    const real t320 = t87 * t319;
-    const real t321 = t317 != 0 ? t320 : 1.0;
-    const real t322 = t149 * t321;
-    const real t323 = 0.0 < t307;
-    const real t324 = t323 != 0 ? t307 : 1.0;
-    const real t325 = 1.0 / t324;
-    const real t326 = t77 * t325;
-    const real t327 = t323 != 0 ? t326 : 1.0;
-    const real t328 = t139 * t327;
-    const real t329 = 0.0 < t304;
-    const real t330 = t329 != 0 ? t304 : 1.0;
-    const real t331 = 1.0 / t330;
-    const real t332 = t69 * t331;
-    const real t333 = t329 != 0 ? t332 : 1.0;
-    const real t334 = t131 * t333;
-    const real t335 = 0.0 < t301;
-    const real t336 = t335 != 0 ? t301 : 1.0;
-    const real t337 = 1.0 / t336;
-    const real t338 = t63 * t337;
-    const real t339 = t335 != 0 ? t338 : 1.0;
-    const real t340 = t125 * t339;
-    const real t341 = 0.0 < t298;
-    const real t342 = t341 != 0 ? t298 : 1.0;
-    const real t343 = 1.0 / t342;
-    const real t344 = t59 * t343;
-    const real t345 = t341 != 0 ? t344 : 1.0;
-    const real t346 = t121 * t345;
-    const real t347 = t298 * t337;
-    const real t348 = t346 * t347;
-    const real t349 = t340 + t348;
-    const real t350 = t301 * t331;
-    const real t351 = t349 * t350;
-    const real t352 = t334 + t351;
-    const real t353 = t304 * t325;
-    const real t354 = t352 * t353;
-    const real t355 = t328 + t354;
-    const real t356 = t307 * t319;
-    const real t357 = t355 * t356;
-    const real t358 = t322 + t357;
-    const real t359 = 0.0 < t313;
-    const real t360 = t359 != 0 ? t313 : 1.0;
-    const real t361 = 1.0 / t360;
-    const real t362 = t99 * t361;
-    const real t363 = t359 != 0 ? t362 : 1.0;
-    const real t364 = t358 * t363;
-    const real t365 = t310 * t361;
-    const real t366 = t161 * t365;
-    const real t367 = t364 - t366;
-    const real t368 = t367 * t367;
-    const real t369 = t355 * t321;
-    const real t370 = t149 * t356;
-    const real t371 = t369 - t370;
-    const real t372 = t371 * t371;
-    const real t373 = t352 * t327;
-    const real t374 = t139 * t353;
-    const real t375 = t373 - t374;
-    const real t376 = t375 * t375;
-    const real t377 = t349 * t333;
-    const real t378 = t131 * t350;
-    const real t379 = t377 - t378;
-    const real t380 = t379 * t379;
-    const real t381 = t346 * t339;
-    const real t382 = t125 * t347;
-    const real t383 = t381 - t382;
-    const real t384 = t383 * t383;
-    const real t385 = t295 * t343;
-    const real t386 = t121 * t385;
-    const real t387 = t386 * t386;
-    const real t388 = sqrt(J[1]);
-    const real t389 = t388 * t388;
-    const real t390 = t387 + t389;
-    const real t391 = sqrt(t390);
-    const real t392 = t391 * t391;
-    const real t393 = t384 + t392;
-    const real t394 = sqrt(t393);
-    const real t395 = t394 * t394;
-    const real t396 = t380 + t395;
-    const real t397 = sqrt(t396);
-    const real t398 = t397 * t397;
-    const real t399 = t376 + t398;
-    const real t400 = sqrt(t399);
-    const real t401 = t400 * t400;
-    const real t402 = t372 + t401;
-    const real t403 = sqrt(t402);
-    const real t404 = t403 * t403;
-    const real t405 = t368 + t404;
-    const real t406 = sqrt(t405);
-    const real t407 = t406 * t406;
-    const real t408 = t316 < t407;
-    if (!(t408 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t409 = 1e-26 * t230;
-    const real t410 = t201 * t327;
-    const real t411 = t193 * t333;
-    const real t412 = t187 * t339;
-    const real t413 = t183 * t345;
-    const real t414 = t413 * t347;
-    const real t415 = t412 + t414;
-    const real t416 = t415 * t350;
-    const real t417 = t411 + t416;
-    const real t418 = t417 * t353;
-    const real t419 = t410 + t418;
-    const real t420 = t419 * t321;
-    const real t421 = t211 * t356;
-    const real t422 = t420 - t421;
-    const real t423 = 0.0 < t403;
-    const real t424 = t423 != 0 ? t403 : 1.0;
-    const real t425 = 1.0 / t424;
-    const real t426 = t371 * t425;
-    const real t427 = t423 != 0 ? t426 : 1.0;
-    const real t428 = t422 * t427;
-    const real t429 = t417 * t327;
-    const real t430 = t201 * t353;
-    const real t431 = t429 - t430;
-    const real t432 = 0.0 < t400;
-    const real t433 = t432 != 0 ? t400 : 1.0;
-    const real t434 = 1.0 / t433;
-    const real t435 = t375 * t434;
-    const real t436 = t432 != 0 ? t435 : 1.0;
-    const real t437 = t431 * t436;
-    const real t438 = t415 * t333;
-    const real t439 = t193 * t350;
-    const real t440 = t438 - t439;
-    const real t441 = 0.0 < t397;
-    const real t442 = t441 != 0 ? t397 : 1.0;
-    const real t443 = 1.0 / t442;
-    const real t444 = t379 * t443;
-    const real t445 = t441 != 0 ? t444 : 1.0;
-    const real t446 = t440 * t445;
-    const real t447 = t413 * t339;
-    const real t448 = t187 * t347;
-    const real t449 = t447 - t448;
-    const real t450 = 0.0 < t394;
-    const real t451 = t450 != 0 ? t394 : 1.0;
-    const real t452 = 1.0 / t451;
-    const real t453 = t383 * t452;
-    const real t454 = t450 != 0 ? t453 : 1.0;
-    const real t455 = t449 * t454;
-    const real t456 = t183 * t385;
-    const real t457 = 0.0 < t391;
-    const real t458 = t457 != 0 ? t391 : 1.0;
-    const real t459 = 1.0 / t458;
-    const real t460 = t386 * t459;
-    const real t461 = -t460;
-    const real t462 = t457 != 0 ? t461 : 1.0;
-    const real t463 = t456 * t462;
-    const real t464 = t391 * t452;
-    const real t465 = t463 * t464;
-    const real t466 = t455 - t465;
-    const real t467 = t394 * t443;
-    const real t468 = t466 * t467;
-    const real t469 = t446 + t468;
-    const real t470 = t397 * t434;
-    const real t471 = t469 * t470;
-    const real t472 = t437 + t471;
-    const real t473 = t400 * t425;
-    const real t474 = t472 * t473;
-    const real t475 = t428 + t474;
-    const real t476 = 0.0 < t406;
-    const real t477 = t476 != 0 ? t406 : 1.0;
-    const real t478 = 1.0 / t477;
-    const real t479 = t367 * t478;
-    const real t480 = t476 != 0 ? t479 : 1.0;
-    const real t481 = t475 * t480;
-    const real t482 = t211 * t321;
-    const real t483 = t419 * t356;
-    const real t484 = t482 + t483;
-    const real t485 = t484 * t363;
-    const real t486 = t223 * t365;
-    const real t487 = t485 - t486;
-    const real t488 = t403 * t478;
-    const real t489 = t487 * t488;
-    const real t490 = t481 - t489;
-    const real t491 = t490 * t490;
-    const real t492 = t472 * t427;
-    const real t493 = t422 * t473;
-    const real t494 = t492 - t493;
-    const real t495 = t494 * t494;
-    const real t496 = t469 * t436;
-    const real t497 = t431 * t470;
-    const real t498 = t496 - t497;
-    const real t499 = t498 * t498;
-    const real t500 = t466 * t445;
-    const real t501 = t440 * t467;
-    const real t502 = t500 - t501;
-    const real t503 = t502 * t502;
-    const real t504 = t463 * t454;
-    const real t505 = t449 * t464;
-    const real t506 = t504 + t505;
-    const real t507 = t506 * t506;
-    const real t508 = t388 * t459;
-    const real t509 = t456 * t508;
-    const real t510 = t509 * t509;
-    const real t511 = sqrt(J[2]);
-    const real t512 = t511 * t511;
-    const real t513 = t510 + t512;
-    const real t514 = sqrt(t513);
-    const real t515 = t514 * t514;
-    const real t516 = t507 + t515;
-    const real t517 = sqrt(t516);
-    const real t518 = t517 * t517;
-    const real t519 = t503 + t518;
-    const real t520 = sqrt(t519);
-    const real t521 = t520 * t520;
-    const real t522 = t499 + t521;
-    const real t523 = sqrt(t522);
-    const real t524 = t523 * t523;
-    const real t525 = t495 + t524;
-    const real t526 = sqrt(t525);
-    const real t527 = t526 * t526;
-    const real t528 = t491 + t527;
-    const real t529 = sqrt(t528);
-    const real t530 = t529 * t529;
-    const real t531 = t409 < t530;
-    if (!(t531 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t532 = 1e-26 * t292;
-    const real t533 = t255 * t333;
-    const real t534 = t249 * t339;
-    const real t535 = t245 * t345;
-    const real t536 = t535 * t347;
-    const real t537 = t534 + t536;
-    const real t538 = t537 * t350;
-    const real t539 = t533 + t538;
-    const real t540 = t539 * t327;
-    const real t541 = t263 * t353;
-    const real t542 = t540 - t541;
-    const real t543 = t542 * t436;
-    const real t544 = t537 * t333;
-    const real t545 = t255 * t350;
-    const real t546 = t544 - t545;
-    const real t547 = t546 * t445;
-    const real t548 = t535 * t339;
-    const real t549 = t249 * t347;
-    const real t550 = t548 - t549;
-    const real t551 = t550 * t454;
-    const real t552 = t245 * t385;
-    const real t553 = t552 * t462;
-    const real t554 = t553 * t464;
-    const real t555 = t551 - t554;
-    const real t556 = t555 * t467;
-    const real t557 = t547 + t556;
-    const real t558 = t557 * t470;
-    const real t559 = t543 + t558;
-    const real t560 = t559 * t427;
-    const real t561 = t263 * t327;
-    const real t562 = t539 * t353;
-    const real t563 = t561 + t562;
-    const real t564 = t563 * t321;
-    const real t565 = t273 * t356;
-    const real t566 = t564 - t565;
-    const real t567 = t566 * t473;
-    const real t568 = t560 - t567;
-    const real t569 = 0.0 < t526;
-    const real t570 = t569 != 0 ? t526 : 1.0;
-    const real t571 = 1.0 / t570;
-    const real t572 = t494 * t571;
-    const real t573 = t569 != 0 ? t572 : 1.0;
-    const real t574 = t568 * t573;
-    const real t575 = t557 * t436;
-    const real t576 = t542 * t470;
-    const real t577 = t575 - t576;
-    const real t578 = 0.0 < t523;
-    const real t579 = t578 != 0 ? t523 : 1.0;
-    const real t580 = 1.0 / t579;
-    const real t581 = t498 * t580;
-    const real t582 = t578 != 0 ? t581 : 1.0;
-    const real t583 = t577 * t582;
-    const real t584 = t555 * t445;
-    const real t585 = t546 * t467;
-    const real t586 = t584 - t585;
-    const real t587 = 0.0 < t520;
-    const real t588 = t587 != 0 ? t520 : 1.0;
-    const real t589 = 1.0 / t588;
-    const real t590 = t502 * t589;
-    const real t591 = t587 != 0 ? t590 : 1.0;
-    const real t592 = t586 * t591;
-    const real t593 = t552 * t508;
-    const real t594 = 0.0 < t514;
-    const real t595 = t594 != 0 ? t514 : 1.0;
-    const real t596 = 1.0 / t595;
-    const real t597 = t509 * t596;
-    const real t598 = t594 != 0 ? t597 : 1.0;
-    const real t599 = t593 * t598;
-    const real t600 = 0.0 < t517;
-    const real t601 = t600 != 0 ? t517 : 1.0;
-    const real t602 = 1.0 / t601;
-    const real t603 = t514 * t602;
-    const real t604 = t599 * t603;
-    const real t605 = t553 * t454;
-    const real t606 = t550 * t464;
-    const real t607 = t605 + t606;
-    const real t608 = t506 * t602;
-    const real t609 = -t608;
-    const real t610 = t600 != 0 ? t609 : 1.0;
-    const real t611 = t607 * t610;
-    const real t612 = t604 - t611;
-    const real t613 = t517 * t589;
-    const real t614 = t612 * t613;
-    const real t615 = t592 + t614;
-    const real t616 = t520 * t580;
-    const real t617 = t615 * t616;
-    const real t618 = t583 + t617;
-    const real t619 = t523 * t571;
-    const real t620 = t618 * t619;
-    const real t621 = t574 + t620;
-    const real t622 = 0.0 < t529;
-    const real t623 = t622 != 0 ? t529 : 1.0;
-    const real t624 = 1.0 / t623;
-    const real t625 = t490 * t624;
-    const real t626 = t622 != 0 ? t625 : 1.0;
-    const real t627 = t621 * t626;
-    const real t628 = t566 * t427;
-    const real t629 = t559 * t473;
-    const real t630 = t628 + t629;
-    const real t631 = t630 * t480;
-    const real t632 = t273 * t321;
-    const real t633 = t563 * t356;
-    const real t634 = t632 + t633;
-    const real t635 = t634 * t363;
-    const real t636 = t285 * t365;
-    const real t637 = t635 - t636;
-    const real t638 = t637 * t488;
-    const real t639 = t631 - t638;
-    const real t640 = t526 * t624;
-    const real t641 = t639 * t640;
-    const real t642 = t627 - t641;
-    const real t643 = t642 * t642;
-    const real t644 = t618 * t573;
-    const real t645 = t568 * t619;
-    const real t646 = t644 - t645;
-    const real t647 = t646 * t646;
-    const real t648 = t615 * t582;
-    const real t649 = t577 * t616;
-    const real t650 = t648 - t649;
-    const real t651 = t650 * t650;
-    const real t652 = t612 * t591;
-    const real t653 = t586 * t613;
-    const real t654 = t652 - t653;
-    const real t655 = t654 * t654;
-    const real t656 = t599 * t610;
-    const real t657 = t607 * t603;
-    const real t658 = t656 + t657;
-    const real t659 = t658 * t658;
-    const real t660 = t511 * t596;
-    const real t661 = t593 * t660;
-    const real t662 = t661 * t661;
-    const real t663 = sqrt(J[3]);
-    const real t664 = t663 * t663;
-    const real t665 = t662 + t664;
-    const real t666 = sqrt(t665);
-    const real t667 = t666 * t666;
-    const real t668 = t659 + t667;
-    const real t669 = sqrt(t668);
-    const real t670 = t669 * t669;
-    const real t671 = t655 + t670;
-    const real t672 = sqrt(t671);
-    const real t673 = t672 * t672;
-    const real t674 = t651 + t673;
-    const real t675 = sqrt(t674);
-    const real t676 = t675 * t675;
-    const real t677 = t647 + t676;
-    const real t678 = sqrt(t677);
-    const real t679 = t678 * t678;
-    const real t680 = t643 + t679;
-    const real t681 = sqrt(t680);
-    const real t682 = t681 * t681;
-    const real t683 = t532 < t682;
-    if (!(t683 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t684 = U[0] * t363;
-    const real t685 = 1.0 / t313;
-    const real t686 = t684 * t685;
-    const real t687 = t161 * t363;
-    const real t688 = t358 * t365;
-    const real t689 = t687 + t688;
-    const real t690 = t689 * t685;
-    const real t691 = t637 * t480;
-    const real t692 = t630 * t488;
-    const real t693 = t691 + t692;
-    const real t694 = 1.0 / t406;
-    const real t695 = t693 * t694;
-    const real t696 = U[0] * t365;
-    const real t697 = t696 * t488;
-    const real t698 = t697 * t640;
-    const real t699 = 0.0 < t681;
-    const real t700 = t699 != 0 ? t681 : 1.0;
-    const real t701 = 1.0 / t700;
-    const real t702 = t642 * t701;
-    const real t703 = t699 != 0 ? t702 : 1.0;
-    const real t704 = t698 * t703;
-    const real t705 = 1.0 / t681;
-    const real t706 = t704 * t705;
-    const real t707 = t695 * t706;
-    const real t708 = t696 * t480;
-    const real t709 = t708 * t694;
-    const real t710 = t487 * t480;
-    const real t711 = t475 * t488;
-    const real t712 = t710 + t711;
-    const real t713 = t712 * t694;
-    const real t714 = t697 * t626;
-    const real t715 = 1.0 / t529;
-    const real t716 = t714 * t715;
-    const real t717 = t639 * t626;
-    const real t718 = t621 * t640;
-    const real t719 = t717 + t718;
-    const real t720 = t719 * t715;
-    const real t721 = t720 * t706;
-    const real t722 = t716 + t721;
-    const real t723 = t713 * t722;
-    const real t724 = t709 + t723;
-    const real t725 = t707 - t724;
-    const real t726 = t690 * t725;
-    const real t727 = t686 - t726;
-    const real t728 = t223 * t363;
-    const real t729 = t484 * t365;
-    const real t730 = t728 + t729;
-    const real t731 = t730 * t685;
-    const real t732 = t731 * t722;
-    const real t733 = t727 - t732;
-    const real t734 = t285 * t363;
-    const real t735 = t634 * t365;
-    const real t736 = t734 + t735;
-    const real t737 = t736 * t685;
-    const real t738 = t737 * t706;
-    const real t739 = t733 + t738;
-    G[0] = t739;
-    const real t740 = U[1] * t363;
-    const real t741 = U[6] * t321;
-    const real t742 = t741 * t365;
-    const real t743 = t740 + t742;
-    const real t744 = t743 * t685;
-    const real t745 = t741 * t363;
-    const real t746 = U[1] * t365;
-    const real t747 = t745 - t746;
-    const real t748 = t747 * t480;
-    const real t749 = U[6] * t356;
-    const real t750 = t749 * t427;
-    const real t751 = t750 * t488;
-    const real t752 = t748 - t751;
-    const real t753 = t752 * t694;
-    const real t754 = t749 * t473;
-    const real t755 = t754 * t573;
-    const real t756 = t755 * t640;
-    const real t757 = t750 * t480;
-    const real t758 = t747 * t488;
-    const real t759 = t757 + t758;
-    const real t760 = t759 * t626;
-    const real t761 = t756 - t760;
-    const real t762 = t761 * t715;
-    const real t763 = t755 * t626;
-    const real t764 = t759 * t640;
-    const real t765 = t763 + t764;
-    const real t766 = t765 * t703;
-    const real t767 = t754 * t619;
-    const real t768 = 0.0 < t678;
-    const real t769 = t768 != 0 ? t678 : 1.0;
-    const real t770 = 1.0 / t769;
-    const real t771 = t646 * t770;
-    const real t772 = t768 != 0 ? t771 : 1.0;
-    const real t773 = t767 * t772;
-    const real t774 = t678 * t701;
-    const real t775 = t773 * t774;
-    const real t776 = t766 - t775;
-    const real t777 = t776 * t705;
-    const real t778 = t720 * t777;
-    const real t779 = t762 - t778;
-    const real t780 = t713 * t779;
-    const real t781 = t753 - t780;
-    const real t782 = t695 * t777;
-    const real t783 = t781 - t782;
-    const real t784 = t690 * t783;
-    const real t785 = t744 - t784;
-    const real t786 = t731 * t779;
-    const real t787 = t785 - t786;
-    const real t788 = t737 * t777;
-    const real t789 = t787 - t788;
-    G[1] = t789;
-    const real t790 = U[2] * t363;
-    const real t791 = U[7] * t321;
-    const real t792 = U[11] * t327;
-    const real t793 = t792 * t356;
-    const real t794 = t791 + t793;
-    const real t795 = t794 * t365;
-    const real t796 = t790 + t795;
-    const real t797 = t796 * t685;
-    const real t798 = t794 * t363;
-    const real t799 = U[2] * t365;
-    const real t800 = t798 - t799;
-    const real t801 = t800 * t480;
-    const real t802 = t792 * t321;
-    const real t803 = U[7] * t356;
-    const real t804 = t802 - t803;
-    const real t805 = t804 * t427;
-    const real t806 = U[11] * t353;
-    const real t807 = t806 * t436;
-    const real t808 = t807 * t473;
-    const real t809 = t805 - t808;
-    const real t810 = t809 * t488;
-    const real t811 = t801 + t810;
-    const real t812 = t811 * t694;
-    const real t813 = t809 * t480;
-    const real t814 = t800 * t488;
-    const real t815 = t813 - t814;
-    const real t816 = t815 * t626;
-    const real t817 = t806 * t470;
-    const real t818 = t817 * t582;
-    const real t819 = t818 * t619;
-    const real t820 = t807 * t427;
-    const real t821 = t804 * t473;
-    const real t822 = t820 + t821;
-    const real t823 = t822 * t573;
-    const real t824 = t819 - t823;
-    const real t825 = t824 * t640;
-    const real t826 = t816 + t825;
-    const real t827 = t826 * t715;
-    const real t828 = t824 * t626;
-    const real t829 = t815 * t640;
-    const real t830 = t828 - t829;
-    const real t831 = t830 * t703;
-    const real t832 = t818 * t573;
-    const real t833 = t822 * t619;
-    const real t834 = t832 + t833;
-    const real t835 = t834 * t772;
-    const real t836 = t817 * t616;
-    const real t837 = 0.0 < t675;
-    const real t838 = t837 != 0 ? t675 : 1.0;
-    const real t839 = 1.0 / t838;
-    const real t840 = t650 * t839;
-    const real t841 = t837 != 0 ? t840 : 1.0;
-    const real t842 = t836 * t841;
-    const real t843 = t675 * t770;
-    const real t844 = t842 * t843;
-    const real t845 = t835 - t844;
-    const real t846 = t845 * t774;
-    const real t847 = t831 + t846;
-    const real t848 = t847 * t705;
-    const real t849 = t720 * t848;
-    const real t850 = t827 - t849;
-    const real t851 = t713 * t850;
-    const real t852 = t812 - t851;
-    const real t853 = t695 * t848;
-    const real t854 = t852 - t853;
-    const real t855 = t690 * t854;
-    const real t856 = t797 - t855;
-    const real t857 = t731 * t850;
-    const real t858 = t856 - t857;
-    const real t859 = t737 * t848;
-    const real t860 = t858 - t859;
-    G[2] = t860;
-    const real t861 = U[3] * t363;
-    const real t862 = U[8] * t321;
-    const real t863 = U[12] * t327;
-    const real t864 = U[15] * t333;
-    const real t865 = t864 * t353;
-    const real t866 = t863 + t865;
-    const real t867 = t866 * t356;
-    const real t868 = t862 + t867;
-    const real t869 = t868 * t365;
-    const real t870 = t861 + t869;
-    const real t871 = t870 * t685;
-    const real t872 = t868 * t363;
-    const real t873 = U[3] * t365;
-    const real t874 = t872 - t873;
-    const real t875 = t874 * t480;
-    const real t876 = t866 * t321;
-    const real t877 = U[8] * t356;
-    const real t878 = t876 - t877;
-    const real t879 = t878 * t427;
-    const real t880 = t864 * t327;
-    const real t881 = U[12] * t353;
-    const real t882 = t880 - t881;
-    const real t883 = t882 * t436;
-    const real t884 = U[15] * t350;
-    const real t885 = t884 * t445;
-    const real t886 = t885 * t470;
-    const real t887 = t883 - t886;
-    const real t888 = t887 * t473;
-    const real t889 = t879 + t888;
-    const real t890 = t889 * t488;
-    const real t891 = t875 + t890;
-    const real t892 = t891 * t694;
-    const real t893 = t889 * t480;
-    const real t894 = t874 * t488;
-    const real t895 = t893 - t894;
-    const real t896 = t895 * t626;
-    const real t897 = t887 * t427;
-    const real t898 = t878 * t473;
-    const real t899 = t897 - t898;
-    const real t900 = t899 * t573;
-    const real t901 = t884 * t467;
-    const real t902 = t901 * t591;
-    const real t903 = t902 * t616;
-    const real t904 = t885 * t436;
-    const real t905 = t882 * t470;
-    const real t906 = t904 + t905;
-    const real t907 = t906 * t582;
-    const real t908 = t903 - t907;
-    const real t909 = t908 * t619;
-    const real t910 = t900 + t909;
-    const real t911 = t910 * t640;
-    const real t912 = t896 + t911;
-    const real t913 = t912 * t715;
-    const real t914 = t910 * t626;
-    const real t915 = t895 * t640;
-    const real t916 = t914 - t915;
-    const real t917 = t916 * t703;
-    const real t918 = t908 * t573;
-    const real t919 = t899 * t619;
-    const real t920 = t918 - t919;
-    const real t921 = t920 * t772;
-    const real t922 = t902 * t582;
-    const real t923 = t906 * t616;
-    const real t924 = t922 + t923;
-    const real t925 = t924 * t841;
-    const real t926 = t901 * t613;
-    const real t927 = 0.0 < t672;
-    const real t928 = t927 != 0 ? t672 : 1.0;
-    const real t929 = 1.0 / t928;
-    const real t930 = t654 * t929;
-    const real t931 = t927 != 0 ? t930 : 1.0;
-    const real t932 = t926 * t931;
-    const real t933 = t672 * t839;
-    const real t934 = t932 * t933;
-    const real t935 = t925 - t934;
-    const real t936 = t935 * t843;
-    const real t937 = t921 + t936;
-    const real t938 = t937 * t774;
-    const real t939 = t917 + t938;
-    const real t940 = t939 * t705;
-    const real t941 = t720 * t940;
-    const real t942 = t913 - t941;
-    const real t943 = t713 * t942;
-    const real t944 = t892 - t943;
-    const real t945 = t695 * t940;
-    const real t946 = t944 - t945;
-    const real t947 = t690 * t946;
-    const real t948 = t871 - t947;
-    const real t949 = t731 * t942;
-    const real t950 = t948 - t949;
-    const real t951 = t737 * t940;
-    const real t952 = t950 - t951;
-    G[3] = t952;
-    const real t953 = U[4] * t363;
-    const real t954 = U[9] * t321;
-    const real t955 = U[13] * t327;
-    const real t956 = U[16] * t333;
-    const real t957 = U[18] * t339;
-    const real t958 = t957 * t350;
-    const real t959 = t956 + t958;
-    const real t960 = t959 * t353;
-    const real t961 = t955 + t960;
-    const real t962 = t961 * t356;
-    const real t963 = t954 + t962;
-    const real t964 = t963 * t365;
-    const real t965 = t953 + t964;
-    const real t966 = t965 * t685;
-    const real t967 = t963 * t363;
-    const real t968 = U[4] * t365;
-    const real t969 = t967 - t968;
-    const real t970 = t969 * t480;
-    const real t971 = t961 * t321;
-    const real t972 = U[9] * t356;
-    const real t973 = t971 - t972;
-    const real t974 = t973 * t427;
-    const real t975 = t959 * t327;
-    const real t976 = U[13] * t353;
-    const real t977 = t975 - t976;
-    const real t978 = t977 * t436;
-    const real t979 = t957 * t333;
-    const real t980 = U[16] * t350;
-    const real t981 = t979 - t980;
-    const real t982 = t981 * t445;
-    const real t983 = U[18] * t347;
-    const real t984 = t983 * t454;
-    const real t985 = t984 * t467;
-    const real t986 = t982 - t985;
-    const real t987 = t986 * t470;
-    const real t988 = t978 + t987;
-    const real t989 = t988 * t473;
-    const real t990 = t974 + t989;
-    const real t991 = t990 * t488;
-    const real t992 = t970 + t991;
-    const real t993 = t992 * t694;
-    const real t994 = t990 * t480;
-    const real t995 = t969 * t488;
-    const real t996 = t994 - t995;
-    const real t997 = t996 * t626;
-    const real t998 = t988 * t427;
-    const real t999 = t973 * t473;
-    const real t1000 = t998 - t999;
-    const real t1001 = t1000 * t573;
-    const real t1002 = t986 * t436;
-    const real t1003 = t977 * t470;
-    const real t1004 = t1002 - t1003;
-    const real t1005 = t1004 * t582;
-    const real t1006 = t983 * t464;
-    const real t1007 = t1006 * t610;
-    const real t1008 = t1007 * t613;
-    const real t1009 = t984 * t445;
-    const real t1010 = t981 * t467;
-    const real t1011 = t1009 + t1010;
-    const real t1012 = t1011 * t591;
-    const real t1013 = t1008 - t1012;
-    const real t1014 = t1013 * t616;
-    const real t1015 = t1005 + t1014;
-    const real t1016 = t1015 * t619;
-    const real t1017 = t1001 + t1016;
-    const real t1018 = t1017 * t640;
-    const real t1019 = t997 + t1018;
-    const real t1020 = t1019 * t715;
-    const real t1021 = t1017 * t626;
-    const real t1022 = t996 * t640;
-    const real t1023 = t1021 - t1022;
-    const real t1024 = t1023 * t703;
-    const real t1025 = t1015 * t573;
-    const real t1026 = t1000 * t619;
-    const real t1027 = t1025 - t1026;
-    const real t1028 = t1027 * t772;
-    const real t1029 = t1013 * t582;
-    const real t1030 = t1004 * t616;
-    const real t1031 = t1029 - t1030;
-    const real t1032 = t1031 * t841;
-    const real t1033 = t1007 * t591;
-    const real t1034 = t1011 * t613;
-    const real t1035 = t1033 + t1034;
-    const real t1036 = t1035 * t931;
-    const real t1037 = t1006 * t603;
-    const real t1038 = 0.0 < t669;
-    const real t1039 = t1038 != 0 ? t669 : 1.0;
-    const real t1040 = 1.0 / t1039;
-    const real t1041 = t658 * t1040;
-    const real t1042 = t1038 != 0 ? t1041 : 1.0;
-    const real t1043 = t1037 * t1042;
-    const real t1044 = t669 * t929;
-    const real t1045 = t1043 * t1044;
-    const real t1046 = t1036 - t1045;
-    const real t1047 = t1046 * t933;
-    const real t1048 = t1032 + t1047;
-    const real t1049 = t1048 * t843;
-    const real t1050 = t1028 + t1049;
-    const real t1051 = t1050 * t774;
-    const real t1052 = t1024 + t1051;
-    const real t1053 = t1052 * t705;
-    const real t1054 = t720 * t1053;
-    const real t1055 = t1020 - t1054;
-    const real t1056 = t713 * t1055;
-    const real t1057 = t993 - t1056;
-    const real t1058 = t695 * t1053;
-    const real t1059 = t1057 - t1058;
-    const real t1060 = t690 * t1059;
-    const real t1061 = t966 - t1060;
-    const real t1062 = t731 * t1055;
-    const real t1063 = t1061 - t1062;
-    const real t1064 = t737 * t1053;
-    const real t1065 = t1063 - t1064;
-    G[4] = t1065;
-    const real t1066 = U[5] * t363;
-    const real t1067 = U[10] * t321;
-    const real t1068 = U[14] * t327;
-    const real t1069 = U[17] * t333;
-    const real t1070 = U[19] * t339;
-    const real t1071 = U[20] * t345;
-    const real t1072 = t1071 * t347;
-    const real t1073 = t1070 + t1072;
-    const real t1074 = t1073 * t350;
-    const real t1075 = t1069 + t1074;
-    const real t1076 = t1075 * t353;
-    const real t1077 = t1068 + t1076;
-    const real t1078 = t1077 * t356;
-    const real t1079 = t1067 + t1078;
-    const real t1080 = t1079 * t365;
-    const real t1081 = t1066 + t1080;
-    const real t1082 = t1081 * t685;
-    const real t1083 = t1079 * t363;
-    const real t1084 = U[5] * t365;
-    const real t1085 = t1083 - t1084;
-    const real t1086 = t1085 * t480;
-    const real t1087 = t1077 * t321;
-    const real t1088 = U[10] * t356;
-    const real t1089 = t1087 - t1088;
-    const real t1090 = t1089 * t427;
-    const real t1091 = t1075 * t327;
-    const real t1092 = U[14] * t353;
-    const real t1093 = t1091 - t1092;
-    const real t1094 = t1093 * t436;
-    const real t1095 = t1073 * t333;
-    const real t1096 = U[17] * t350;
-    const real t1097 = t1095 - t1096;
-    const real t1098 = t1097 * t445;
-    const real t1099 = t1071 * t339;
-    const real t1100 = U[19] * t347;
-    const real t1101 = t1099 - t1100;
-    const real t1102 = t1101 * t454;
-    const real t1103 = U[20] * t385;
-    const real t1104 = t1103 * t462;
-    const real t1105 = t1104 * t464;
-    const real t1106 = t1102 - t1105;
-    const real t1107 = t1106 * t467;
-    const real t1108 = t1098 + t1107;
-    const real t1109 = t1108 * t470;
-    const real t1110 = t1094 + t1109;
-    const real t1111 = t1110 * t473;
-    const real t1112 = t1090 + t1111;
-    const real t1113 = t1112 * t488;
-    const real t1114 = t1086 + t1113;
-    const real t1115 = t1114 * t694;
-    const real t1116 = t1112 * t480;
-    const real t1117 = t1085 * t488;
-    const real t1118 = t1116 - t1117;
-    const real t1119 = t1118 * t626;
-    const real t1120 = t1110 * t427;
-    const real t1121 = t1089 * t473;
-    const real t1122 = t1120 - t1121;
-    const real t1123 = t1122 * t573;
-    const real t1124 = t1108 * t436;
-    const real t1125 = t1093 * t470;
-    const real t1126 = t1124 - t1125;
-    const real t1127 = t1126 * t582;
-    const real t1128 = t1106 * t445;
-    const real t1129 = t1097 * t467;
-    const real t1130 = t1128 - t1129;
-    const real t1131 = t1130 * t591;
-    const real t1132 = t1103 * t508;
-    const real t1133 = t1132 * t598;
-    const real t1134 = t1133 * t603;
-    const real t1135 = t1104 * t454;
-    const real t1136 = t1101 * t464;
-    const real t1137 = t1135 + t1136;
-    const real t1138 = t1137 * t610;
-    const real t1139 = t1134 - t1138;
-    const real t1140 = t1139 * t613;
-    const real t1141 = t1131 + t1140;
-    const real t1142 = t1141 * t616;
-    const real t1143 = t1127 + t1142;
-    const real t1144 = t1143 * t619;
-    const real t1145 = t1123 + t1144;
-    const real t1146 = t1145 * t640;
-    const real t1147 = t1119 + t1146;
-    const real t1148 = t1147 * t715;
-    const real t1149 = t1145 * t626;
-    const real t1150 = t1118 * t640;
-    const real t1151 = t1149 - t1150;
-    const real t1152 = t1151 * t703;
-    const real t1153 = t1143 * t573;
-    const real t1154 = t1122 * t619;
-    const real t1155 = t1153 - t1154;
-    const real t1156 = t1155 * t772;
-    const real t1157 = t1141 * t582;
-    const real t1158 = t1126 * t616;
-    const real t1159 = t1157 - t1158;
-    const real t1160 = t1159 * t841;
-    const real t1161 = t1139 * t591;
-    const real t1162 = t1130 * t613;
-    const real t1163 = t1161 - t1162;
-    const real t1164 = t1163 * t931;
-    const real t1165 = t1133 * t610;
-    const real t1166 = t1137 * t603;
-    const real t1167 = t1165 + t1166;
-    const real t1168 = t1167 * t1042;
-    const real t1169 = t1132 * t660;
-    const real t1170 = 0.0 < t666;
-    const real t1171 = t1170 != 0 ? t666 : 1.0;
-    const real t1172 = 1.0 / t1171;
-    const real t1173 = t661 * t1172;
-    const real t1174 = -t1173;
-    const real t1175 = t1170 != 0 ? t1174 : 1.0;
-    const real t1176 = t1169 * t1175;
-    const real t1177 = t666 * t1040;
-    const real t1178 = t1176 * t1177;
-    const real t1179 = t1168 - t1178;
-    const real t1180 = t1179 * t1044;
-    const real t1181 = t1164 + t1180;
-    const real t1182 = t1181 * t933;
-    const real t1183 = t1160 + t1182;
-    const real t1184 = t1183 * t843;
-    const real t1185 = t1156 + t1184;
-    const real t1186 = t1185 * t774;
-    const real t1187 = t1152 + t1186;
-    const real t1188 = t1187 * t705;
-    const real t1189 = t720 * t1188;
-    const real t1190 = t1148 - t1189;
-    const real t1191 = t713 * t1190;
-    const real t1192 = t1115 - t1191;
-    const real t1193 = t695 * t1188;
-    const real t1194 = t1192 - t1193;
-    const real t1195 = t690 * t1194;
-    const real t1196 = t1082 - t1195;
-    const real t1197 = t731 * t1190;
-    const real t1198 = t1196 - t1197;
-    const real t1199 = t737 * t1188;
-    const real t1200 = t1198 - t1199;
-    G[5] = t1200;
-    G[6] = t725;
-    G[7] = t783;
-    G[8] = t854;
-    G[9] = t946;
-    G[10] = t1059;
-    G[11] = t1194;
-    G[12] = t722;
-    G[13] = t779;
-    G[14] = t850;
-    G[15] = t942;
-    G[16] = t1055;
-    G[17] = t1190;
-    const real t1201 = -t706;
-    G[18] = t1201;
-    G[19] = t777;
-    G[20] = t848;
-    G[21] = t940;
-    G[22] = t1053;
-    G[23] = t1188;
-    const real t1202 = t10 * 1e-26;
-    const real t1203 = t1202 < t10;
-    const real t1204 = t1203 != 0 ? 0.0 : e[0];
-    const real t1205 = H[0] * t1204;
-    const real t1206 = t8 + t11;
-    const real t1207 = 1e-26 * t1206;
-    const real t1208 = t1207 < t8;
-    const real t1209 = 1.0 / U[0];
-    const real t1210 = e[0] * t1209;
-    const real t1211 = t1203 != 0 ? t1210 : 0.0;
-    const real t1212 = U[1] * t1211;
-    const real t1213 = e[1] - t1212;
-    const real t1214 = t1208 != 0 ? 0.0 : t1213;
-    const real t1215 = H[4] * t1214;
-    const real t1216 = t1205 + t1215;
-    const real t1217 = t9 + t7;
-    const real t1218 = t6 + t1217;
-    const real t1219 = 1e-26 * t1218;
-    const real t1220 = t1219 < t6;
-    const real t1221 = U[2] * t1211;
-    const real t1222 = 1.0 / U[6];
-    const real t1223 = t1213 * t1222;
-    const real t1224 = t1208 != 0 ? t1223 : 0.0;
-    const real t1225 = U[7] * t1224;
-    const real t1226 = t1221 + t1225;
-    const real t1227 = e[2] - t1226;
-    const real t1228 = t1220 != 0 ? 0.0 : t1227;
-    const real t1229 = H[8] * t1228;
-    const real t1230 = t1216 + t1229;
-    const real t1231 = t39 + t37;
-    const real t1232 = t34 + t1231;
-    const real t1233 = t31 + t1232;
-    const real t1234 = 1e-26 * t1233;
-    const real t1235 = t1234 < t31;
-    const real t1236 = 1.0 / U[11];
-    const real t1237 = t1227 * t1236;
-    const real t1238 = t1220 != 0 ? t1237 : 0.0;
-    const real t1239 = U[12] * t1238;
-    const real t1240 = U[3] * t1211;
-    const real t1241 = U[8] * t1224;
-    const real t1242 = t1240 + t1241;
-    const real t1243 = t1239 + t1242;
-    const real t1244 = e[3] - t1243;
-    const real t1245 = t1235 != 0 ? 0.0 : t1244;
-    const real t1246 = H[12] * t1245;
-    const real t1247 = t1230 + t1246;
-    const real t1248 = t40 + t36;
-    const real t1249 = t33 + t1248;
-    const real t1250 = t30 + t1249;
-    const real t1251 = t28 + t1250;
-    const real t1252 = 1e-26 * t1251;
-    const real t1253 = t1252 < t28;
-    const real t1254 = 1.0 / U[15];
-    const real t1255 = t1244 * t1254;
-    const real t1256 = t1235 != 0 ? t1255 : 0.0;
-    const real t1257 = U[16] * t1256;
-    const real t1258 = U[13] * t1238;
-    const real t1259 = U[4] * t1211;
-    const real t1260 = U[9] * t1224;
-    const real t1261 = t1259 + t1260;
-    const real t1262 = t1258 + t1261;
-    const real t1263 = t1257 + t1262;
-    const real t1264 = e[4] - t1263;
-    const real t1265 = t1253 != 0 ? 0.0 : t1264;
-    const real t1266 = H[16] * t1265;
-    const real t1267 = t1247 + t1266;
-    const real t1268 = t38 + t35;
-    const real t1269 = t32 + t1268;
-    const real t1270 = t29 + t1269;
-    const real t1271 = t27 + t1270;
-    const real t1272 = t26 + t1271;
-    const real t1273 = 1e-26 * t1272;
-    const real t1274 = t1273 < t26;
-    const real t1275 = 1.0 / U[18];
-    const real t1276 = t1264 * t1275;
-    const real t1277 = t1253 != 0 ? t1276 : 0.0;
-    const real t1278 = U[19] * t1277;
-    const real t1279 = U[17] * t1256;
-    const real t1280 = U[14] * t1238;
-    const real t1281 = U[5] * t1211;
-    const real t1282 = U[10] * t1224;
-    const real t1283 = t1281 + t1282;
-    const real t1284 = t1280 + t1283;
-    const real t1285 = t1279 + t1284;
-    const real t1286 = t1278 + t1285;
-    const real t1287 = e[5] - t1286;
-    const real t1288 = t1274 != 0 ? 0.0 : t1287;
-    const real t1289 = H[20] * t1288;
-    const real t1290 = t1267 + t1289;
-    const real t1291 = tau[0] - t1290;
-    const real t1292 = t1291 * t685;
-    const real t1293 = d[0] + t1211;
-    const real t1294 = t1293 * t363;
-    const real t1295 = d[1] + t1224;
-    const real t1296 = t1295 * t321;
-    const real t1297 = d[2] + t1238;
-    const real t1298 = t1297 * t327;
-    const real t1299 = d[3] + t1256;
-    const real t1300 = t1299 * t333;
-    const real t1301 = d[4] + t1277;
-    const real t1302 = t1301 * t339;
-    const real t1303 = 1.0 / U[20];
-    const real t1304 = t1287 * t1303;
-    const real t1305 = t1274 != 0 ? t1304 : 0.0;
-    const real t1306 = d[5] + t1305;
-    const real t1307 = t1306 * t345;
-    const real t1308 = t1307 * t347;
-    const real t1309 = t1302 + t1308;
-    const real t1310 = t1309 * t350;
-    const real t1311 = t1300 + t1310;
-    const real t1312 = t1311 * t353;
-    const real t1313 = t1298 + t1312;
-    const real t1314 = t1313 * t356;
-    const real t1315 = t1296 + t1314;
-    const real t1316 = t1315 * t365;
-    const real t1317 = t1294 + t1316;
-    const real t1318 = t1292 - t1317;
-    const real t1319 = t685 * t1318;
-    const real t1320 = H[1] * t1204;
-    const real t1321 = H[5] * t1214;
-    const real t1322 = t1320 + t1321;
-    const real t1323 = H[9] * t1228;
-    const real t1324 = t1322 + t1323;
-    const real t1325 = H[13] * t1245;
-    const real t1326 = t1324 + t1325;
-    const real t1327 = H[17] * t1265;
-    const real t1328 = t1326 + t1327;
-    const real t1329 = H[21] * t1288;
-    const real t1330 = t1328 + t1329;
-    const real t1331 = tau[1] - t1330;
-    const real t1332 = t1291 * t690;
-    const real t1333 = t1331 - t1332;
-    const real t1334 = t694 * t1333;
-    const real t1335 = t1315 * t363;
-    const real t1336 = t1293 * t365;
-    const real t1337 = t1335 - t1336;
-    const real t1338 = t1337 * t480;
-    const real t1339 = t1313 * t321;
-    const real t1340 = t1295 * t356;
-    const real t1341 = t1339 - t1340;
-    const real t1342 = t1341 * t427;
-    const real t1343 = t1311 * t327;
-    const real t1344 = t1297 * t353;
-    const real t1345 = t1343 - t1344;
-    const real t1346 = t1345 * t436;
-    const real t1347 = t1309 * t333;
-    const real t1348 = t1299 * t350;
-    const real t1349 = t1347 - t1348;
-    const real t1350 = t1349 * t445;
-    const real t1351 = t1307 * t339;
-    const real t1352 = t1301 * t347;
-    const real t1353 = t1351 - t1352;
-    const real t1354 = t1353 * t454;
-    const real t1355 = t1306 * t385;
-    const real t1356 = t1355 * t462;
-    const real t1357 = t1356 * t464;
-    const real t1358 = t1354 - t1357;
-    const real t1359 = t1358 * t467;
-    const real t1360 = t1350 + t1359;
-    const real t1361 = t1360 * t470;
-    const real t1362 = t1346 + t1361;
-    const real t1363 = t1362 * t473;
-    const real t1364 = t1342 + t1363;
-    const real t1365 = t1364 * t488;
-    const real t1366 = t1338 + t1365;
-    const real t1367 = t1334 - t1366;
-    const real t1368 = t694 * t1367;
-    const real t1369 = H[2] * t1204;
-    const real t1370 = H[6] * t1214;
-    const real t1371 = t1369 + t1370;
-    const real t1372 = H[10] * t1228;
-    const real t1373 = t1371 + t1372;
-    const real t1374 = H[14] * t1245;
-    const real t1375 = t1373 + t1374;
-    const real t1376 = H[18] * t1265;
-    const real t1377 = t1375 + t1376;
-    const real t1378 = H[22] * t1288;
-    const real t1379 = t1377 + t1378;
-    const real t1380 = tau[2] - t1379;
-    const real t1381 = t1291 * t731;
-    const real t1382 = t1380 - t1381;
-    const real t1383 = t713 * t1333;
-    const real t1384 = t1382 - t1383;
-    const real t1385 = t715 * t1384;
-    const real t1386 = t1364 * t480;
-    const real t1387 = t1337 * t488;
-    const real t1388 = t1386 - t1387;
-    const real t1389 = t1388 * t626;
-    const real t1390 = t1362 * t427;
-    const real t1391 = t1341 * t473;
-    const real t1392 = t1390 - t1391;
-    const real t1393 = t1392 * t573;
-    const real t1394 = t1360 * t436;
-    const real t1395 = t1345 * t470;
-    const real t1396 = t1394 - t1395;
-    const real t1397 = t1396 * t582;
-    const real t1398 = t1358 * t445;
-    const real t1399 = t1349 * t467;
-    const real t1400 = t1398 - t1399;
-    const real t1401 = t1400 * t591;
-    const real t1402 = t1355 * t508;
-    const real t1403 = t1402 * t598;
-    const real t1404 = t1403 * t603;
-    const real t1405 = t1356 * t454;
-    const real t1406 = t1353 * t464;
-    const real t1407 = t1405 + t1406;
-    const real t1408 = t1407 * t610;
-    const real t1409 = t1404 - t1408;
-    const real t1410 = t1409 * t613;
-    const real t1411 = t1401 + t1410;
-    const real t1412 = t1411 * t616;
-    const real t1413 = t1397 + t1412;
-    const real t1414 = t1413 * t619;
-    const real t1415 = t1393 + t1414;
-    const real t1416 = t1415 * t640;
-    const real t1417 = t1389 + t1416;
-    const real t1418 = t1385 - t1417;
-    const real t1419 = t715 * t1418;
-    const real t1420 = H[3] * t1204;
-    const real t1421 = H[7] * t1214;
-    const real t1422 = t1420 + t1421;
-    const real t1423 = H[11] * t1228;
-    const real t1424 = t1422 + t1423;
-    const real t1425 = H[15] * t1245;
-    const real t1426 = t1424 + t1425;
-    const real t1427 = H[19] * t1265;
-    const real t1428 = t1426 + t1427;
-    const real t1429 = H[23] * t1288;
-    const real t1430 = t1428 + t1429;
-    const real t1431 = tau[3] - t1430;
-    const real t1432 = t1291 * t737;
-    const real t1433 = t1431 - t1432;
-    const real t1434 = t695 * t1333;
-    const real t1435 = t1433 - t1434;
-    const real t1436 = t720 * t1384;
-    const real t1437 = t1435 - t1436;
-    const real t1438 = t705 * t1437;
-    const real t1439 = t1415 * t626;
-    const real t1440 = t1388 * t640;
-    const real t1441 = t1439 - t1440;
-    const real t1442 = t1441 * t703;
-    const real t1443 = t1413 * t573;
-    const real t1444 = t1392 * t619;
-    const real t1445 = t1443 - t1444;
-    const real t1446 = t1445 * t772;
-    const real t1447 = t1411 * t582;
-    const real t1448 = t1396 * t616;
-    const real t1449 = t1447 - t1448;
-    const real t1450 = t1449 * t841;
-    const real t1451 = t1409 * t591;
-    const real t1452 = t1400 * t613;
-    const real t1453 = t1451 - t1452;
-    const real t1454 = t1453 * t931;
-    const real t1455 = t1403 * t610;
-    const real t1456 = t1407 * t603;
-    const real t1457 = t1455 + t1456;
-    const real t1458 = t1457 * t1042;
-    const real t1459 = t1402 * t660;
-    const real t1460 = t1459 * t1175;
-    const real t1461 = t1460 * t1177;
-    const real t1462 = t1458 - t1461;
-    const real t1463 = t1462 * t1044;
-    const real t1464 = t1454 + t1463;
-    const real t1465 = t1464 * t933;
-    const real t1466 = t1450 + t1465;
-    const real t1467 = t1466 * t843;
-    const real t1468 = t1446 + t1467;
-    const real t1469 = t1468 * t774;
-    const real t1470 = t1442 + t1469;
-    const real t1471 = t1438 - t1470;
-    const real t1472 = t705 * t1471;
-    const real t1473 = t720 * t1472;
-    const real t1474 = t1419 - t1473;
-    const real t1475 = t713 * t1474;
-    const real t1476 = t1368 - t1475;
-    const real t1477 = t695 * t1472;
-    const real t1478 = t1476 - t1477;
-    const real t1479 = t690 * t1478;
-    const real t1480 = t1319 - t1479;
-    const real t1481 = t731 * t1474;
-    const real t1482 = t1480 - t1481;
-    const real t1483 = t737 * t1472;
-    const real t1484 = t1482 - t1483;
-    g[0] = t1484;
-    g[1] = t1478;
-    g[2] = t1474;
-    g[3] = t1472;
-    const real t1485 = t698 * t774;
-    const real t1486 = t1485 < 0.0;
-    const real t1487 = t1486 != 0 ? (-1.0) : 1.0;
-    const real t1488 = t1485 * t1487;
-    V[0] = t1488;
-    const real t1489 = t773 * t703;
-    const real t1490 = t765 * t774;
-    const real t1491 = t1489 + t1490;
-    const real t1492 = t1491 * t1487;
-    const real t1493 = -t1492;
-    V[1] = t1493;
-    const real t1494 = t845 * t703;
-    const real t1495 = t830 * t774;
-    const real t1496 = t1494 - t1495;
-    const real t1497 = t1496 * t1487;
-    V[2] = t1497;
-    const real t1498 = t937 * t703;
-    const real t1499 = t916 * t774;
-    const real t1500 = t1498 - t1499;
-    const real t1501 = t1500 * t1487;
-    V[3] = t1501;
-    const real t1502 = t1050 * t703;
-    const real t1503 = t1023 * t774;
-    const real t1504 = t1502 - t1503;
-    const real t1505 = t1504 * t1487;
-    V[4] = t1505;
-    const real t1506 = t1185 * t703;
-    const real t1507 = t1151 * t774;
-    const real t1508 = t1506 - t1507;
-    const real t1509 = t1508 * t1487;
-    V[5] = t1509;
-    const real t1510 = t767 * t843;
-    const real t1511 = t1510 < 0.0;
-    const real t1512 = t1511 != 0 ? (-1.0) : 1.0;
-    const real t1513 = t1510 * t1512;
-    V[6] = t1513;
-    const real t1514 = t842 * t772;
-    const real t1515 = t834 * t843;
-    const real t1516 = t1514 + t1515;
-    const real t1517 = t1516 * t1512;
-    const real t1518 = -t1517;
-    V[7] = t1518;
-    const real t1519 = t935 * t772;
-    const real t1520 = t920 * t843;
-    const real t1521 = t1519 - t1520;
-    const real t1522 = t1521 * t1512;
-    V[8] = t1522;
-    const real t1523 = t1048 * t772;
-    const real t1524 = t1027 * t843;
-    const real t1525 = t1523 - t1524;
-    const real t1526 = t1525 * t1512;
-    V[9] = t1526;
-    const real t1527 = t1183 * t772;
-    const real t1528 = t1155 * t843;
-    const real t1529 = t1527 - t1528;
-    const real t1530 = t1529 * t1512;
-    V[10] = t1530;
-    const real t1531 = t836 * t933;
-    const real t1532 = t1531 < 0.0;
-    const real t1533 = t1532 != 0 ? (-1.0) : 1.0;
-    const real t1534 = t1531 * t1533;
-    V[11] = t1534;
-    const real t1535 = t932 * t841;
-    const real t1536 = t924 * t933;
-    const real t1537 = t1535 + t1536;
-    const real t1538 = t1537 * t1533;
-    const real t1539 = -t1538;
-    V[12] = t1539;
-    const real t1540 = t1046 * t841;
-    const real t1541 = t1031 * t933;
-    const real t1542 = t1540 - t1541;
-    const real t1543 = t1542 * t1533;
-    V[13] = t1543;
-    const real t1544 = t1181 * t841;
-    const real t1545 = t1159 * t933;
-    const real t1546 = t1544 - t1545;
-    const real t1547 = t1546 * t1533;
-    V[14] = t1547;
-    const real t1548 = t926 * t1044;
-    const real t1549 = t1548 < 0.0;
-    const real t1550 = t1549 != 0 ? (-1.0) : 1.0;
-    const real t1551 = t1548 * t1550;
-    V[15] = t1551;
-    const real t1552 = t1043 * t931;
-    const real t1553 = t1035 * t1044;
-    const real t1554 = t1552 + t1553;
-    const real t1555 = t1554 * t1550;
-    const real t1556 = -t1555;
-    V[16] = t1556;
-    const real t1557 = t1179 * t931;
-    const real t1558 = t1163 * t1044;
-    const real t1559 = t1557 - t1558;
-    const real t1560 = t1559 * t1550;
-    V[17] = t1560;
-    const real t1561 = t1037 * t1177;
-    const real t1562 = t1561 < 0.0;
-    const real t1563 = t1562 != 0 ? (-1.0) : 1.0;
-    const real t1564 = t1561 * t1563;
-    V[18] = t1564;
-    const real t1565 = t1176 * t1042;
-    const real t1566 = t1167 * t1177;
-    const real t1567 = t1565 + t1566;
-    const real t1568 = t1567 * t1563;
-    const real t1569 = -t1568;
-    V[19] = t1569;
-    const real t1570 = t663 * t1172;
-    const real t1571 = t1169 * t1570;
-    const real t1572 = t1571 < 0.0;
-    const real t1573 = t1572 != 0 ? (-1.0) : 1.0;
-    const real t1574 = t1571 * t1573;
-    V[20] = t1574;
-    const real t1575 = t1468 * t703;
-    const real t1576 = t1441 * t774;
-    const real t1577 = t1575 - t1576;
-    const real t1578 = t1577 * t1487;
-    d_V[0] = t1578;
-    const real t1579 = t1466 * t772;
-    const real t1580 = t1445 * t843;
-    const real t1581 = t1579 - t1580;
-    const real t1582 = t1581 * t1512;
-    d_V[1] = t1582;
-    const real t1583 = t1464 * t841;
-    const real t1584 = t1449 * t933;
-    const real t1585 = t1583 - t1584;
-    const real t1586 = t1585 * t1533;
-    d_V[2] = t1586;
-    const real t1587 = t1462 * t931;
-    const real t1588 = t1453 * t1044;
-    const real t1589 = t1587 - t1588;
-    const real t1590 = t1589 * t1550;
-    d_V[3] = t1590;
-    const real t1591 = t1460 * t1042;
-    const real t1592 = t1457 * t1177;
-    const real t1593 = t1591 + t1592;
-    const real t1594 = t1593 * t1563;
-    const real t1595 = -t1594;
-    d_V[4] = t1595;
-    const real t1596 = t1459 * t1570;
-    const real t1597 = t1596 * t1573;
-    d_V[5] = t1597;
-    const real t1598 = t1291 * t739;
-    const real t1599 = t1331 * t725;
-    const real t1600 = t1598 + t1599;
-    const real t1601 = t1380 * t722;
-    const real t1602 = t1600 + t1601;
-    const real t1603 = t1431 * t706;
-    const real t1604 = t1602 - t1603;
-    const real t1605 = t1204 + t1604;
-    e_Q[0] = t1605;
-    const real t1606 = t1291 * t789;
-    const real t1607 = t1331 * t783;
-    const real t1608 = t1606 + t1607;
-    const real t1609 = t1380 * t779;
-    const real t1610 = t1608 + t1609;
-    const real t1611 = t1431 * t777;
-    const real t1612 = t1610 + t1611;
-    const real t1613 = t1214 + t1612;
-    e_Q[1] = t1613;
-    const real t1614 = t1291 * t860;
-    const real t1615 = t1331 * t854;
-    const real t1616 = t1614 + t1615;
-    const real t1617 = t1380 * t850;
-    const real t1618 = t1616 + t1617;
-    const real t1619 = t1431 * t848;
-    const real t1620 = t1618 + t1619;
-    const real t1621 = t1228 + t1620;
-    e_Q[2] = t1621;
-    const real t1622 = t1291 * t952;
-    const real t1623 = t1331 * t946;
-    const real t1624 = t1622 + t1623;
-    const real t1625 = t1380 * t942;
-    const real t1626 = t1624 + t1625;
-    const real t1627 = t1431 * t940;
-    const real t1628 = t1626 + t1627;
-    const real t1629 = t1245 + t1628;
-    e_Q[3] = t1629;
-    const real t1630 = t1291 * t1065;
-    const real t1631 = t1331 * t1059;
-    const real t1632 = t1630 + t1631;
-    const real t1633 = t1380 * t1055;
-    const real t1634 = t1632 + t1633;
-    const real t1635 = t1431 * t1053;
-    const real t1636 = t1634 + t1635;
-    const real t1637 = t1265 + t1636;
-    e_Q[4] = t1637;
-    const real t1638 = t1291 * t1200;
-    const real t1639 = t1331 * t1194;
-    const real t1640 = t1638 + t1639;
-    const real t1641 = t1380 * t1190;
-    const real t1642 = t1640 + t1641;
-    const real t1643 = t1431 * t1188;
-    const real t1644 = t1642 + t1643;
-    const real t1645 = t1288 + t1644;
-    e_Q[5] = t1645;
-    return 0;
+  real t6 = U[11] * U[11];
+  real t7 = U[7] * U[7];
+  real t8 = U[6] * U[6];
+  real t9 = U[2] * U[2];
+  real t10 = U[0] * U[0];
+  real t11 = U[1] * U[1];
+  real t17 = ((real)1 / (real)300000000000000) * (t6 + (t7 + (t8 + (t9 + (t10 + t11)))));
+  real t18 = (0.0 < floor_[0]) ? floor_[0] : t17;
+  real t26 = U[20] * U[20];
+  real t27 = U[19] * U[19];
+  real t28 = U[18] * U[18];
+  real t29 = U[17] * U[17];
+  real t30 = U[16] * U[16];
+  real t31 = U[15] * U[15];
+  real t32 = U[14] * U[14];
+  real t33 = U[13] * U[13];
+  real t34 = U[12] * U[12];
+  real t35 = U[10] * U[10];
+  real t36 = U[9] * U[9];
+  real t37 = U[8] * U[8];
+  real t38 = U[5] * U[5];
+  real t39 = U[3] * U[3];
+  real t40 = U[4] * U[4];
+  real t55 = ((real)1 / (real)300000000000000) * (t26 + (t27 + (t28 + (t29 + (t30 + (t31 + (t32 +
+    (t33 + (t34 + (t35 + (t36 + (t37 + (t38 + (t39 + t40))))))))))))));
+  real t56 = (0.0 < floor_[1]) ? floor_[1] : t55;
+  real t59 = H[20] * U[20];
+  real t60 = t59 * t59;
+  real t63 = H[16] * U[18] + H[20] * U[19];
+  real t64 = t63 * t63;
+  real t69 = H[12] * U[15] + H[16] * U[16] + H[20] * U[17];
+  real t70 = t69 * t69;
+  real t77 = H[8] * U[11] + H[12] * U[12] + H[16] * U[13] + H[20] * U[14];
+  real t78 = t77 * t77;
+  real t87 = H[4] * U[6] + H[8] * U[7] + H[12] * U[8] + H[16] * U[9] + H[20] * U[10];
+  real t88 = t87 * t87;
+  real t99 = H[0] * U[0] + H[4] * U[1] + H[8] * U[2] + H[12] * U[3] + H[16] * U[4] + H[20] * U[5];
+  real t100 = t99 * t99;
+  real t106 = t60 + (t64 + (t70 + (t78 + (t88 + (J[0] + t100)))));
+  if (!(((H[8] * H[8] + (H[0] * H[0] + H[4] * H[4])) * t18 + (H[20] * H[20] + (H[12] * H[12] + H[16] * H[16])) * t56 < t106))) return 1; /* speed 1 of 4 moves no inertia: its acceleration is undetermined */
+  real t121 = H[21] * U[20];
+  real t125 = H[17] * U[18] + H[21] * U[19];
+  real t131 = H[13] * U[15] + H[17] * U[16] + H[21] * U[17];
+  real t139 = H[9] * U[11] + H[13] * U[12] + H[17] * U[13] + H[21] * U[14];
+  real t149 = H[5] * U[6] + H[9] * U[7] + H[13] * U[8] + H[17] * U[9] + H[21] * U[10];
+  real t161 = H[1] * U[0] + H[5] * U[1] + H[9] * U[2] + H[13] * U[3] + H[17] * U[4] + H[21] * U[5];
+  real t168 = t121 * t121 + (t125 * t125 + (t131 * t131 + (t139 * t139 + (t149 * t149 + (J[1] + t161
+    * t161)))));
+  if (!((t18 * (H[9] * H[9] + (H[1] * H[1] + H[5] * H[5])) + t56 * (H[21] * H[21] + (H[13] * H[13] + H[17] * H[17])) < t168))) return 1; /* speed 2 of 4 moves no inertia: its acceleration is undetermined */
+  real t183 = H[22] * U[20];
+  real t187 = H[18] * U[18] + H[22] * U[19];
+  real t193 = H[14] * U[15] + H[18] * U[16] + H[22] * U[17];
+  real t201 = H[10] * U[11] + H[14] * U[12] + H[18] * U[13] + H[22] * U[14];
+  real t211 = H[6] * U[6] + H[10] * U[7] + H[14] * U[8] + H[18] * U[9] + H[22] * U[10];
+  real t223 = H[2] * U[0] + H[6] * U[1] + H[10] * U[2] + H[14] * U[3] + H[18] * U[4] + H[22] * U[5];
+  real t230 = t183 * t183 + (t187 * t187 + (t193 * t193 + (t201 * t201 + (t211 * t211 + (J[2] + t223
+    * t223)))));
+  if (!((t18 * (H[10] * H[10] + (H[2] * H[2] + H[6] * H[6])) + t56 * (H[22] * H[22] + (H[14] * H[14] + H[18] * H[18])) < t230))) return 1; /* speed 3 of 4 moves no inertia: its acceleration is undetermined */
+  real t245 = H[23] * U[20];
+  real t249 = H[19] * U[18] + H[23] * U[19];
+  real t255 = H[15] * U[15] + H[19] * U[16] + H[23] * U[17];
+  real t263 = H[11] * U[11] + H[15] * U[12] + H[19] * U[13] + H[23] * U[14];
+  real t273 = H[7] * U[6] + H[11] * U[7] + H[15] * U[8] + H[19] * U[9] + H[23] * U[10];
+  real t285 = H[3] * U[0] + H[7] * U[1] + H[11] * U[2] + H[15] * U[3] + H[19] * U[4] + H[23] * U[5];
+  real t292 = t245 * t245 + (t249 * t249 + (t255 * t255 + (t263 * t263 + (t273 * t273 + (J[3] + t285
+    * t285)))));
+  if (!((t18 * (H[11] * H[11] + (H[3] * H[3] + H[7] * H[7])) + t56 * (H[23] * H[23] + (H[15] * H[15] + H[19] * H[19])) < t292))) return 1; /* speed 4 of 4 moves no inertia: its acceleration is undetermined */
+  real t295 = sqrt(J[0]);
+  real t298 = sqrt(t60 + t295 * t295);
+  real t301 = sqrt(t64 + t298 * t298);
+  real t304 = sqrt(t70 + t301 * t301);
+  real t307 = sqrt(t78 + t304 * t304);
+  real t310 = sqrt(t88 + t307 * t307);
+  real t313 = sqrt(t100 + t310 * t310);
+  if (!((1e-26 * t106 < t313 * t313))) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+  real t317 = 0.0 < t310;
+  real t319 = 1.0 / (t317 != 0 ? t310 : 1.0);
+  real t320 = t87 * t319;
+  real t321 = t317 != 0 ? t320 : 1.0;
+  real t323 = 0.0 < t307;
+  real t325 = 1.0 / (t323 != 0 ? t307 : 1.0);
+  real t326 = t77 * t325;
+  real t327 = t323 != 0 ? t326 : 1.0;
+  real t329 = 0.0 < t304;
+  real t331 = 1.0 / (t329 != 0 ? t304 : 1.0);
+  real t332 = t69 * t331;
+  real t333 = t329 != 0 ? t332 : 1.0;
+  real t335 = 0.0 < t301;
+  real t337 = 1.0 / (t335 != 0 ? t301 : 1.0);
+  real t338 = t63 * t337;
+  real t339 = t335 != 0 ? t338 : 1.0;
+  real t341 = 0.0 < t298;
+  real t343 = 1.0 / (t341 != 0 ? t298 : 1.0);
+  real t344 = t59 * t343;
+  real t345 = t341 != 0 ? t344 : 1.0;
+  real t346 = t121 * t345;
+  real t347 = t298 * t337;
+  real t349 = t125 * t339 + t346 * t347;
+  real t350 = t301 * t331;
+  real t352 = t131 * t333 + t349 * t350;
+  real t353 = t304 * t325;
+  real t355 = t139 * t327 + t352 * t353;
+  real t356 = t307 * t319;
+  real t358 = t149 * t321 + t355 * t356;
+  real t359 = 0.0 < t313;
+  real t361 = 1.0 / (t359 != 0 ? t313 : 1.0);
+  real t362 = t99 * t361;
+  real t363 = t359 != 0 ? t362 : 1.0;
+  real t365 = t310 * t361;
+  real t367 = t358 * t363 - t161 * t365;
+  real t371 = t355 * t321 - t149 * t356;
+  real t375 = t352 * t327 - t139 * t353;
+  real t379 = t349 * t333 - t131 * t350;
+  real t383 = t346 * t339 - t125 * t347;
+  real t385 = t295 * t343;
+  real t386 = t121 * t385;
+  real t388 = sqrt(J[1]);
+  real t391 = sqrt(t386 * t386 + t388 * t388);
+  real t394 = sqrt(t383 * t383 + t391 * t391);
+  real t397 = sqrt(t379 * t379 + t394 * t394);
+  real t400 = sqrt(t375 * t375 + t397 * t397);
+  real t403 = sqrt(t371 * t371 + t400 * t400);
+  real t406 = sqrt(t367 * t367 + t403 * t403);
+  if (!((1e-26 * t168 < t406 * t406))) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+  real t413 = t183 * t345;
+  real t415 = t187 * t339 + t413 * t347;
+  real t417 = t193 * t333 + t415 * t350;
+  real t419 = t201 * t327 + t417 * t353;
+  real t422 = t419 * t321 - t211 * t356;
+  real t423 = 0.0 < t403;
+  real t425 = 1.0 / (t423 != 0 ? t403 : 1.0);
+  real t426 = t371 * t425;
+  real t427 = t423 != 0 ? t426 : 1.0;
+  real t431 = t417 * t327 - t201 * t353;
+  real t432 = 0.0 < t400;
+  real t434 = 1.0 / (t432 != 0 ? t400 : 1.0);
+  real t435 = t375 * t434;
+  real t436 = t432 != 0 ? t435 : 1.0;
+  real t440 = t415 * t333 - t193 * t350;
+  real t441 = 0.0 < t397;
+  real t443 = 1.0 / (t441 != 0 ? t397 : 1.0);
+  real t444 = t379 * t443;
+  real t445 = t441 != 0 ? t444 : 1.0;
+  real t449 = t413 * t339 - t187 * t347;
+  real t450 = 0.0 < t394;
+  real t452 = 1.0 / (t450 != 0 ? t394 : 1.0);
+  real t453 = t383 * t452;
+  real t454 = t450 != 0 ? t453 : 1.0;
+  real t456 = t183 * t385;
+  real t457 = 0.0 < t391;
+  real t459 = 1.0 / (t457 != 0 ? t391 : 1.0);
+  real t461 = -(t386 * t459);
+  real t462 = t457 != 0 ? t461 : 1.0;
+  real t463 = t456 * t462;
+  real t464 = t391 * t452;
+  real t466 = t449 * t454 - t463 * t464;
+  real t467 = t394 * t443;
+  real t469 = t440 * t445 + t466 * t467;
+  real t470 = t397 * t434;
+  real t472 = t431 * t436 + t469 * t470;
+  real t473 = t400 * t425;
+  real t475 = t422 * t427 + t472 * t473;
+  real t476 = 0.0 < t406;
+  real t478 = 1.0 / (t476 != 0 ? t406 : 1.0);
+  real t479 = t367 * t478;
+  real t480 = t476 != 0 ? t479 : 1.0;
+  real t484 = t211 * t321 + t419 * t356;
+  real t487 = t484 * t363 - t223 * t365;
+  real t488 = t403 * t478;
+  real t490 = t475 * t480 - t487 * t488;
+  real t494 = t472 * t427 - t422 * t473;
+  real t498 = t469 * t436 - t431 * t470;
+  real t502 = t466 * t445 - t440 * t467;
+  real t506 = t463 * t454 + t449 * t464;
+  real t508 = t388 * t459;
+  real t509 = t456 * t508;
+  real t511 = sqrt(J[2]);
+  real t514 = sqrt(t509 * t509 + t511 * t511);
+  real t517 = sqrt(t506 * t506 + t514 * t514);
+  real t520 = sqrt(t502 * t502 + t517 * t517);
+  real t523 = sqrt(t498 * t498 + t520 * t520);
+  real t526 = sqrt(t494 * t494 + t523 * t523);
+  real t529 = sqrt(t490 * t490 + t526 * t526);
+  if (!((1e-26 * t230 < t529 * t529))) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+  real t535 = t245 * t345;
+  real t537 = t249 * t339 + t535 * t347;
+  real t539 = t255 * t333 + t537 * t350;
+  real t542 = t539 * t327 - t263 * t353;
+  real t546 = t537 * t333 - t255 * t350;
+  real t550 = t535 * t339 - t249 * t347;
+  real t552 = t245 * t385;
+  real t553 = t552 * t462;
+  real t555 = t550 * t454 - t553 * t464;
+  real t557 = t546 * t445 + t555 * t467;
+  real t559 = t542 * t436 + t557 * t470;
+  real t563 = t263 * t327 + t539 * t353;
+  real t566 = t563 * t321 - t273 * t356;
+  real t568 = t559 * t427 - t566 * t473;
+  real t569 = 0.0 < t526;
+  real t571 = 1.0 / (t569 != 0 ? t526 : 1.0);
+  real t572 = t494 * t571;
+  real t573 = t569 != 0 ? t572 : 1.0;
+  real t577 = t557 * t436 - t542 * t470;
+  real t578 = 0.0 < t523;
+  real t580 = 1.0 / (t578 != 0 ? t523 : 1.0);
+  real t581 = t498 * t580;
+  real t582 = t578 != 0 ? t581 : 1.0;
+  real t586 = t555 * t445 - t546 * t467;
+  real t587 = 0.0 < t520;
+  real t589 = 1.0 / (t587 != 0 ? t520 : 1.0);
+  real t590 = t502 * t589;
+  real t591 = t587 != 0 ? t590 : 1.0;
+  real t593 = t552 * t508;
+  real t594 = 0.0 < t514;
+  real t596 = 1.0 / (t594 != 0 ? t514 : 1.0);
+  real t597 = t509 * t596;
+  real t598 = t594 != 0 ? t597 : 1.0;
+  real t599 = t593 * t598;
+  real t600 = 0.0 < t517;
+  real t602 = 1.0 / (t600 != 0 ? t517 : 1.0);
+  real t603 = t514 * t602;
+  real t607 = t553 * t454 + t550 * t464;
+  real t609 = -(t506 * t602);
+  real t610 = t600 != 0 ? t609 : 1.0;
+  real t612 = t599 * t603 - t607 * t610;
+  real t613 = t517 * t589;
+  real t615 = t586 * t591 + t612 * t613;
+  real t616 = t520 * t580;
+  real t618 = t577 * t582 + t615 * t616;
+  real t619 = t523 * t571;
+  real t621 = t568 * t573 + t618 * t619;
+  real t622 = 0.0 < t529;
+  real t624 = 1.0 / (t622 != 0 ? t529 : 1.0);
+  real t625 = t490 * t624;
+  real t626 = t622 != 0 ? t625 : 1.0;
+  real t630 = t566 * t427 + t559 * t473;
+  real t634 = t273 * t321 + t563 * t356;
+  real t637 = t634 * t363 - t285 * t365;
+  real t639 = t630 * t480 - t637 * t488;
+  real t640 = t526 * t624;
+  real t642 = t621 * t626 - t639 * t640;
+  real t646 = t618 * t573 - t568 * t619;
+  real t650 = t615 * t582 - t577 * t616;
+  real t654 = t612 * t591 - t586 * t613;
+  real t658 = t599 * t610 + t607 * t603;
+  real t660 = t511 * t596;
+  real t661 = t593 * t660;
+  real t663 = sqrt(J[3]);
+  real t666 = sqrt(t661 * t661 + t663 * t663);
+  real t669 = sqrt(t658 * t658 + t666 * t666);
+  real t672 = sqrt(t654 * t654 + t669 * t669);
+  real t675 = sqrt(t650 * t650 + t672 * t672);
+  real t678 = sqrt(t646 * t646 + t675 * t675);
+  real t681 = sqrt(t642 * t642 + t678 * t678);
+  if (!((1e-26 * t292 < t681 * t681))) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+  real t685 = 1.0 / t313;
+  real t690 = (t161 * t363 + t358 * t365) * t685;
+  real t694 = 1.0 / t406;
+  real t695 = (t637 * t480 + t630 * t488) * t694;
+  real t696 = U[0] * t365;
+  real t697 = t696 * t488;
+  real t698 = t697 * t640;
+  real t699 = 0.0 < t681;
+  real t701 = 1.0 / (t699 != 0 ? t681 : 1.0);
+  real t702 = t642 * t701;
+  real t703 = t699 != 0 ? t702 : 1.0;
+  real t705 = 1.0 / t681;
+  real t706 = t698 * t703 * t705;
+  real t713 = (t487 * t480 + t475 * t488) * t694;
+  real t715 = 1.0 / t529;
+  real t720 = (t639 * t626 + t621 * t640) * t715;
+  real t722 = t697 * t626 * t715 + t720 * t706;
+  real t725 = t695 * t706 - (t696 * t480 * t694 + t713 * t722);
+  real t731 = (t223 * t363 + t484 * t365) * t685;
+  real t737 = (t285 * t363 + t634 * t365) * t685;
+  real t739 = U[0] * t363 * t685 - t690 * t725 - t731 * t722 + t737 * t706;
+  G[0] = t739;
+  real t741 = U[6] * t321;
+  real t747 = t741 * t363 - U[1] * t365;
+  real t749 = U[6] * t356;
+  real t750 = t749 * t427;
+  real t754 = t749 * t473;
+  real t755 = t754 * t573;
+  real t759 = t750 * t480 + t747 * t488;
+  real t765 = t755 * t626 + t759 * t640;
+  real t767 = t754 * t619;
+  real t768 = 0.0 < t678;
+  real t770 = 1.0 / (t768 != 0 ? t678 : 1.0);
+  real t771 = t646 * t770;
+  real t772 = t768 != 0 ? t771 : 1.0;
+  real t773 = t767 * t772;
+  real t774 = t678 * t701;
+  real t777 = (t765 * t703 - t773 * t774) * t705;
+  real t779 = (t755 * t640 - t759 * t626) * t715 - t720 * t777;
+  real t783 = (t747 * t480 - t750 * t488) * t694 - t713 * t779 - t695 * t777;
+  real t789 = (U[1] * t363 + t741 * t365) * t685 - t690 * t783 - t731 * t779 - t737 * t777;
+  G[1] = t789;
+  real t792 = U[11] * t327;
+  real t794 = U[7] * t321 + t792 * t356;
+  real t800 = t794 * t363 - U[2] * t365;
+  real t804 = t792 * t321 - U[7] * t356;
+  real t806 = U[11] * t353;
+  real t807 = t806 * t436;
+  real t809 = t804 * t427 - t807 * t473;
+  real t815 = t809 * t480 - t800 * t488;
+  real t817 = t806 * t470;
+  real t818 = t817 * t582;
+  real t822 = t807 * t427 + t804 * t473;
+  real t824 = t818 * t619 - t822 * t573;
+  real t830 = t824 * t626 - t815 * t640;
+  real t834 = t818 * t573 + t822 * t619;
+  real t836 = t817 * t616;
+  real t837 = 0.0 < t675;
+  real t839 = 1.0 / (t837 != 0 ? t675 : 1.0);
+  real t840 = t650 * t839;
+  real t841 = t837 != 0 ? t840 : 1.0;
+  real t842 = t836 * t841;
+  real t843 = t675 * t770;
+  real t845 = t834 * t772 - t842 * t843;
+  real t848 = (t830 * t703 + t845 * t774) * t705;
+  real t850 = (t815 * t626 + t824 * t640) * t715 - t720 * t848;
+  real t854 = (t800 * t480 + t809 * t488) * t694 - t713 * t850 - t695 * t848;
+  real t860 = (U[2] * t363 + t794 * t365) * t685 - t690 * t854 - t731 * t850 - t737 * t848;
+  G[2] = t860;
+  real t864 = U[15] * t333;
+  real t866 = U[12] * t327 + t864 * t353;
+  real t868 = U[8] * t321 + t866 * t356;
+  real t874 = t868 * t363 - U[3] * t365;
+  real t878 = t866 * t321 - U[8] * t356;
+  real t882 = t864 * t327 - U[12] * t353;
+  real t884 = U[15] * t350;
+  real t885 = t884 * t445;
+  real t887 = t882 * t436 - t885 * t470;
+  real t889 = t878 * t427 + t887 * t473;
+  real t895 = t889 * t480 - t874 * t488;
+  real t899 = t887 * t427 - t878 * t473;
+  real t901 = t884 * t467;
+  real t902 = t901 * t591;
+  real t906 = t885 * t436 + t882 * t470;
+  real t908 = t902 * t616 - t906 * t582;
+  real t910 = t899 * t573 + t908 * t619;
+  real t916 = t910 * t626 - t895 * t640;
+  real t920 = t908 * t573 - t899 * t619;
+  real t924 = t902 * t582 + t906 * t616;
+  real t926 = t901 * t613;
+  real t927 = 0.0 < t672;
+  real t929 = 1.0 / (t927 != 0 ? t672 : 1.0);
+  real t930 = t654 * t929;
+  real t931 = t927 != 0 ? t930 : 1.0;
+  real t932 = t926 * t931;
+  real t933 = t672 * t839;
+  real t935 = t924 * t841 - t932 * t933;
+  real t937 = t920 * t772 + t935 * t843;
+  real t940 = (t916 * t703 + t937 * t774) * t705;
+  real t942 = (t895 * t626 + t910 * t640) * t715 - t720 * t940;
+  real t946 = (t874 * t480 + t889 * t488) * t694 - t713 * t942 - t695 * t940;
+  real t952 = (U[3] * t363 + t868 * t365) * t685 - t690 * t946 - t731 * t942 - t737 * t940;
+  G[3] = t952;
+  real t957 = U[18] * t339;
+  real t959 = U[16] * t333 + t957 * t350;
+  real t961 = U[13] * t327 + t959 * t353;
+  real t963 = U[9] * t321 + t961 * t356;
+  real t969 = t963 * t363 - U[4] * t365;
+  real t973 = t961 * t321 - U[9] * t356;
+  real t977 = t959 * t327 - U[13] * t353;
+  real t981 = t957 * t333 - U[16] * t350;
+  real t983 = U[18] * t347;
+  real t984 = t983 * t454;
+  real t986 = t981 * t445 - t984 * t467;
+  real t988 = t977 * t436 + t986 * t470;
+  real t990 = t973 * t427 + t988 * t473;
+  real t996 = t990 * t480 - t969 * t488;
+  real t1000 = t988 * t427 - t973 * t473;
+  real t1004 = t986 * t436 - t977 * t470;
+  real t1006 = t983 * t464;
+  real t1007 = t1006 * t610;
+  real t1011 = t984 * t445 + t981 * t467;
+  real t1013 = t1007 * t613 - t1011 * t591;
+  real t1015 = t1004 * t582 + t1013 * t616;
+  real t1017 = t1000 * t573 + t1015 * t619;
+  real t1023 = t1017 * t626 - t996 * t640;
+  real t1027 = t1015 * t573 - t1000 * t619;
+  real t1031 = t1013 * t582 - t1004 * t616;
+  real t1035 = t1007 * t591 + t1011 * t613;
+  real t1037 = t1006 * t603;
+  real t1038 = 0.0 < t669;
+  real t1040 = 1.0 / (t1038 != 0 ? t669 : 1.0);
+  real t1041 = t658 * t1040;
+  real t1042 = t1038 != 0 ? t1041 : 1.0;
+  real t1043 = t1037 * t1042;
+  real t1044 = t669 * t929;
+  real t1046 = t1035 * t931 - t1043 * t1044;
+  real t1048 = t1031 * t841 + t1046 * t933;
+  real t1050 = t1027 * t772 + t1048 * t843;
+  real t1053 = (t1023 * t703 + t1050 * t774) * t705;
+  real t1055 = (t996 * t626 + t1017 * t640) * t715 - t720 * t1053;
+  real t1059 = (t969 * t480 + t990 * t488) * t694 - t713 * t1055 - t695 * t1053;
+  real t1065 = (U[4] * t363 + t963 * t365) * t685 - t690 * t1059 - t731 * t1055 - t737 * t1053;
+  G[4] = t1065;
+  real t1071 = U[20] * t345;
+  real t1073 = U[19] * t339 + t1071 * t347;
+  real t1075 = U[17] * t333 + t1073 * t350;
+  real t1077 = U[14] * t327 + t1075 * t353;
+  real t1079 = U[10] * t321 + t1077 * t356;
+  real t1085 = t1079 * t363 - U[5] * t365;
+  real t1089 = t1077 * t321 - U[10] * t356;
+  real t1093 = t1075 * t327 - U[14] * t353;
+  real t1097 = t1073 * t333 - U[17] * t350;
+  real t1101 = t1071 * t339 - U[19] * t347;
+  real t1103 = U[20] * t385;
+  real t1104 = t1103 * t462;
+  real t1106 = t1101 * t454 - t1104 * t464;
+  real t1108 = t1097 * t445 + t1106 * t467;
+  real t1110 = t1093 * t436 + t1108 * t470;
+  real t1112 = t1089 * t427 + t1110 * t473;
+  real t1118 = t1112 * t480 - t1085 * t488;
+  real t1122 = t1110 * t427 - t1089 * t473;
+  real t1126 = t1108 * t436 - t1093 * t470;
+  real t1130 = t1106 * t445 - t1097 * t467;
+  real t1132 = t1103 * t508;
+  real t1133 = t1132 * t598;
+  real t1137 = t1104 * t454 + t1101 * t464;
+  real t1139 = t1133 * t603 - t1137 * t610;
+  real t1141 = t1130 * t591 + t1139 * t613;
+  real t1143 = t1126 * t582 + t1141 * t616;
+  real t1145 = t1122 * t573 + t1143 * t619;
+  real t1151 = t1145 * t626 - t1118 * t640;
+  real t1155 = t1143 * t573 - t1122 * t619;
+  real t1159 = t1141 * t582 - t1126 * t616;
+  real t1163 = t1139 * t591 - t1130 * t613;
+  real t1167 = t1133 * t610 + t1137 * t603;
+  real t1169 = t1132 * t660;
+  real t1170 = 0.0 < t666;
+  real t1172 = 1.0 / (t1170 != 0 ? t666 : 1.0);
+  real t1174 = -(t661 * t1172);
+  real t1175 = t1170 != 0 ? t1174 : 1.0;
+  real t1176 = t1169 * t1175;
+  real t1177 = t666 * t1040;
+  real t1179 = t1167 * t1042 - t1176 * t1177;
+  real t1181 = t1163 * t931 + t1179 * t1044;
+  real t1183 = t1159 * t841 + t1181 * t933;
+  real t1185 = t1155 * t772 + t1183 * t843;
+  real t1188 = (t1151 * t703 + t1185 * t774) * t705;
+  real t1190 = (t1118 * t626 + t1145 * t640) * t715 - t720 * t1188;
+  real t1194 = (t1085 * t480 + t1112 * t488) * t694 - t713 * t1190 - t695 * t1188;
+  real t1200 = (U[5] * t363 + t1079 * t365) * t685 - t690 * t1194 - t731 * t1190 - t737 * t1188;
+  G[5] = t1200;
+  G[6] = t725;
+  G[7] = t783;
+  G[8] = t854;
+  G[9] = t946;
+  G[10] = t1059;
+  G[11] = t1194;
+  G[12] = t722;
+  G[13] = t779;
+  G[14] = t850;
+  G[15] = t942;
+  G[16] = t1055;
+  G[17] = t1190;
+  G[18] = -t706;
+  G[19] = t777;
+  G[20] = t848;
+  G[21] = t940;
+  G[22] = t1053;
+  G[23] = t1188;
+  real t1203 = t10 * 1e-26 < t10;
+  real t1204 = t1203 != 0 ? 0.0 : e[0];
+  real t1208 = 1e-26 * (t8 + t11) < t8;
+  real t1210 = e[0] * (1.0 / U[0]);
+  real t1211 = t1203 != 0 ? t1210 : 0.0;
+  real t1213 = e[1] - U[1] * t1211;
+  real t1214 = t1208 != 0 ? 0.0 : t1213;
+  real t1220 = 1e-26 * (t6 + (t9 + t7)) < t6;
+  real t1223 = t1213 * (1.0 / U[6]);
+  real t1224 = t1208 != 0 ? t1223 : 0.0;
+  real t1227 = e[2] - (U[2] * t1211 + U[7] * t1224);
+  real t1228 = t1220 != 0 ? 0.0 : t1227;
+  real t1235 = 1e-26 * (t31 + (t34 + (t39 + t37))) < t31;
+  real t1237 = t1227 * (1.0 / U[11]);
+  real t1238 = t1220 != 0 ? t1237 : 0.0;
+  real t1244 = e[3] - (U[12] * t1238 + (U[3] * t1211 + U[8] * t1224));
+  real t1245 = t1235 != 0 ? 0.0 : t1244;
+  real t1253 = 1e-26 * (t28 + (t30 + (t33 + (t40 + t36)))) < t28;
+  real t1255 = t1244 * (1.0 / U[15]);
+  real t1256 = t1235 != 0 ? t1255 : 0.0;
+  real t1264 = e[4] - (U[16] * t1256 + (U[13] * t1238 + (U[4] * t1211 + U[9] * t1224)));
+  real t1265 = t1253 != 0 ? 0.0 : t1264;
+  real t1274 = 1e-26 * (t26 + (t27 + (t29 + (t32 + (t38 + t35))))) < t26;
+  real t1276 = t1264 * (1.0 / U[18]);
+  real t1277 = t1253 != 0 ? t1276 : 0.0;
+  real t1287 = e[5] - (U[19] * t1277 + (U[17] * t1256 + (U[14] * t1238 + (U[5] * t1211 + U[10] *
+    t1224))));
+  real t1288 = t1274 != 0 ? 0.0 : t1287;
+  real t1291 = tau[0] - (H[0] * t1204 + H[4] * t1214 + H[8] * t1228 + H[12] * t1245 + H[16] * t1265
+    + H[20] * t1288);
+  real t1293 = d[0] + t1211;
+  real t1295 = d[1] + t1224;
+  real t1297 = d[2] + t1238;
+  real t1299 = d[3] + t1256;
+  real t1301 = d[4] + t1277;
+  real t1304 = t1287 * (1.0 / U[20]);
+  real t1306 = d[5] + (t1274 != 0 ? t1304 : 0.0);
+  real t1307 = t1306 * t345;
+  real t1309 = t1301 * t339 + t1307 * t347;
+  real t1311 = t1299 * t333 + t1309 * t350;
+  real t1313 = t1297 * t327 + t1311 * t353;
+  real t1315 = t1295 * t321 + t1313 * t356;
+  real t1331 = tau[1] - (H[1] * t1204 + H[5] * t1214 + H[9] * t1228 + H[13] * t1245 + H[17] * t1265
+    + H[21] * t1288);
+  real t1333 = t1331 - t1291 * t690;
+  real t1337 = t1315 * t363 - t1293 * t365;
+  real t1341 = t1313 * t321 - t1295 * t356;
+  real t1345 = t1311 * t327 - t1297 * t353;
+  real t1349 = t1309 * t333 - t1299 * t350;
+  real t1353 = t1307 * t339 - t1301 * t347;
+  real t1355 = t1306 * t385;
+  real t1356 = t1355 * t462;
+  real t1358 = t1353 * t454 - t1356 * t464;
+  real t1360 = t1349 * t445 + t1358 * t467;
+  real t1362 = t1345 * t436 + t1360 * t470;
+  real t1364 = t1341 * t427 + t1362 * t473;
+  real t1380 = tau[2] - (H[2] * t1204 + H[6] * t1214 + H[10] * t1228 + H[14] * t1245 + H[18] * t1265
+    + H[22] * t1288);
+  real t1384 = t1380 - t1291 * t731 - t713 * t1333;
+  real t1388 = t1364 * t480 - t1337 * t488;
+  real t1392 = t1362 * t427 - t1341 * t473;
+  real t1396 = t1360 * t436 - t1345 * t470;
+  real t1400 = t1358 * t445 - t1349 * t467;
+  real t1402 = t1355 * t508;
+  real t1403 = t1402 * t598;
+  real t1407 = t1356 * t454 + t1353 * t464;
+  real t1409 = t1403 * t603 - t1407 * t610;
+  real t1411 = t1400 * t591 + t1409 * t613;
+  real t1413 = t1396 * t582 + t1411 * t616;
+  real t1415 = t1392 * t573 + t1413 * t619;
+  real t1431 = tau[3] - (H[3] * t1204 + H[7] * t1214 + H[11] * t1228 + H[15] * t1245 + H[19] * t1265
+    + H[23] * t1288);
+  real t1441 = t1415 * t626 - t1388 * t640;
+  real t1445 = t1413 * t573 - t1392 * t619;
+  real t1449 = t1411 * t582 - t1396 * t616;
+  real t1453 = t1409 * t591 - t1400 * t613;
+  real t1457 = t1403 * t610 + t1407 * t603;
+  real t1459 = t1402 * t660;
+  real t1460 = t1459 * t1175;
+  real t1462 = t1457 * t1042 - t1460 * t1177;
+  real t1464 = t1453 * t931 + t1462 * t1044;
+  real t1466 = t1449 * t841 + t1464 * t933;
+  real t1468 = t1445 * t772 + t1466 * t843;
+  real t1472 = t705 * (t705 * (t1431 - t1291 * t737 - t695 * t1333 - t720 * t1384) - (t1441 * t703 +
+    t1468 * t774));
+  real t1474 = t715 * (t715 * t1384 - (t1388 * t626 + t1415 * t640)) - t720 * t1472;
+  real t1478 = t694 * (t694 * t1333 - (t1337 * t480 + t1364 * t488)) - t713 * t1474 - t695 * t1472;
+  g[0] = t685 * (t1291 * t685 - (t1293 * t363 + t1315 * t365)) - t690 * t1478 - t731 * t1474 - t737
+    * t1472;
+  g[1] = t1478;
+  g[2] = t1474;
+  g[3] = t1472;
+  real t1485 = t698 * t774;
+  real t1487 = (t1485 < 0.0) ? (-1.0) : 1.0;
+  V[0] = t1485 * t1487;
+  V[1] = -((t773 * t703 + t765 * t774) * t1487);
+  V[2] = (t845 * t703 - t830 * t774) * t1487;
+  V[3] = (t937 * t703 - t916 * t774) * t1487;
+  V[4] = (t1050 * t703 - t1023 * t774) * t1487;
+  V[5] = (t1185 * t703 - t1151 * t774) * t1487;
+  real t1510 = t767 * t843;
+  real t1512 = (t1510 < 0.0) ? (-1.0) : 1.0;
+  V[6] = t1510 * t1512;
+  V[7] = -((t842 * t772 + t834 * t843) * t1512);
+  V[8] = (t935 * t772 - t920 * t843) * t1512;
+  V[9] = (t1048 * t772 - t1027 * t843) * t1512;
+  V[10] = (t1183 * t772 - t1155 * t843) * t1512;
+  real t1531 = t836 * t933;
+  real t1533 = (t1531 < 0.0) ? (-1.0) : 1.0;
+  V[11] = t1531 * t1533;
+  V[12] = -((t932 * t841 + t924 * t933) * t1533);
+  V[13] = (t1046 * t841 - t1031 * t933) * t1533;
+  V[14] = (t1181 * t841 - t1159 * t933) * t1533;
+  real t1548 = t926 * t1044;
+  real t1550 = (t1548 < 0.0) ? (-1.0) : 1.0;
+  V[15] = t1548 * t1550;
+  V[16] = -((t1043 * t931 + t1035 * t1044) * t1550);
+  V[17] = (t1179 * t931 - t1163 * t1044) * t1550;
+  real t1561 = t1037 * t1177;
+  real t1563 = (t1561 < 0.0) ? (-1.0) : 1.0;
+  V[18] = t1561 * t1563;
+  V[19] = -((t1176 * t1042 + t1167 * t1177) * t1563);
+  real t1570 = t663 * t1172;
+  real t1571 = t1169 * t1570;
+  real t1573 = (t1571 < 0.0) ? (-1.0) : 1.0;
+  V[20] = t1571 * t1573;
+  d_V[0] = (t1468 * t703 - t1441 * t774) * t1487;
+  d_V[1] = (t1466 * t772 - t1445 * t843) * t1512;
+  d_V[2] = (t1464 * t841 - t1449 * t933) * t1533;
+  d_V[3] = (t1462 * t931 - t1453 * t1044) * t1550;
+  d_V[4] = -((t1460 * t1042 + t1457 * t1177) * t1563);
+  d_V[5] = t1459 * t1570 * t1573;
+  e_Q[0] = t1204 + (t1291 * t739 + t1331 * t725 + t1380 * t722 - t1431 * t706);
+  e_Q[1] = t1214 + (t1291 * t789 + t1331 * t783 + t1380 * t779 + t1431 * t777);
+  e_Q[2] = t1228 + (t1291 * t860 + t1331 * t854 + t1380 * t850 + t1431 * t848);
+  e_Q[3] = t1245 + (t1291 * t952 + t1331 * t946 + t1380 * t942 + t1431 * t940);
+  e_Q[4] = t1265 + (t1291 * t1065 + t1331 * t1059 + t1380 * t1055 + t1431 * t1053);
+  e_Q[5] = t1288 + (t1291 * t1200 + t1331 * t1194 + t1380 * t1190 + t1431 * t1188);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_qr_eliminate_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"J", 4, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 4, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_qr_eliminate_outputs[] = {
-    {"G", 24, "", 0, 0},
-    {"g", 4, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic4_qr_eliminate_guards[] = {
-    {1, "speed 1 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 4 moves no inertia: its acceleration is undetermined"},
-    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic4_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 4 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -5975,127 +1569,31 @@ static const mstmm_guard mstmm_sweep_generic4_qr_eliminate_guards[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic4_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic4_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = H[12] * s[0];
-    const real t7 = H[13] * s[1];
-    const real t8 = t6 + t7;
-    const real t9 = H[14] * s[2];
-    const real t10 = t8 + t9;
-    const real t11 = H[15] * s[3];
-    const real t12 = t10 + t11;
-    const real t13 = c[3] + t12;
-    const real t14 = t5 - t13;
-    const real t15 = motion[3] + t14;
-    Q[3] = t15;
-    const real t16 = w[2] * t0;
-    const real t17 = w[0] * t2;
-    const real t18 = t16 - t17;
-    const real t19 = H[16] * s[0];
-    const real t20 = H[17] * s[1];
-    const real t21 = t19 + t20;
-    const real t22 = H[18] * s[2];
-    const real t23 = t21 + t22;
-    const real t24 = H[19] * s[3];
-    const real t25 = t23 + t24;
-    const real t26 = c[4] + t25;
-    const real t27 = t18 - t26;
-    const real t28 = motion[4] + t27;
-    Q[4] = t28;
-    const real t29 = w[0] * t1;
-    const real t30 = w[1] * t0;
-    const real t31 = t29 - t30;
-    const real t32 = H[20] * s[0];
-    const real t33 = H[21] * s[1];
-    const real t34 = t32 + t33;
-    const real t35 = H[22] * s[2];
-    const real t36 = t34 + t35;
-    const real t37 = H[23] * s[3];
-    const real t38 = t36 + t37;
-    const real t39 = c[5] + t38;
-    const real t40 = t31 - t39;
-    const real t41 = motion[5] + t40;
-    Q[5] = t41;
-    const real t42 = v[1] * t2;
-    const real t43 = t42 * 2.0;
-    const real t44 = v[2] * t1;
-    const real t45 = 2.0 * t44;
-    const real t46 = t43 - t45;
-    const real t47 = H[0] * s[0];
-    const real t48 = H[1] * s[1];
-    const real t49 = t47 + t48;
-    const real t50 = H[2] * s[2];
-    const real t51 = t49 + t50;
-    const real t52 = H[3] * s[3];
-    const real t53 = t51 + t52;
-    const real t54 = c[0] + t53;
-    const real t55 = t46 - t54;
-    const real t56 = motion[6] + t55;
-    Q[6] = t56;
-    const real t57 = v[2] * t0;
-    const real t58 = 2.0 * t57;
-    const real t59 = v[0] * t2;
-    const real t60 = 2.0 * t59;
-    const real t61 = t58 - t60;
-    const real t62 = H[4] * s[0];
-    const real t63 = H[5] * s[1];
-    const real t64 = t62 + t63;
-    const real t65 = H[6] * s[2];
-    const real t66 = t64 + t65;
-    const real t67 = H[7] * s[3];
-    const real t68 = t66 + t67;
-    const real t69 = c[1] + t68;
-    const real t70 = t61 - t69;
-    const real t71 = motion[7] + t70;
-    Q[7] = t71;
-    const real t72 = v[0] * t1;
-    const real t73 = 2.0 * t72;
-    const real t74 = v[1] * t0;
-    const real t75 = 2.0 * t74;
-    const real t76 = t73 - t75;
-    const real t77 = H[8] * s[0];
-    const real t78 = H[9] * s[1];
-    const real t79 = t77 + t78;
-    const real t80 = H[10] * s[2];
-    const real t81 = t79 + t80;
-    const real t82 = H[11] * s[3];
-    const real t83 = t81 + t82;
-    const real t84 = c[2] + t83;
-    const real t85 = t76 - t84;
-    const real t86 = motion[8] + t85;
-    Q[8] = t86;
-    return 0;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - (c[3] + (H[12] * s[0] + H[13] * s[1] + H[14] * s[2] +
+    H[15] * s[3])));
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - (c[4] + (H[16] * s[0] + H[17] * s[1] + H[18] * s[2] +
+    H[19] * s[3])));
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - (c[5] + (H[20] * s[0] + H[21] * s[1] + H[22] * s[2] +
+    H[23] * s[3])));
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - (c[0] + (H[0] * s[0] + H[1] * s[1] +
+    H[2] * s[2] + H[3] * s[3])));
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - (c[1] + (H[4] * s[0] + H[5] * s[1] +
+    H[6] * s[2] + H[7] * s[3])));
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - (c[2] + (H[8] * s[0] + H[9] * s[1] +
+    H[10] * s[2] + H[11] * s[3])));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_carrier_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"s", 4, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 4 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6119,372 +1617,62 @@ static const mstmm_port mstmm_sweep_generic4_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic4_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic4_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = H[12] * d_s[0];
-    const real t16 = H[13] * d_s[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[14] * d_s[2];
-    const real t19 = t17 + t18;
-    const real t20 = H[15] * d_s[3];
-    const real t21 = t19 + t20;
-    const real t22 = s[0] * d_H[12];
-    const real t23 = s[1] * d_H[13];
-    const real t24 = t22 + t23;
-    const real t25 = s[2] * d_H[14];
-    const real t26 = t24 + t25;
-    const real t27 = s[3] * d_H[15];
-    const real t28 = t26 + t27;
-    const real t29 = t21 + t28;
-    const real t30 = d_c[3] + t29;
-    const real t31 = theta[2] * Q[4];
-    const real t32 = Q[1] * d_w[2];
-    const real t33 = Q[2] * d_w[1];
-    const real t34 = t32 - t33;
-    const real t35 = t31 + t34;
-    const real t36 = theta[1] * Q[5];
-    const real t37 = t35 - t36;
-    const real t38 = t30 + t37;
-    const real t39 = t14 + t38;
-    B[3] = t39;
-    const real t40 = w[0] * t10;
-    const real t41 = w[2] * t2;
-    const real t42 = t40 - t41;
-    const real t43 = H[16] * d_s[0];
-    const real t44 = H[17] * d_s[1];
-    const real t45 = t43 + t44;
-    const real t46 = H[18] * d_s[2];
-    const real t47 = t45 + t46;
-    const real t48 = H[19] * d_s[3];
-    const real t49 = t47 + t48;
-    const real t50 = s[0] * d_H[16];
-    const real t51 = s[1] * d_H[17];
-    const real t52 = t50 + t51;
-    const real t53 = s[2] * d_H[18];
-    const real t54 = t52 + t53;
-    const real t55 = s[3] * d_H[19];
-    const real t56 = t54 + t55;
-    const real t57 = t49 + t56;
-    const real t58 = d_c[4] + t57;
-    const real t59 = theta[0] * Q[5];
-    const real t60 = Q[2] * d_w[0];
-    const real t61 = Q[0] * d_w[2];
-    const real t62 = t60 - t61;
-    const real t63 = theta[2] * Q[3];
-    const real t64 = t62 - t63;
-    const real t65 = t59 + t64;
-    const real t66 = t58 + t65;
-    const real t67 = t42 + t66;
-    B[4] = t67;
-    const real t68 = w[1] * t2;
-    const real t69 = w[0] * t6;
-    const real t70 = t68 - t69;
-    const real t71 = H[20] * d_s[0];
-    const real t72 = H[21] * d_s[1];
-    const real t73 = t71 + t72;
-    const real t74 = H[22] * d_s[2];
-    const real t75 = t73 + t74;
-    const real t76 = H[23] * d_s[3];
-    const real t77 = t75 + t76;
-    const real t78 = s[0] * d_H[20];
-    const real t79 = s[1] * d_H[21];
-    const real t80 = t78 + t79;
-    const real t81 = s[2] * d_H[22];
-    const real t82 = t80 + t81;
-    const real t83 = s[3] * d_H[23];
-    const real t84 = t82 + t83;
-    const real t85 = t77 + t84;
-    const real t86 = d_c[5] + t85;
-    const real t87 = theta[1] * Q[3];
-    const real t88 = Q[0] * d_w[1];
-    const real t89 = Q[1] * d_w[0];
-    const real t90 = t88 - t89;
-    const real t91 = t87 + t90;
-    const real t92 = theta[0] * Q[4];
-    const real t93 = t91 - t92;
-    const real t94 = t86 + t93;
-    const real t95 = t70 + t94;
-    B[5] = t95;
-    const real t96 = v[2] * 2.0;
-    const real t97 = t6 * t96;
-    const real t98 = v[1] * 2.0;
-    const real t99 = t10 * t98;
-    const real t100 = t97 - t99;
-    const real t101 = H[0] * d_s[0];
-    const real t102 = H[1] * d_s[1];
-    const real t103 = t101 + t102;
-    const real t104 = H[2] * d_s[2];
-    const real t105 = t103 + t104;
-    const real t106 = H[3] * d_s[3];
-    const real t107 = t105 + t106;
-    const real t108 = s[0] * d_H[0];
-    const real t109 = s[1] * d_H[1];
-    const real t110 = t108 + t109;
-    const real t111 = s[2] * d_H[2];
-    const real t112 = t110 + t111;
-    const real t113 = s[3] * d_H[3];
-    const real t114 = t112 + t113;
-    const real t115 = t107 + t114;
-    const real t116 = d_c[0] + t115;
-    const real t117 = theta[2] * Q[7];
-    const real t118 = x[2] * Q[4];
-    const real t119 = Q[1] * d_v[2];
-    const real t120 = 2.0 * t119;
-    const real t121 = x[1] * Q[0];
-    const real t122 = x[0] * Q[1];
-    const real t123 = t121 - t122;
-    const real t124 = Q[1] * t123;
-    const real t125 = x[0] * Q[2];
-    const real t126 = x[2] * Q[0];
-    const real t127 = t125 - t126;
-    const real t128 = Q[2] * t127;
-    const real t129 = t124 - t128;
-    const real t130 = t120 + t129;
-    const real t131 = Q[2] * d_v[1];
-    const real t132 = 2.0 * t131;
-    const real t133 = t130 - t132;
-    const real t134 = t118 + t133;
-    const real t135 = x[1] * Q[5];
-    const real t136 = t134 - t135;
-    const real t137 = t117 + t136;
-    const real t138 = theta[1] * Q[8];
-    const real t139 = t137 - t138;
-    const real t140 = t116 + t139;
-    const real t141 = t100 + t140;
-    B[6] = t141;
-    const real t142 = v[0] * 2.0;
-    const real t143 = t10 * t142;
-    const real t144 = t2 * t96;
-    const real t145 = t143 - t144;
-    const real t146 = H[4] * d_s[0];
-    const real t147 = H[5] * d_s[1];
-    const real t148 = t146 + t147;
-    const real t149 = H[6] * d_s[2];
-    const real t150 = t148 + t149;
-    const real t151 = H[7] * d_s[3];
-    const real t152 = t150 + t151;
-    const real t153 = s[0] * d_H[4];
-    const real t154 = s[1] * d_H[5];
-    const real t155 = t153 + t154;
-    const real t156 = s[2] * d_H[6];
-    const real t157 = t155 + t156;
-    const real t158 = s[3] * d_H[7];
-    const real t159 = t157 + t158;
-    const real t160 = t152 + t159;
-    const real t161 = d_c[1] + t160;
-    const real t162 = theta[0] * Q[8];
-    const real t163 = x[0] * Q[5];
-    const real t164 = Q[2] * d_v[0];
-    const real t165 = 2.0 * t164;
-    const real t166 = x[2] * Q[1];
-    const real t167 = x[1] * Q[2];
-    const real t168 = t166 - t167;
-    const real t169 = Q[2] * t168;
-    const real t170 = Q[0] * t123;
-    const real t171 = t169 - t170;
-    const real t172 = Q[0] * d_v[2];
-    const real t173 = 2.0 * t172;
-    const real t174 = t171 - t173;
-    const real t175 = t165 + t174;
-    const real t176 = x[2] * Q[3];
-    const real t177 = t175 - t176;
-    const real t178 = t163 + t177;
-    const real t179 = theta[2] * Q[6];
-    const real t180 = t178 - t179;
-    const real t181 = t162 + t180;
-    const real t182 = t161 + t181;
-    const real t183 = t145 + t182;
-    B[7] = t183;
-    const real t184 = t2 * t98;
-    const real t185 = t6 * t142;
-    const real t186 = t184 - t185;
-    const real t187 = H[8] * d_s[0];
-    const real t188 = H[9] * d_s[1];
-    const real t189 = t187 + t188;
-    const real t190 = H[10] * d_s[2];
-    const real t191 = t189 + t190;
-    const real t192 = H[11] * d_s[3];
-    const real t193 = t191 + t192;
-    const real t194 = s[0] * d_H[8];
-    const real t195 = s[1] * d_H[9];
-    const real t196 = t194 + t195;
-    const real t197 = s[2] * d_H[10];
-    const real t198 = t196 + t197;
-    const real t199 = s[3] * d_H[11];
-    const real t200 = t198 + t199;
-    const real t201 = t193 + t200;
-    const real t202 = d_c[2] + t201;
-    const real t203 = theta[1] * Q[6];
-    const real t204 = x[1] * Q[3];
-    const real t205 = Q[0] * d_v[1];
-    const real t206 = 2.0 * t205;
-    const real t207 = Q[0] * t127;
-    const real t208 = Q[1] * t168;
-    const real t209 = t207 - t208;
-    const real t210 = t206 + t209;
-    const real t211 = Q[1] * d_v[0];
-    const real t212 = 2.0 * t211;
-    const real t213 = t210 - t212;
-    const real t214 = t204 + t213;
-    const real t215 = x[0] * Q[4];
-    const real t216 = t214 - t215;
-    const real t217 = t203 + t216;
-    const real t218 = theta[0] * Q[7];
-    const real t219 = t217 - t218;
-    const real t220 = t202 + t219;
-    const real t221 = t186 + t220;
-    B[8] = t221;
-    const real t222 = theta[1] * f[2];
-    const real t223 = theta[2] * f[1];
-    const real t224 = t222 - t223;
-    G[0] = t224;
-    const real t225 = theta[2] * f[0];
-    const real t226 = theta[0] * f[2];
-    const real t227 = t225 - t226;
-    G[1] = t227;
-    const real t228 = theta[0] * f[1];
-    const real t229 = theta[1] * f[0];
-    const real t230 = t228 - t229;
-    G[2] = t230;
-    const real t231 = theta[1] * f[5];
-    const real t232 = x[1] * f[2];
-    const real t233 = x[2] * f[1];
-    const real t234 = t232 - t233;
-    const real t235 = theta[2] * f[4];
-    const real t236 = t234 - t235;
-    const real t237 = t231 + t236;
-    G[3] = t237;
-    const real t238 = theta[2] * f[3];
-    const real t239 = x[2] * f[0];
-    const real t240 = x[0] * f[2];
-    const real t241 = t239 - t240;
-    const real t242 = t238 + t241;
-    const real t243 = theta[0] * f[5];
-    const real t244 = t242 - t243;
-    G[4] = t244;
-    const real t245 = theta[0] * f[4];
-    const real t246 = x[0] * f[1];
-    const real t247 = x[1] * f[0];
-    const real t248 = t246 - t247;
-    const real t249 = theta[1] * f[3];
-    const real t250 = t248 - t249;
-    const real t251 = t245 + t250;
-    G[5] = t251;
-    const real t252 = d_s[0] * J[0];
-    const real t253 = f[0] * d_H[0];
-    const real t254 = f[1] * d_H[4];
-    const real t255 = t253 + t254;
-    const real t256 = f[2] * d_H[8];
-    const real t257 = t255 + t256;
-    const real t258 = f[3] * d_H[12];
-    const real t259 = t257 + t258;
-    const real t260 = f[4] * d_H[16];
-    const real t261 = t259 + t260;
-    const real t262 = f[5] * d_H[20];
-    const real t263 = t261 + t262;
-    const real t264 = t263 - laws[0];
-    const real t265 = t252 + t264;
-    row[0] = t265;
-    const real t266 = d_s[1] * J[1];
-    const real t267 = f[0] * d_H[1];
-    const real t268 = f[1] * d_H[5];
-    const real t269 = t267 + t268;
-    const real t270 = f[2] * d_H[9];
-    const real t271 = t269 + t270;
-    const real t272 = f[3] * d_H[13];
-    const real t273 = t271 + t272;
-    const real t274 = f[4] * d_H[17];
-    const real t275 = t273 + t274;
-    const real t276 = f[5] * d_H[21];
-    const real t277 = t275 + t276;
-    const real t278 = t277 - laws[1];
-    const real t279 = t266 + t278;
-    row[1] = t279;
-    const real t280 = d_s[2] * J[2];
-    const real t281 = f[0] * d_H[2];
-    const real t282 = f[1] * d_H[6];
-    const real t283 = t281 + t282;
-    const real t284 = f[2] * d_H[10];
-    const real t285 = t283 + t284;
-    const real t286 = f[3] * d_H[14];
-    const real t287 = t285 + t286;
-    const real t288 = f[4] * d_H[18];
-    const real t289 = t287 + t288;
-    const real t290 = f[5] * d_H[22];
-    const real t291 = t289 + t290;
-    const real t292 = t291 - laws[2];
-    const real t293 = t280 + t292;
-    row[2] = t293;
-    const real t294 = d_s[3] * J[3];
-    const real t295 = f[0] * d_H[3];
-    const real t296 = f[1] * d_H[7];
-    const real t297 = t295 + t296;
-    const real t298 = f[2] * d_H[11];
-    const real t299 = t297 + t298;
-    const real t300 = f[3] * d_H[15];
-    const real t301 = t299 + t300;
-    const real t302 = f[4] * d_H[19];
-    const real t303 = t301 + t302;
-    const real t304 = f[5] * d_H[23];
-    const real t305 = t303 + t304;
-    const real t306 = t305 - laws[3];
-    const real t307 = t294 + t306;
-    row[3] = t307;
-    return 0;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] +
+    H[15] * d_s[3] + (s[0] * d_H[12] + s[1] * d_H[13] + s[2] * d_H[14] + s[3] * d_H[15])) +
+    (theta[2] * Q[4] + (Q[1] * d_w[2] - Q[2] * d_w[1]) - theta[1] * Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (H[16] * d_s[0] + H[17] * d_s[1] + H[18] * d_s[2] +
+    H[19] * d_s[3] + (s[0] * d_H[16] + s[1] * d_H[17] + s[2] * d_H[18] + s[3] * d_H[19])) +
+    (theta[0] * Q[5] + (Q[2] * d_w[0] - Q[0] * d_w[2] - theta[2] * Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (H[20] * d_s[0] + H[21] * d_s[1] + H[22] * d_s[2] + H[23]
+    * d_s[3] + (s[0] * d_H[20] + s[1] * d_H[21] + s[2] * d_H[22] + s[3] * d_H[23])) + (theta[1] *
+    Q[3] + (Q[0] * d_w[1] - Q[1] * d_w[0]) - theta[0] * Q[4]));
+  real t96 = v[2] * 2.0;
+  real t98 = v[1] * 2.0;
+  real t123 = x[1] * Q[0] - x[0] * Q[1];
+  real t127 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t96 - t10 * t98 + (d_c[0] + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + H[3] *
+    d_s[3] + (s[0] * d_H[0] + s[1] * d_H[1] + s[2] * d_H[2] + s[3] * d_H[3])) + (theta[2] * Q[7] +
+    (x[2] * Q[4] + (2.0 * (Q[1] * d_v[2]) + (Q[1] * t123 - Q[2] * t127) - 2.0 * (Q[2] * d_v[1])) -
+    x[1] * Q[5]) - theta[1] * Q[8]));
+  real t142 = v[0] * 2.0;
+  real t168 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t142 - t2 * t96 + (d_c[1] + (H[4] * d_s[0] + H[5] * d_s[1] + H[6] * d_s[2] + H[7] *
+    d_s[3] + (s[0] * d_H[4] + s[1] * d_H[5] + s[2] * d_H[6] + s[3] * d_H[7])) + (theta[0] * Q[8] +
+    (x[0] * Q[5] + (2.0 * (Q[2] * d_v[0]) + (Q[2] * t168 - Q[0] * t123 - 2.0 * (Q[0] * d_v[2])) -
+    x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t2 * t98 - t6 * t142 + (d_c[2] + (H[8] * d_s[0] + H[9] * d_s[1] + H[10] * d_s[2] + H[11] *
+    d_s[3] + (s[0] * d_H[8] + s[1] * d_H[9] + s[2] * d_H[10] + s[3] * d_H[11])) + (theta[1] * Q[6] +
+    (x[1] * Q[3] + (2.0 * (Q[0] * d_v[1]) + (Q[0] * t127 - Q[1] * t168) - 2.0 * (Q[1] * d_v[0])) -
+    x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] + (f[0] * d_H[0] + f[1] * d_H[4] + f[2] * d_H[8] + f[3] * d_H[12] + f[4] *
+    d_H[16] + f[5] * d_H[20] - laws[0]);
+  row[1] = d_s[1] * J[1] + (f[0] * d_H[1] + f[1] * d_H[5] + f[2] * d_H[9] + f[3] * d_H[13] + f[4] *
+    d_H[17] + f[5] * d_H[21] - laws[1]);
+  row[2] = d_s[2] * J[2] + (f[0] * d_H[2] + f[1] * d_H[6] + f[2] * d_H[10] + f[3] * d_H[14] + f[4] *
+    d_H[18] + f[5] * d_H[22] - laws[2]);
+  row[3] = d_s[3] * J[3] + (f[0] * d_H[3] + f[1] * d_H[7] + f[2] * d_H[11] + f[3] * d_H[15] + f[4] *
+    d_H[19] + f[5] * d_H[23] - laws[3]);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"s", 4, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 24, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 4, "", 0, 0},
-    {"J", 4, "kg*m2 or kg", 0, 0},
-    {"laws", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* rotation and displacement along coordinates of a hinge with 4 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6494,75 +1682,18 @@ static const mstmm_port mstmm_sweep_generic4_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic4_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x)
+int mstmm_sweep_generic4_tangent_coordinate_change(in_t H, in_t d_q, out_t theta, out_t x)
 {
-    const real t0 = H[12] * d_q[0];
-    const real t1 = H[13] * d_q[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[14] * d_q[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * d_q[3];
-    const real t6 = t4 + t5;
-    theta[0] = t6;
-    const real t7 = H[16] * d_q[0];
-    const real t8 = H[17] * d_q[1];
-    const real t9 = t7 + t8;
-    const real t10 = H[18] * d_q[2];
-    const real t11 = t9 + t10;
-    const real t12 = H[19] * d_q[3];
-    const real t13 = t11 + t12;
-    theta[1] = t13;
-    const real t14 = H[20] * d_q[0];
-    const real t15 = H[21] * d_q[1];
-    const real t16 = t14 + t15;
-    const real t17 = H[22] * d_q[2];
-    const real t18 = t16 + t17;
-    const real t19 = H[23] * d_q[3];
-    const real t20 = t18 + t19;
-    theta[2] = t20;
-    const real t21 = H[0] * d_q[0];
-    const real t22 = H[1] * d_q[1];
-    const real t23 = t21 + t22;
-    const real t24 = H[2] * d_q[2];
-    const real t25 = t23 + t24;
-    const real t26 = H[3] * d_q[3];
-    const real t27 = t25 + t26;
-    x[0] = t27;
-    const real t28 = H[4] * d_q[0];
-    const real t29 = H[5] * d_q[1];
-    const real t30 = t28 + t29;
-    const real t31 = H[6] * d_q[2];
-    const real t32 = t30 + t31;
-    const real t33 = H[7] * d_q[3];
-    const real t34 = t32 + t33;
-    x[1] = t34;
-    const real t35 = H[8] * d_q[0];
-    const real t36 = H[9] * d_q[1];
-    const real t37 = t35 + t36;
-    const real t38 = H[10] * d_q[2];
-    const real t39 = t37 + t38;
-    const real t40 = H[11] * d_q[3];
-    const real t41 = t39 + t40;
-    x[2] = t41;
-    return 0;
+  theta[0] = H[12] * d_q[0] + H[13] * d_q[1] + H[14] * d_q[2] + H[15] * d_q[3];
+  theta[1] = H[16] * d_q[0] + H[17] * d_q[1] + H[18] * d_q[2] + H[19] * d_q[3];
+  theta[2] = H[20] * d_q[0] + H[21] * d_q[1] + H[22] * d_q[2] + H[23] * d_q[3];
+  x[0] = H[0] * d_q[0] + H[1] * d_q[1] + H[2] * d_q[2] + H[3] * d_q[3];
+  x[1] = H[4] * d_q[0] + H[5] * d_q[1] + H[6] * d_q[2] + H[7] * d_q[3];
+  x[2] = H[8] * d_q[0] + H[9] * d_q[1] + H[10] * d_q[2] + H[11] * d_q[3];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_coordinate_change_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"d_q", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_coordinate_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_coordinate_change, (in[0], in[1], out[0], out[1]))
 
 /* a direction of a hinge with 4 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6582,331 +1713,60 @@ static const mstmm_port mstmm_sweep_generic4_tangent_coordinate_change_outputs[]
  * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic4_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row)
+int mstmm_sweep_generic4_tangent_steady(in_t theta, in_t x, in_t H, in_t v, in_t w, in_t Q, in_t f,
+    in_t d_u, in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[12] * d_u[0];
-    const real t1 = H[13] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[14] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * d_u[3];
-    const real t6 = t4 + t5;
-    const real t7 = theta[2] * Q[1];
-    const real t8 = theta[1] * Q[2];
-    const real t9 = t7 - t8;
-    const real t10 = t6 + t9;
-    B[0] = t10;
-    const real t11 = H[16] * d_u[0];
-    const real t12 = H[17] * d_u[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[18] * d_u[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[19] * d_u[3];
-    const real t17 = t15 + t16;
-    const real t18 = theta[0] * Q[2];
-    const real t19 = theta[2] * Q[0];
-    const real t20 = t18 - t19;
-    const real t21 = t17 + t20;
-    B[1] = t21;
-    const real t22 = H[20] * d_u[0];
-    const real t23 = H[21] * d_u[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[22] * d_u[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[23] * d_u[3];
-    const real t28 = t26 + t27;
-    const real t29 = theta[1] * Q[0];
-    const real t30 = theta[0] * Q[1];
-    const real t31 = t29 - t30;
-    const real t32 = t28 + t31;
-    B[2] = t32;
-    const real t33 = w[2] * t20;
-    const real t34 = w[1] * t31;
-    const real t35 = t33 - t34;
-    const real t36 = H[12] * d_s[0];
-    const real t37 = H[13] * d_s[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[14] * d_s[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[15] * d_s[3];
-    const real t42 = t40 + t41;
-    const real t43 = theta[2] * Q[4];
-    const real t44 = Q[1] * t28;
-    const real t45 = Q[2] * t17;
-    const real t46 = t44 - t45;
-    const real t47 = t43 + t46;
-    const real t48 = theta[1] * Q[5];
-    const real t49 = t47 - t48;
-    const real t50 = t42 + t49;
-    const real t51 = t35 + t50;
-    B[3] = t51;
-    const real t52 = w[0] * t31;
-    const real t53 = w[2] * t9;
-    const real t54 = t52 - t53;
-    const real t55 = H[16] * d_s[0];
-    const real t56 = H[17] * d_s[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[18] * d_s[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[19] * d_s[3];
-    const real t61 = t59 + t60;
-    const real t62 = theta[0] * Q[5];
-    const real t63 = Q[2] * t6;
-    const real t64 = Q[0] * t28;
-    const real t65 = t63 - t64;
-    const real t66 = theta[2] * Q[3];
-    const real t67 = t65 - t66;
-    const real t68 = t62 + t67;
-    const real t69 = t61 + t68;
-    const real t70 = t54 + t69;
-    B[4] = t70;
-    const real t71 = w[1] * t9;
-    const real t72 = w[0] * t20;
-    const real t73 = t71 - t72;
-    const real t74 = H[20] * d_s[0];
-    const real t75 = H[21] * d_s[1];
-    const real t76 = t74 + t75;
-    const real t77 = H[22] * d_s[2];
-    const real t78 = t76 + t77;
-    const real t79 = H[23] * d_s[3];
-    const real t80 = t78 + t79;
-    const real t81 = theta[1] * Q[3];
-    const real t82 = Q[0] * t17;
-    const real t83 = Q[1] * t6;
-    const real t84 = t82 - t83;
-    const real t85 = t81 + t84;
-    const real t86 = theta[0] * Q[4];
-    const real t87 = t85 - t86;
-    const real t88 = t80 + t87;
-    const real t89 = t73 + t88;
-    B[5] = t89;
-    const real t90 = v[2] * 2.0;
-    const real t91 = t20 * t90;
-    const real t92 = v[1] * 2.0;
-    const real t93 = t31 * t92;
-    const real t94 = t91 - t93;
-    const real t95 = H[0] * d_s[0];
-    const real t96 = H[1] * d_s[1];
-    const real t97 = t95 + t96;
-    const real t98 = H[2] * d_s[2];
-    const real t99 = t97 + t98;
-    const real t100 = H[3] * d_s[3];
-    const real t101 = t99 + t100;
-    const real t102 = v[2] * t17;
-    const real t103 = H[8] * d_u[0];
-    const real t104 = H[9] * d_u[1];
-    const real t105 = t103 + t104;
-    const real t106 = H[10] * d_u[2];
-    const real t107 = t105 + t106;
-    const real t108 = H[11] * d_u[3];
-    const real t109 = t107 + t108;
-    const real t110 = w[1] * t109;
-    const real t111 = H[4] * d_u[0];
-    const real t112 = H[5] * d_u[1];
-    const real t113 = t111 + t112;
-    const real t114 = H[6] * d_u[2];
-    const real t115 = t113 + t114;
-    const real t116 = H[7] * d_u[3];
-    const real t117 = t115 + t116;
-    const real t118 = w[2] * t117;
-    const real t119 = t110 - t118;
-    const real t120 = t102 + t119;
-    const real t121 = v[1] * t28;
-    const real t122 = t120 - t121;
-    const real t123 = t101 + t122;
-    const real t124 = theta[2] * Q[7];
-    const real t125 = x[2] * Q[4];
-    const real t126 = Q[1] * t109;
-    const real t127 = 2.0 * t126;
-    const real t128 = x[1] * Q[0];
-    const real t129 = x[0] * Q[1];
-    const real t130 = t128 - t129;
-    const real t131 = Q[1] * t130;
-    const real t132 = x[0] * Q[2];
-    const real t133 = x[2] * Q[0];
-    const real t134 = t132 - t133;
-    const real t135 = Q[2] * t134;
-    const real t136 = t131 - t135;
-    const real t137 = t127 + t136;
-    const real t138 = Q[2] * t117;
-    const real t139 = 2.0 * t138;
-    const real t140 = t137 - t139;
-    const real t141 = t125 + t140;
-    const real t142 = x[1] * Q[5];
-    const real t143 = t141 - t142;
-    const real t144 = t124 + t143;
-    const real t145 = theta[1] * Q[8];
-    const real t146 = t144 - t145;
-    const real t147 = t123 + t146;
-    const real t148 = t94 + t147;
-    B[6] = t148;
-    const real t149 = v[0] * 2.0;
-    const real t150 = t31 * t149;
-    const real t151 = t9 * t90;
-    const real t152 = t150 - t151;
-    const real t153 = H[4] * d_s[0];
-    const real t154 = H[5] * d_s[1];
-    const real t155 = t153 + t154;
-    const real t156 = H[6] * d_s[2];
-    const real t157 = t155 + t156;
-    const real t158 = H[7] * d_s[3];
-    const real t159 = t157 + t158;
-    const real t160 = v[0] * t28;
-    const real t161 = H[0] * d_u[0];
-    const real t162 = H[1] * d_u[1];
-    const real t163 = t161 + t162;
-    const real t164 = H[2] * d_u[2];
-    const real t165 = t163 + t164;
-    const real t166 = H[3] * d_u[3];
-    const real t167 = t165 + t166;
-    const real t168 = w[2] * t167;
-    const real t169 = w[0] * t109;
-    const real t170 = t168 - t169;
-    const real t171 = v[2] * t6;
-    const real t172 = t170 - t171;
-    const real t173 = t160 + t172;
-    const real t174 = t159 + t173;
-    const real t175 = theta[0] * Q[8];
-    const real t176 = x[0] * Q[5];
-    const real t177 = Q[2] * t167;
-    const real t178 = 2.0 * t177;
-    const real t179 = x[2] * Q[1];
-    const real t180 = x[1] * Q[2];
-    const real t181 = t179 - t180;
-    const real t182 = Q[2] * t181;
-    const real t183 = Q[0] * t130;
-    const real t184 = t182 - t183;
-    const real t185 = Q[0] * t109;
-    const real t186 = 2.0 * t185;
-    const real t187 = t184 - t186;
-    const real t188 = t178 + t187;
-    const real t189 = x[2] * Q[3];
-    const real t190 = t188 - t189;
-    const real t191 = t176 + t190;
-    const real t192 = theta[2] * Q[6];
-    const real t193 = t191 - t192;
-    const real t194 = t175 + t193;
-    const real t195 = t174 + t194;
-    const real t196 = t152 + t195;
-    B[7] = t196;
-    const real t197 = t9 * t92;
-    const real t198 = t20 * t149;
-    const real t199 = t197 - t198;
-    const real t200 = H[8] * d_s[0];
-    const real t201 = H[9] * d_s[1];
-    const real t202 = t200 + t201;
-    const real t203 = H[10] * d_s[2];
-    const real t204 = t202 + t203;
-    const real t205 = H[11] * d_s[3];
-    const real t206 = t204 + t205;
-    const real t207 = v[1] * t6;
-    const real t208 = w[0] * t117;
-    const real t209 = w[1] * t167;
-    const real t210 = t208 - t209;
-    const real t211 = t207 + t210;
-    const real t212 = v[0] * t17;
-    const real t213 = t211 - t212;
-    const real t214 = t206 + t213;
-    const real t215 = theta[1] * Q[6];
-    const real t216 = x[1] * Q[3];
-    const real t217 = Q[0] * t117;
-    const real t218 = 2.0 * t217;
-    const real t219 = Q[0] * t134;
-    const real t220 = Q[1] * t181;
-    const real t221 = t219 - t220;
-    const real t222 = t218 + t221;
-    const real t223 = Q[1] * t167;
-    const real t224 = 2.0 * t223;
-    const real t225 = t222 - t224;
-    const real t226 = t216 + t225;
-    const real t227 = x[0] * Q[4];
-    const real t228 = t226 - t227;
-    const real t229 = t215 + t228;
-    const real t230 = theta[0] * Q[7];
-    const real t231 = t229 - t230;
-    const real t232 = t214 + t231;
-    const real t233 = t199 + t232;
-    B[8] = t233;
-    const real t234 = theta[1] * f[2];
-    const real t235 = theta[2] * f[1];
-    const real t236 = t234 - t235;
-    G[0] = t236;
-    const real t237 = theta[2] * f[0];
-    const real t238 = theta[0] * f[2];
-    const real t239 = t237 - t238;
-    G[1] = t239;
-    const real t240 = theta[0] * f[1];
-    const real t241 = theta[1] * f[0];
-    const real t242 = t240 - t241;
-    G[2] = t242;
-    const real t243 = theta[1] * f[5];
-    const real t244 = x[1] * f[2];
-    const real t245 = x[2] * f[1];
-    const real t246 = t244 - t245;
-    const real t247 = theta[2] * f[4];
-    const real t248 = t246 - t247;
-    const real t249 = t243 + t248;
-    G[3] = t249;
-    const real t250 = theta[2] * f[3];
-    const real t251 = x[2] * f[0];
-    const real t252 = x[0] * f[2];
-    const real t253 = t251 - t252;
-    const real t254 = t250 + t253;
-    const real t255 = theta[0] * f[5];
-    const real t256 = t254 - t255;
-    G[4] = t256;
-    const real t257 = theta[0] * f[4];
-    const real t258 = x[0] * f[1];
-    const real t259 = x[1] * f[0];
-    const real t260 = t258 - t259;
-    const real t261 = theta[1] * f[3];
-    const real t262 = t260 - t261;
-    const real t263 = t257 + t262;
-    G[5] = t263;
-    const real t264 = d_s[0] * J[0];
-    const real t265 = t264 - laws[0];
-    row[0] = t265;
-    const real t266 = d_s[1] * J[1];
-    const real t267 = t266 - laws[1];
-    row[1] = t267;
-    const real t268 = d_s[2] * J[2];
-    const real t269 = t268 - laws[2];
-    row[2] = t269;
-    const real t270 = d_s[3] * J[3];
-    const real t271 = t270 - laws[3];
-    row[3] = t271;
-    return 0;
+  real t6 = H[12] * d_u[0] + H[13] * d_u[1] + H[14] * d_u[2] + H[15] * d_u[3];
+  real t9 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t6 + t9;
+  real t17 = H[16] * d_u[0] + H[17] * d_u[1] + H[18] * d_u[2] + H[19] * d_u[3];
+  real t20 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t17 + t20;
+  real t28 = H[20] * d_u[0] + H[21] * d_u[1] + H[22] * d_u[2] + H[23] * d_u[3];
+  real t31 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t28 + t31;
+  B[3] = w[2] * t20 - w[1] * t31 + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] + H[15] *
+    d_s[3] + (theta[2] * Q[4] + (Q[1] * t28 - Q[2] * t17) - theta[1] * Q[5]));
+  B[4] = w[0] * t31 - w[2] * t9 + (H[16] * d_s[0] + H[17] * d_s[1] + H[18] * d_s[2] + H[19] * d_s[3]
+    + (theta[0] * Q[5] + (Q[2] * t6 - Q[0] * t28 - theta[2] * Q[3])));
+  B[5] = w[1] * t9 - w[0] * t20 + (H[20] * d_s[0] + H[21] * d_s[1] + H[22] * d_s[2] + H[23] * d_s[3]
+    + (theta[1] * Q[3] + (Q[0] * t17 - Q[1] * t6) - theta[0] * Q[4]));
+  real t90 = v[2] * 2.0;
+  real t92 = v[1] * 2.0;
+  real t109 = H[8] * d_u[0] + H[9] * d_u[1] + H[10] * d_u[2] + H[11] * d_u[3];
+  real t117 = H[4] * d_u[0] + H[5] * d_u[1] + H[6] * d_u[2] + H[7] * d_u[3];
+  real t130 = x[1] * Q[0] - x[0] * Q[1];
+  real t134 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t20 * t90 - t31 * t92 + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + H[3] * d_s[3] +
+    (v[2] * t17 + (w[1] * t109 - w[2] * t117) - v[1] * t28) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0
+    * (Q[1] * t109) + (Q[1] * t130 - Q[2] * t134) - 2.0 * (Q[2] * t117)) - x[1] * Q[5]) - theta[1] *
+    Q[8]));
+  real t149 = v[0] * 2.0;
+  real t167 = H[0] * d_u[0] + H[1] * d_u[1] + H[2] * d_u[2] + H[3] * d_u[3];
+  real t181 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t31 * t149 - t9 * t90 + (H[4] * d_s[0] + H[5] * d_s[1] + H[6] * d_s[2] + H[7] * d_s[3] +
+    (v[0] * t28 + (w[2] * t167 - w[0] * t109 - v[2] * t6)) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0
+    * (Q[2] * t167) + (Q[2] * t181 - Q[0] * t130 - 2.0 * (Q[0] * t109)) - x[2] * Q[3]) - theta[2] *
+    Q[6])));
+  B[8] = t9 * t92 - t20 * t149 + (H[8] * d_s[0] + H[9] * d_s[1] + H[10] * d_s[2] + H[11] * d_s[3] +
+    (v[1] * t6 + (w[0] * t117 - w[1] * t167) - v[0] * t17) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0
+    * (Q[0] * t117) + (Q[0] * t134 - Q[1] * t181) - 2.0 * (Q[1] * t167)) - x[0] * Q[4]) - theta[0] *
+    Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  row[3] = d_s[3] * J[3] - laws[3];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_steady_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_steady_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 4, "", 0, 0},
-    {"d_s", 4, "", 0, 0},
-    {"J", 4, "kg*m2 or kg", 0, 0},
-    {"laws", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_steady_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_steady, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], out[0], out[1], out[2]))
 
 /* a direction of a hinge with 4 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -6924,181 +1784,42 @@ static const mstmm_port mstmm_sweep_generic4_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[4] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic4_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+int mstmm_sweep_generic4_tangent_rotational(in_t theta, in_t H, in_t w, in_t Q, in_t f, in_t d_u,
+    in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[12] * d_u[0];
-    const real t1 = H[13] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[14] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * d_u[3];
-    const real t6 = t4 + t5;
-    const real t7 = theta[2] * Q[1];
-    const real t8 = theta[1] * Q[2];
-    const real t9 = t7 - t8;
-    const real t10 = t6 + t9;
-    B[0] = t10;
-    const real t11 = H[16] * d_u[0];
-    const real t12 = H[17] * d_u[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[18] * d_u[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[19] * d_u[3];
-    const real t17 = t15 + t16;
-    const real t18 = theta[0] * Q[2];
-    const real t19 = theta[2] * Q[0];
-    const real t20 = t18 - t19;
-    const real t21 = t17 + t20;
-    B[1] = t21;
-    const real t22 = H[20] * d_u[0];
-    const real t23 = H[21] * d_u[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[22] * d_u[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[23] * d_u[3];
-    const real t28 = t26 + t27;
-    const real t29 = theta[1] * Q[0];
-    const real t30 = theta[0] * Q[1];
-    const real t31 = t29 - t30;
-    const real t32 = t28 + t31;
-    B[2] = t32;
-    const real t33 = w[2] * t20;
-    const real t34 = w[1] * t31;
-    const real t35 = t33 - t34;
-    const real t36 = H[12] * d_s[0];
-    const real t37 = H[13] * d_s[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[14] * d_s[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[15] * d_s[3];
-    const real t42 = t40 + t41;
-    const real t43 = theta[2] * Q[4];
-    const real t44 = Q[1] * t28;
-    const real t45 = Q[2] * t17;
-    const real t46 = t44 - t45;
-    const real t47 = t43 + t46;
-    const real t48 = theta[1] * Q[5];
-    const real t49 = t47 - t48;
-    const real t50 = t42 + t49;
-    const real t51 = t35 + t50;
-    B[3] = t51;
-    const real t52 = w[0] * t31;
-    const real t53 = w[2] * t9;
-    const real t54 = t52 - t53;
-    const real t55 = H[16] * d_s[0];
-    const real t56 = H[17] * d_s[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[18] * d_s[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[19] * d_s[3];
-    const real t61 = t59 + t60;
-    const real t62 = theta[0] * Q[5];
-    const real t63 = Q[2] * t6;
-    const real t64 = Q[0] * t28;
-    const real t65 = t63 - t64;
-    const real t66 = theta[2] * Q[3];
-    const real t67 = t65 - t66;
-    const real t68 = t62 + t67;
-    const real t69 = t61 + t68;
-    const real t70 = t54 + t69;
-    B[4] = t70;
-    const real t71 = w[1] * t9;
-    const real t72 = w[0] * t20;
-    const real t73 = t71 - t72;
-    const real t74 = H[20] * d_s[0];
-    const real t75 = H[21] * d_s[1];
-    const real t76 = t74 + t75;
-    const real t77 = H[22] * d_s[2];
-    const real t78 = t76 + t77;
-    const real t79 = H[23] * d_s[3];
-    const real t80 = t78 + t79;
-    const real t81 = theta[1] * Q[3];
-    const real t82 = Q[0] * t17;
-    const real t83 = Q[1] * t6;
-    const real t84 = t82 - t83;
-    const real t85 = t81 + t84;
-    const real t86 = theta[0] * Q[4];
-    const real t87 = t85 - t86;
-    const real t88 = t80 + t87;
-    const real t89 = t73 + t88;
-    B[5] = t89;
-    const real t90 = theta[2] * Q[7];
-    const real t91 = theta[1] * Q[8];
-    const real t92 = t90 - t91;
-    B[6] = t92;
-    const real t93 = theta[0] * Q[8];
-    const real t94 = theta[2] * Q[6];
-    const real t95 = t93 - t94;
-    B[7] = t95;
-    const real t96 = theta[1] * Q[6];
-    const real t97 = theta[0] * Q[7];
-    const real t98 = t96 - t97;
-    B[8] = t98;
-    const real t99 = theta[1] * f[2];
-    const real t100 = theta[2] * f[1];
-    const real t101 = t99 - t100;
-    G[0] = t101;
-    const real t102 = theta[2] * f[0];
-    const real t103 = theta[0] * f[2];
-    const real t104 = t102 - t103;
-    G[1] = t104;
-    const real t105 = theta[0] * f[1];
-    const real t106 = theta[1] * f[0];
-    const real t107 = t105 - t106;
-    G[2] = t107;
-    const real t108 = theta[1] * f[5];
-    const real t109 = theta[2] * f[4];
-    const real t110 = t108 - t109;
-    G[3] = t110;
-    const real t111 = theta[2] * f[3];
-    const real t112 = theta[0] * f[5];
-    const real t113 = t111 - t112;
-    G[4] = t113;
-    const real t114 = theta[0] * f[4];
-    const real t115 = theta[1] * f[3];
-    const real t116 = t114 - t115;
-    G[5] = t116;
-    const real t117 = d_s[0] * J[0];
-    const real t118 = t117 - laws[0];
-    row[0] = t118;
-    const real t119 = d_s[1] * J[1];
-    const real t120 = t119 - laws[1];
-    row[1] = t120;
-    const real t121 = d_s[2] * J[2];
-    const real t122 = t121 - laws[2];
-    row[2] = t122;
-    const real t123 = d_s[3] * J[3];
-    const real t124 = t123 - laws[3];
-    row[3] = t124;
-    return 0;
+  real t6 = H[12] * d_u[0] + H[13] * d_u[1] + H[14] * d_u[2] + H[15] * d_u[3];
+  real t9 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t6 + t9;
+  real t17 = H[16] * d_u[0] + H[17] * d_u[1] + H[18] * d_u[2] + H[19] * d_u[3];
+  real t20 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t17 + t20;
+  real t28 = H[20] * d_u[0] + H[21] * d_u[1] + H[22] * d_u[2] + H[23] * d_u[3];
+  real t31 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t28 + t31;
+  B[3] = w[2] * t20 - w[1] * t31 + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] + H[15] *
+    d_s[3] + (theta[2] * Q[4] + (Q[1] * t28 - Q[2] * t17) - theta[1] * Q[5]));
+  B[4] = w[0] * t31 - w[2] * t9 + (H[16] * d_s[0] + H[17] * d_s[1] + H[18] * d_s[2] + H[19] * d_s[3]
+    + (theta[0] * Q[5] + (Q[2] * t6 - Q[0] * t28 - theta[2] * Q[3])));
+  B[5] = w[1] * t9 - w[0] * t20 + (H[20] * d_s[0] + H[21] * d_s[1] + H[22] * d_s[2] + H[23] * d_s[3]
+    + (theta[1] * Q[3] + (Q[0] * t17 - Q[1] * t6) - theta[0] * Q[4]));
+  B[6] = theta[2] * Q[7] - theta[1] * Q[8];
+  B[7] = theta[0] * Q[8] - theta[2] * Q[6];
+  B[8] = theta[1] * Q[6] - theta[0] * Q[7];
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] - theta[2] * f[4];
+  G[4] = theta[2] * f[3] - theta[0] * f[5];
+  G[5] = theta[0] * f[4] - theta[1] * f[3];
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  row[3] = d_s[3] * J[3] - laws[3];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_rotational_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_rotational_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 4, "", 0, 0},
-    {"d_s", 4, "", 0, 0},
-    {"J", 4, "kg*m2 or kg", 0, 0},
-    {"laws", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_rotational_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_rotational, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2]))
 
 /* rows of a hinge with 4 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7112,395 +1833,217 @@ static const mstmm_port mstmm_sweep_generic4_tangent_rotational_outputs[] = {
  * out D[4][4] rows by unknowns
  * out one[4][4] unit matrix
  */
-int mstmm_sweep_generic4_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one)
+int mstmm_sweep_generic4_tangent_rows(in_t H, in_t B, in_t W, in_t S, out_t K, out_t right, out_t D,
+    out_t one)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = B[0] * v0;
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = B[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = B[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = B[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = B[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = B[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = B[6] * v17;
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = B[7] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = B[8] * v23;
-        const two_t v25 = v22 + v24;
-        const two_t v26 = B[9] * v0;
-        const two_t v27 = B[10] * v2;
-        const two_t v28 = v26 + v27;
-        const two_t v29 = B[11] * v5;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = B[12] * v8;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = B[13] * v11;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = B[14] * v14;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = B[15] * v17;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = B[16] * v20;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = B[17] * v23;
-        const two_t v42 = v40 + v41;
-        const two_t v43 = B[18] * v0;
-        const two_t v44 = B[19] * v2;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = B[20] * v5;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = B[21] * v8;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = B[22] * v11;
-        const two_t v51 = v49 + v50;
-        const two_t v52 = B[23] * v14;
-        const two_t v53 = v51 + v52;
-        const two_t v54 = B[24] * v17;
-        const two_t v55 = v53 + v54;
-        const two_t v56 = B[25] * v20;
-        const two_t v57 = v55 + v56;
-        const two_t v58 = B[26] * v23;
-        const two_t v59 = v57 + v58;
-        const two_t v60 = B[27] * v0;
-        const two_t v61 = B[28] * v2;
-        const two_t v62 = v60 + v61;
-        const two_t v63 = B[29] * v5;
-        const two_t v64 = v62 + v63;
-        const two_t v65 = B[30] * v8;
-        const two_t v66 = v64 + v65;
-        const two_t v67 = B[31] * v11;
-        const two_t v68 = v66 + v67;
-        const two_t v69 = B[32] * v14;
-        const two_t v70 = v68 + v69;
-        const two_t v71 = B[33] * v17;
-        const two_t v72 = v70 + v71;
-        const two_t v73 = B[34] * v20;
-        const two_t v74 = v72 + v73;
-        const two_t v75 = B[35] * v23;
-        const two_t v76 = v74 + v75;
-        *(two_free_t *)(K + 0 + k) = v25;
-        *(two_free_t *)(K + 6 + k) = v42;
-        *(two_free_t *)(K + 12 + k) = v59;
-        *(two_free_t *)(K + 18 + k) = v76;
-    }
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
-        const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
-        const two_t v3 = H[4] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
-        const two_t v6 = H[8] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
-        const two_t v9 = H[12] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
-        const two_t v12 = H[16] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
-        const two_t v15 = H[20] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = H[1] * v0;
-        const two_t v18 = H[5] * v2;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = H[9] * v5;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = H[13] * v8;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = H[17] * v11;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = H[21] * v14;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = H[2] * v0;
-        const two_t v29 = H[6] * v2;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = H[10] * v5;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = H[14] * v8;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = H[18] * v11;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = H[22] * v14;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = H[3] * v0;
-        const two_t v40 = H[7] * v2;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = H[11] * v5;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = H[15] * v8;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = H[19] * v11;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = H[23] * v14;
-        const two_t v49 = v47 + v48;
-        *(two_free_t *)(right + 0 + k) = v16;
-        *(two_free_t *)(right + 9 + k) = v27;
-        *(two_free_t *)(right + 18 + k) = v38;
-        *(two_free_t *)(right + 27 + k) = v49;
-    }
-    const real t804 = H[0] * K[0];
-    const real t805 = H[4] * K[1];
-    const real t806 = t804 + t805;
-    const real t807 = H[8] * K[2];
-    const real t808 = t806 + t807;
-    const real t809 = H[12] * K[3];
-    const real t810 = t808 + t809;
-    const real t811 = H[16] * K[4];
-    const real t812 = t810 + t811;
-    const real t813 = H[20] * K[5];
-    const real t814 = t812 + t813;
-    const real t815 = W[0] + t814;
-    D[0] = t815;
-    const real t816 = H[0] * K[6];
-    const real t817 = H[4] * K[7];
-    const real t818 = t816 + t817;
-    const real t819 = H[8] * K[8];
-    const real t820 = t818 + t819;
-    const real t821 = H[12] * K[9];
-    const real t822 = t820 + t821;
-    const real t823 = H[16] * K[10];
-    const real t824 = t822 + t823;
-    const real t825 = H[20] * K[11];
-    const real t826 = t824 + t825;
-    const real t827 = W[4] + t826;
-    D[1] = t827;
-    const real t828 = H[0] * K[12];
-    const real t829 = H[4] * K[13];
-    const real t830 = t828 + t829;
-    const real t831 = H[8] * K[14];
-    const real t832 = t830 + t831;
-    const real t833 = H[12] * K[15];
-    const real t834 = t832 + t833;
-    const real t835 = H[16] * K[16];
-    const real t836 = t834 + t835;
-    const real t837 = H[20] * K[17];
-    const real t838 = t836 + t837;
-    const real t839 = W[8] + t838;
-    D[2] = t839;
-    const real t840 = H[0] * K[18];
-    const real t841 = H[4] * K[19];
-    const real t842 = t840 + t841;
-    const real t843 = H[8] * K[20];
-    const real t844 = t842 + t843;
-    const real t845 = H[12] * K[21];
-    const real t846 = t844 + t845;
-    const real t847 = H[16] * K[22];
-    const real t848 = t846 + t847;
-    const real t849 = H[20] * K[23];
-    const real t850 = t848 + t849;
-    const real t851 = W[12] + t850;
-    D[3] = t851;
-    const real t852 = H[1] * K[0];
-    const real t853 = H[5] * K[1];
-    const real t854 = t852 + t853;
-    const real t855 = H[9] * K[2];
-    const real t856 = t854 + t855;
-    const real t857 = H[13] * K[3];
-    const real t858 = t856 + t857;
-    const real t859 = H[17] * K[4];
-    const real t860 = t858 + t859;
-    const real t861 = H[21] * K[5];
-    const real t862 = t860 + t861;
-    const real t863 = W[1] + t862;
-    D[4] = t863;
-    const real t864 = H[1] * K[6];
-    const real t865 = H[5] * K[7];
-    const real t866 = t864 + t865;
-    const real t867 = H[9] * K[8];
-    const real t868 = t866 + t867;
-    const real t869 = H[13] * K[9];
-    const real t870 = t868 + t869;
-    const real t871 = H[17] * K[10];
-    const real t872 = t870 + t871;
-    const real t873 = H[21] * K[11];
-    const real t874 = t872 + t873;
-    const real t875 = W[5] + t874;
-    D[5] = t875;
-    const real t876 = H[1] * K[12];
-    const real t877 = H[5] * K[13];
-    const real t878 = t876 + t877;
-    const real t879 = H[9] * K[14];
-    const real t880 = t878 + t879;
-    const real t881 = H[13] * K[15];
-    const real t882 = t880 + t881;
-    const real t883 = H[17] * K[16];
-    const real t884 = t882 + t883;
-    const real t885 = H[21] * K[17];
-    const real t886 = t884 + t885;
-    const real t887 = W[9] + t886;
-    D[6] = t887;
-    const real t888 = H[1] * K[18];
-    const real t889 = H[5] * K[19];
-    const real t890 = t888 + t889;
-    const real t891 = H[9] * K[20];
-    const real t892 = t890 + t891;
-    const real t893 = H[13] * K[21];
-    const real t894 = t892 + t893;
-    const real t895 = H[17] * K[22];
-    const real t896 = t894 + t895;
-    const real t897 = H[21] * K[23];
-    const real t898 = t896 + t897;
-    const real t899 = W[13] + t898;
-    D[7] = t899;
-    const real t900 = H[2] * K[0];
-    const real t901 = H[6] * K[1];
-    const real t902 = t900 + t901;
-    const real t903 = H[10] * K[2];
-    const real t904 = t902 + t903;
-    const real t905 = H[14] * K[3];
-    const real t906 = t904 + t905;
-    const real t907 = H[18] * K[4];
-    const real t908 = t906 + t907;
-    const real t909 = H[22] * K[5];
-    const real t910 = t908 + t909;
-    const real t911 = W[2] + t910;
-    D[8] = t911;
-    const real t912 = H[2] * K[6];
-    const real t913 = H[6] * K[7];
-    const real t914 = t912 + t913;
-    const real t915 = H[10] * K[8];
-    const real t916 = t914 + t915;
-    const real t917 = H[14] * K[9];
-    const real t918 = t916 + t917;
-    const real t919 = H[18] * K[10];
-    const real t920 = t918 + t919;
-    const real t921 = H[22] * K[11];
-    const real t922 = t920 + t921;
-    const real t923 = W[6] + t922;
-    D[9] = t923;
-    const real t924 = H[2] * K[12];
-    const real t925 = H[6] * K[13];
-    const real t926 = t924 + t925;
-    const real t927 = H[10] * K[14];
-    const real t928 = t926 + t927;
-    const real t929 = H[14] * K[15];
-    const real t930 = t928 + t929;
-    const real t931 = H[18] * K[16];
-    const real t932 = t930 + t931;
-    const real t933 = H[22] * K[17];
-    const real t934 = t932 + t933;
-    const real t935 = W[10] + t934;
-    D[10] = t935;
-    const real t936 = H[2] * K[18];
-    const real t937 = H[6] * K[19];
-    const real t938 = t936 + t937;
-    const real t939 = H[10] * K[20];
-    const real t940 = t938 + t939;
-    const real t941 = H[14] * K[21];
-    const real t942 = t940 + t941;
-    const real t943 = H[18] * K[22];
-    const real t944 = t942 + t943;
-    const real t945 = H[22] * K[23];
-    const real t946 = t944 + t945;
-    const real t947 = W[14] + t946;
-    D[11] = t947;
-    const real t948 = H[3] * K[0];
-    const real t949 = H[7] * K[1];
-    const real t950 = t948 + t949;
-    const real t951 = H[11] * K[2];
-    const real t952 = t950 + t951;
-    const real t953 = H[15] * K[3];
-    const real t954 = t952 + t953;
-    const real t955 = H[19] * K[4];
-    const real t956 = t954 + t955;
-    const real t957 = H[23] * K[5];
-    const real t958 = t956 + t957;
-    const real t959 = W[3] + t958;
-    D[12] = t959;
-    const real t960 = H[3] * K[6];
-    const real t961 = H[7] * K[7];
-    const real t962 = t960 + t961;
-    const real t963 = H[11] * K[8];
-    const real t964 = t962 + t963;
-    const real t965 = H[15] * K[9];
-    const real t966 = t964 + t965;
-    const real t967 = H[19] * K[10];
-    const real t968 = t966 + t967;
-    const real t969 = H[23] * K[11];
-    const real t970 = t968 + t969;
-    const real t971 = W[7] + t970;
-    D[13] = t971;
-    const real t972 = H[3] * K[12];
-    const real t973 = H[7] * K[13];
-    const real t974 = t972 + t973;
-    const real t975 = H[11] * K[14];
-    const real t976 = t974 + t975;
-    const real t977 = H[15] * K[15];
-    const real t978 = t976 + t977;
-    const real t979 = H[19] * K[16];
-    const real t980 = t978 + t979;
-    const real t981 = H[23] * K[17];
-    const real t982 = t980 + t981;
-    const real t983 = W[11] + t982;
-    D[14] = t983;
-    const real t984 = H[3] * K[18];
-    const real t985 = H[7] * K[19];
-    const real t986 = t984 + t985;
-    const real t987 = H[11] * K[20];
-    const real t988 = t986 + t987;
-    const real t989 = H[15] * K[21];
-    const real t990 = t988 + t989;
-    const real t991 = H[19] * K[22];
-    const real t992 = t990 + t991;
-    const real t993 = H[23] * K[23];
-    const real t994 = t992 + t993;
-    const real t995 = W[15] + t994;
-    D[15] = t995;
-    one[0] = 1.0;
-    one[1] = 0.0;
-    one[2] = 0.0;
-    one[3] = 0.0;
-    one[4] = 0.0;
-    one[5] = 1.0;
-    one[6] = 0.0;
-    one[7] = 0.0;
-    one[8] = 0.0;
-    one[9] = 0.0;
-    one[10] = 1.0;
-    one[11] = 0.0;
-    one[12] = 0.0;
-    one[13] = 0.0;
-    one[14] = 0.0;
-    one[15] = 1.0;
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = B[0] * v0;
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = B[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = B[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = B[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = B[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = B[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = B[6] * v17;
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = B[7] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = B[8] * v23;
+    const two_t v25 = v22 + v24;
+    const two_t v26 = B[9] * v0;
+    const two_t v27 = B[10] * v2;
+    const two_t v28 = v26 + v27;
+    const two_t v29 = B[11] * v5;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = B[12] * v8;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = B[13] * v11;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = B[14] * v14;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = B[15] * v17;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = B[16] * v20;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = B[17] * v23;
+    const two_t v42 = v40 + v41;
+    const two_t v43 = B[18] * v0;
+    const two_t v44 = B[19] * v2;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = B[20] * v5;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = B[21] * v8;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = B[22] * v11;
+    const two_t v51 = v49 + v50;
+    const two_t v52 = B[23] * v14;
+    const two_t v53 = v51 + v52;
+    const two_t v54 = B[24] * v17;
+    const two_t v55 = v53 + v54;
+    const two_t v56 = B[25] * v20;
+    const two_t v57 = v55 + v56;
+    const two_t v58 = B[26] * v23;
+    const two_t v59 = v57 + v58;
+    const two_t v60 = B[27] * v0;
+    const two_t v61 = B[28] * v2;
+    const two_t v62 = v60 + v61;
+    const two_t v63 = B[29] * v5;
+    const two_t v64 = v62 + v63;
+    const two_t v65 = B[30] * v8;
+    const two_t v66 = v64 + v65;
+    const two_t v67 = B[31] * v11;
+    const two_t v68 = v66 + v67;
+    const two_t v69 = B[32] * v14;
+    const two_t v70 = v68 + v69;
+    const two_t v71 = B[33] * v17;
+    const two_t v72 = v70 + v71;
+    const two_t v73 = B[34] * v20;
+    const two_t v74 = v72 + v73;
+    const two_t v75 = B[35] * v23;
+    const two_t v76 = v74 + v75;
+    *(two_free_t *)(K + 0 + k) = v25;
+    *(two_free_t *)(K + 6 + k) = v42;
+    *(two_free_t *)(K + 12 + k) = v59;
+    *(two_free_t *)(K + 18 + k) = v76;
+  }
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
+    const two_t v1 = H[0] * v0;
+    const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
+    const two_t v3 = H[4] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
+    const two_t v6 = H[8] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
+    const two_t v9 = H[12] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
+    const two_t v12 = H[16] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
+    const two_t v15 = H[20] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = H[1] * v0;
+    const two_t v18 = H[5] * v2;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = H[9] * v5;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = H[13] * v8;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = H[17] * v11;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = H[21] * v14;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = H[2] * v0;
+    const two_t v29 = H[6] * v2;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = H[10] * v5;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = H[14] * v8;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = H[18] * v11;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = H[22] * v14;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = H[3] * v0;
+    const two_t v40 = H[7] * v2;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = H[11] * v5;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = H[15] * v8;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = H[19] * v11;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = H[23] * v14;
+    const two_t v49 = v47 + v48;
+    *(two_free_t *)(right + 0 + k) = v16;
+    *(two_free_t *)(right + 9 + k) = v27;
+    *(two_free_t *)(right + 18 + k) = v38;
+    *(two_free_t *)(right + 27 + k) = v49;
+  }
+  real t815 = W[0] + (H[0] * K[0] + H[4] * K[1] + H[8] * K[2] + H[12] * K[3] + H[16] * K[4] + H[20]
+    * K[5]);
+  D[0] = t815;
+  real t827 = W[4] + (H[0] * K[6] + H[4] * K[7] + H[8] * K[8] + H[12] * K[9] + H[16] * K[10] + H[20]
+    * K[11]);
+  D[1] = t827;
+  real t839 = W[8] + (H[0] * K[12] + H[4] * K[13] + H[8] * K[14] + H[12] * K[15] + H[16] * K[16] +
+    H[20] * K[17]);
+  D[2] = t839;
+  real t851 = W[12] + (H[0] * K[18] + H[4] * K[19] + H[8] * K[20] + H[12] * K[21] + H[16] * K[22] +
+    H[20] * K[23]);
+  D[3] = t851;
+  real t863 = W[1] + (H[1] * K[0] + H[5] * K[1] + H[9] * K[2] + H[13] * K[3] + H[17] * K[4] + H[21]
+    * K[5]);
+  D[4] = t863;
+  real t875 = W[5] + (H[1] * K[6] + H[5] * K[7] + H[9] * K[8] + H[13] * K[9] + H[17] * K[10] + H[21]
+    * K[11]);
+  D[5] = t875;
+  real t887 = W[9] + (H[1] * K[12] + H[5] * K[13] + H[9] * K[14] + H[13] * K[15] + H[17] * K[16] +
+    H[21] * K[17]);
+  D[6] = t887;
+  real t899 = W[13] + (H[1] * K[18] + H[5] * K[19] + H[9] * K[20] + H[13] * K[21] + H[17] * K[22] +
+    H[21] * K[23]);
+  D[7] = t899;
+  real t911 = W[2] + (H[2] * K[0] + H[6] * K[1] + H[10] * K[2] + H[14] * K[3] + H[18] * K[4] + H[22]
+    * K[5]);
+  D[8] = t911;
+  real t923 = W[6] + (H[2] * K[6] + H[6] * K[7] + H[10] * K[8] + H[14] * K[9] + H[18] * K[10] +
+    H[22] * K[11]);
+  D[9] = t923;
+  real t935 = W[10] + (H[2] * K[12] + H[6] * K[13] + H[10] * K[14] + H[14] * K[15] + H[18] * K[16] +
+    H[22] * K[17]);
+  D[10] = t935;
+  real t947 = W[14] + (H[2] * K[18] + H[6] * K[19] + H[10] * K[20] + H[14] * K[21] + H[18] * K[22] +
+    H[22] * K[23]);
+  D[11] = t947;
+  real t959 = W[3] + (H[3] * K[0] + H[7] * K[1] + H[11] * K[2] + H[15] * K[3] + H[19] * K[4] + H[23]
+    * K[5]);
+  D[12] = t959;
+  real t971 = W[7] + (H[3] * K[6] + H[7] * K[7] + H[11] * K[8] + H[15] * K[9] + H[19] * K[10] +
+    H[23] * K[11]);
+  D[13] = t971;
+  real t983 = W[11] + (H[3] * K[12] + H[7] * K[13] + H[11] * K[14] + H[15] * K[15] + H[19] * K[16] +
+    H[23] * K[17]);
+  D[14] = t983;
+  real t995 = W[15] + (H[3] * K[18] + H[7] * K[19] + H[11] * K[20] + H[15] * K[21] + H[19] * K[22] +
+    H[23] * K[23]);
+  D[15] = t995;
+  one[0] = 1.0;
+  one[1] = 0.0;
+  one[2] = 0.0;
+  one[3] = 0.0;
+  one[4] = 0.0;
+  one[5] = 1.0;
+  one[6] = 0.0;
+  one[7] = 0.0;
+  one[8] = 0.0;
+  one[9] = 0.0;
+  one[10] = 1.0;
+  one[11] = 0.0;
+  one[12] = 0.0;
+  one[13] = 0.0;
+  one[14] = 0.0;
+  one[15] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_rows_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_rows_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"B", 36, "", 0, 0},
-    {"W", 16, "", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_rows_outputs[] = {
-    {"K", 24, "", 0, 0},
-    {"right", 36, "", 0, 0},
-    {"D", 16, "", 0, 0},
-    {"one", 16, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_rows, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3]))
 
 /* S without the unknowns of a hinge with 4 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7513,165 +2056,148 @@ static const mstmm_port mstmm_sweep_generic4_tangent_rows_outputs[] = {
  * out V[4][6] K + G, one row per direction
  * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
-int mstmm_sweep_generic4_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S)
+int mstmm_sweep_generic4_tangent_reduce(in_t inverse, in_t right, in_t K, in_t G, out_t gain,
+    out_t V, out_t S)
 {
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_beside(right + 0 + k);
-        const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_beside(right + 9 + k);
-        const two_t v3 = inverse[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(right + 18 + k);
-        const two_t v6 = inverse[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(right + 27 + k);
-        const two_t v9 = inverse[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = inverse[4] * v0;
-        const two_t v12 = inverse[5] * v2;
-        const two_t v13 = v11 + v12;
-        const two_t v14 = inverse[6] * v5;
-        const two_t v15 = v13 + v14;
-        const two_t v16 = inverse[7] * v8;
-        const two_t v17 = v15 + v16;
-        const two_t v18 = inverse[8] * v0;
-        const two_t v19 = inverse[9] * v2;
-        const two_t v20 = v18 + v19;
-        const two_t v21 = inverse[10] * v5;
-        const two_t v22 = v20 + v21;
-        const two_t v23 = inverse[11] * v8;
-        const two_t v24 = v22 + v23;
-        const two_t v25 = inverse[12] * v0;
-        const two_t v26 = inverse[13] * v2;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = inverse[14] * v5;
-        const two_t v29 = v27 + v28;
-        const two_t v30 = inverse[15] * v8;
-        const two_t v31 = v29 + v30;
-        *(two_free_t *)(gain + 0 + k) = v10;
-        *(two_free_t *)(gain + 9 + k) = v17;
-        *(two_free_t *)(gain + 18 + k) = v24;
-        *(two_free_t *)(gain + 27 + k) = v31;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(K + 0 + k);
-        const two_t v1 = mstmm_beside(G + 0 + k);
-        const two_t v2 = v0 + v1;
-        const two_t v3 = mstmm_beside(K + 6 + k);
-        const two_t v4 = mstmm_beside(G + 6 + k);
-        const two_t v5 = v3 + v4;
-        const two_t v6 = mstmm_beside(K + 12 + k);
-        const two_t v7 = mstmm_beside(G + 12 + k);
-        const two_t v8 = v6 + v7;
-        const two_t v9 = mstmm_beside(K + 18 + k);
-        const two_t v10 = mstmm_beside(G + 18 + k);
-        const two_t v11 = v9 + v10;
-        *(two_free_t *)(V + 0 + k) = v2;
-        *(two_free_t *)(V + 6 + k) = v5;
-        *(two_free_t *)(V + 12 + k) = v8;
-        *(two_free_t *)(V + 18 + k) = v11;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(V + 0 + k);
-        const two_t v1 = gain[0] * v0;
-        const two_t v2 = mstmm_beside(V + 6 + k);
-        const two_t v3 = gain[9] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(V + 12 + k);
-        const two_t v6 = gain[18] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(V + 18 + k);
-        const two_t v9 = gain[27] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v12 = gain[1] * v0;
-        const two_t v13 = gain[10] * v2;
-        const two_t v14 = v12 + v13;
-        const two_t v15 = gain[19] * v5;
-        const two_t v16 = v14 + v15;
-        const two_t v17 = gain[28] * v8;
-        const two_t v18 = v16 + v17;
-        const two_t v20 = gain[2] * v0;
-        const two_t v21 = gain[11] * v2;
-        const two_t v22 = v20 + v21;
-        const two_t v23 = gain[20] * v5;
-        const two_t v24 = v22 + v23;
-        const two_t v25 = gain[29] * v8;
-        const two_t v26 = v24 + v25;
-        const two_t v28 = gain[3] * v0;
-        const two_t v29 = gain[12] * v2;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = gain[21] * v5;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = gain[30] * v8;
-        const two_t v34 = v32 + v33;
-        const two_t v36 = gain[4] * v0;
-        const two_t v37 = gain[13] * v2;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = gain[22] * v5;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = gain[31] * v8;
-        const two_t v42 = v40 + v41;
-        const two_t v44 = gain[5] * v0;
-        const two_t v45 = gain[14] * v2;
-        const two_t v46 = v44 + v45;
-        const two_t v47 = gain[23] * v5;
-        const two_t v48 = v46 + v47;
-        const two_t v49 = gain[32] * v8;
-        const two_t v50 = v48 + v49;
-        const two_t v52 = gain[6] * v0;
-        const two_t v53 = gain[15] * v2;
-        const two_t v54 = v52 + v53;
-        const two_t v55 = gain[24] * v5;
-        const two_t v56 = v54 + v55;
-        const two_t v57 = gain[33] * v8;
-        const two_t v58 = v56 + v57;
-        const two_t v60 = gain[7] * v0;
-        const two_t v61 = gain[16] * v2;
-        const two_t v62 = v60 + v61;
-        const two_t v63 = gain[25] * v5;
-        const two_t v64 = v62 + v63;
-        const two_t v65 = gain[34] * v8;
-        const two_t v66 = v64 + v65;
-        const two_t v68 = gain[8] * v0;
-        const two_t v69 = gain[17] * v2;
-        const two_t v70 = v68 + v69;
-        const two_t v71 = gain[26] * v5;
-        const two_t v72 = v70 + v71;
-        const two_t v73 = gain[35] * v8;
-        const two_t v74 = v72 + v73;
-        *(two_free_t *)(S + 0 + k) -= v10;
-        *(two_free_t *)(S + 6 + k) -= v18;
-        *(two_free_t *)(S + 12 + k) -= v26;
-        *(two_free_t *)(S + 18 + k) -= v34;
-        *(two_free_t *)(S + 24 + k) -= v42;
-        *(two_free_t *)(S + 30 + k) -= v50;
-        *(two_free_t *)(S + 36 + k) -= v58;
-        *(two_free_t *)(S + 42 + k) -= v66;
-        *(two_free_t *)(S + 48 + k) -= v74;
-    }
-    return 0;
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_beside(right + 0 + k);
+    const two_t v1 = inverse[0] * v0;
+    const two_t v2 = mstmm_beside(right + 9 + k);
+    const two_t v3 = inverse[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(right + 18 + k);
+    const two_t v6 = inverse[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(right + 27 + k);
+    const two_t v9 = inverse[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = inverse[4] * v0;
+    const two_t v12 = inverse[5] * v2;
+    const two_t v13 = v11 + v12;
+    const two_t v14 = inverse[6] * v5;
+    const two_t v15 = v13 + v14;
+    const two_t v16 = inverse[7] * v8;
+    const two_t v17 = v15 + v16;
+    const two_t v18 = inverse[8] * v0;
+    const two_t v19 = inverse[9] * v2;
+    const two_t v20 = v18 + v19;
+    const two_t v21 = inverse[10] * v5;
+    const two_t v22 = v20 + v21;
+    const two_t v23 = inverse[11] * v8;
+    const two_t v24 = v22 + v23;
+    const two_t v25 = inverse[12] * v0;
+    const two_t v26 = inverse[13] * v2;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = inverse[14] * v5;
+    const two_t v29 = v27 + v28;
+    const two_t v30 = inverse[15] * v8;
+    const two_t v31 = v29 + v30;
+    *(two_free_t *)(gain + 0 + k) = v10;
+    *(two_free_t *)(gain + 9 + k) = v17;
+    *(two_free_t *)(gain + 18 + k) = v24;
+    *(two_free_t *)(gain + 27 + k) = v31;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(K + 0 + k);
+    const two_t v1 = mstmm_beside(G + 0 + k);
+    const two_t v2 = v0 + v1;
+    const two_t v3 = mstmm_beside(K + 6 + k);
+    const two_t v4 = mstmm_beside(G + 6 + k);
+    const two_t v5 = v3 + v4;
+    const two_t v6 = mstmm_beside(K + 12 + k);
+    const two_t v7 = mstmm_beside(G + 12 + k);
+    const two_t v8 = v6 + v7;
+    const two_t v9 = mstmm_beside(K + 18 + k);
+    const two_t v10 = mstmm_beside(G + 18 + k);
+    const two_t v11 = v9 + v10;
+    *(two_free_t *)(V + 0 + k) = v2;
+    *(two_free_t *)(V + 6 + k) = v5;
+    *(two_free_t *)(V + 12 + k) = v8;
+    *(two_free_t *)(V + 18 + k) = v11;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(V + 0 + k);
+    const two_t v1 = gain[0] * v0;
+    const two_t v2 = mstmm_beside(V + 6 + k);
+    const two_t v3 = gain[9] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(V + 12 + k);
+    const two_t v6 = gain[18] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(V + 18 + k);
+    const two_t v9 = gain[27] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v12 = gain[1] * v0;
+    const two_t v13 = gain[10] * v2;
+    const two_t v14 = v12 + v13;
+    const two_t v15 = gain[19] * v5;
+    const two_t v16 = v14 + v15;
+    const two_t v17 = gain[28] * v8;
+    const two_t v18 = v16 + v17;
+    const two_t v20 = gain[2] * v0;
+    const two_t v21 = gain[11] * v2;
+    const two_t v22 = v20 + v21;
+    const two_t v23 = gain[20] * v5;
+    const two_t v24 = v22 + v23;
+    const two_t v25 = gain[29] * v8;
+    const two_t v26 = v24 + v25;
+    const two_t v28 = gain[3] * v0;
+    const two_t v29 = gain[12] * v2;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = gain[21] * v5;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = gain[30] * v8;
+    const two_t v34 = v32 + v33;
+    const two_t v36 = gain[4] * v0;
+    const two_t v37 = gain[13] * v2;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = gain[22] * v5;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = gain[31] * v8;
+    const two_t v42 = v40 + v41;
+    const two_t v44 = gain[5] * v0;
+    const two_t v45 = gain[14] * v2;
+    const two_t v46 = v44 + v45;
+    const two_t v47 = gain[23] * v5;
+    const two_t v48 = v46 + v47;
+    const two_t v49 = gain[32] * v8;
+    const two_t v50 = v48 + v49;
+    const two_t v52 = gain[6] * v0;
+    const two_t v53 = gain[15] * v2;
+    const two_t v54 = v52 + v53;
+    const two_t v55 = gain[24] * v5;
+    const two_t v56 = v54 + v55;
+    const two_t v57 = gain[33] * v8;
+    const two_t v58 = v56 + v57;
+    const two_t v60 = gain[7] * v0;
+    const two_t v61 = gain[16] * v2;
+    const two_t v62 = v60 + v61;
+    const two_t v63 = gain[25] * v5;
+    const two_t v64 = v62 + v63;
+    const two_t v65 = gain[34] * v8;
+    const two_t v66 = v64 + v65;
+    const two_t v68 = gain[8] * v0;
+    const two_t v69 = gain[17] * v2;
+    const two_t v70 = v68 + v69;
+    const two_t v71 = gain[26] * v5;
+    const two_t v72 = v70 + v71;
+    const two_t v73 = gain[35] * v8;
+    const two_t v74 = v72 + v73;
+    *(two_free_t *)(S + 0 + k) -= v10;
+    *(two_free_t *)(S + 6 + k) -= v18;
+    *(two_free_t *)(S + 12 + k) -= v26;
+    *(two_free_t *)(S + 18 + k) -= v34;
+    *(two_free_t *)(S + 24 + k) -= v42;
+    *(two_free_t *)(S + 30 + k) -= v50;
+    *(two_free_t *)(S + 36 + k) -= v58;
+    *(two_free_t *)(S + 42 + k) -= v66;
+    *(two_free_t *)(S + 48 + k) -= v74;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_reduce_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_reduce_inputs[] = {
-    {"inverse", 16, "", 0, 0},
-    {"right", 36, "", 0, 0},
-    {"K", 24, "", 0, 0},
-    {"G", 24, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_reduce_outputs[] = {
-    {"gain", 36, "", 0, 0},
-    {"V", 24, "", 0, 0},
-    {"S", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_reduce, (in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* a right-hand side carried across a hinge with 4 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7686,246 +2212,45 @@ static const mstmm_port mstmm_sweep_generic4_tangent_reduce_outputs[] = {
  * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic4_tangent_load(in_t Rc, in_t r, in_t H, in_t V, in_t inverse, in_t e,
+    in_t e_f, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[4] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[5] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[9] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[13] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[17] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[21] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[6] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[10] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[14] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[18] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[22] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = H[3] * e[0];
-    const real t42 = H[7] * e[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[11] * e[2];
-    const real t45 = t43 + t44;
-    const real t46 = H[15] * e[3];
-    const real t47 = t45 + t46;
-    const real t48 = H[19] * e[4];
-    const real t49 = t47 + t48;
-    const real t50 = H[23] * e[5];
-    const real t51 = t49 + t50;
-    const real t52 = e_f[3] + t51;
-    const real t53 = inverse[3] * t52;
-    const real t54 = t40 + t53;
-    const real t55 = -t54;
-    y[0] = t55;
-    const real t56 = inverse[4] * t11;
-    const real t57 = inverse[5] * t24;
-    const real t58 = t56 + t57;
-    const real t59 = inverse[6] * t38;
-    const real t60 = t58 + t59;
-    const real t61 = inverse[7] * t52;
-    const real t62 = t60 + t61;
-    const real t63 = -t62;
-    y[1] = t63;
-    const real t64 = inverse[8] * t11;
-    const real t65 = inverse[9] * t24;
-    const real t66 = t64 + t65;
-    const real t67 = inverse[10] * t38;
-    const real t68 = t66 + t67;
-    const real t69 = inverse[11] * t52;
-    const real t70 = t68 + t69;
-    const real t71 = -t70;
-    y[2] = t71;
-    const real t72 = inverse[12] * t11;
-    const real t73 = inverse[13] * t24;
-    const real t74 = t72 + t73;
-    const real t75 = inverse[14] * t38;
-    const real t76 = t74 + t75;
-    const real t77 = inverse[15] * t52;
-    const real t78 = t76 + t77;
-    const real t79 = -t78;
-    y[3] = t79;
-    const real t80 = V[0] * t54;
-    const real t81 = V[6] * t62;
-    const real t82 = t80 + t81;
-    const real t83 = V[12] * t70;
-    const real t84 = t82 + t83;
-    const real t85 = V[18] * t78;
-    const real t86 = t84 + t85;
-    const real t87 = e[0] - t86;
-    const real t88 = Rc[0] * t87;
-    const real t89 = V[1] * t54;
-    const real t90 = V[7] * t62;
-    const real t91 = t89 + t90;
-    const real t92 = V[13] * t70;
-    const real t93 = t91 + t92;
-    const real t94 = V[19] * t78;
-    const real t95 = t93 + t94;
-    const real t96 = e[1] - t95;
-    const real t97 = Rc[1] * t96;
-    const real t98 = t88 + t97;
-    const real t99 = V[2] * t54;
-    const real t100 = V[8] * t62;
-    const real t101 = t99 + t100;
-    const real t102 = V[14] * t70;
-    const real t103 = t101 + t102;
-    const real t104 = V[20] * t78;
-    const real t105 = t103 + t104;
-    const real t106 = e[2] - t105;
-    const real t107 = Rc[2] * t106;
-    const real t108 = t98 + t107;
-    e_I[0] += t108;
-    const real t109 = Rc[3] * t87;
-    const real t110 = Rc[4] * t96;
-    const real t111 = t109 + t110;
-    const real t112 = Rc[5] * t106;
-    const real t113 = t111 + t112;
-    e_I[1] += t113;
-    const real t114 = Rc[6] * t87;
-    const real t115 = Rc[7] * t96;
-    const real t116 = t114 + t115;
-    const real t117 = Rc[8] * t106;
-    const real t118 = t116 + t117;
-    e_I[2] += t118;
-    const real t119 = V[3] * t54;
-    const real t120 = V[9] * t62;
-    const real t121 = t119 + t120;
-    const real t122 = V[15] * t70;
-    const real t123 = t121 + t122;
-    const real t124 = V[21] * t78;
-    const real t125 = t123 + t124;
-    const real t126 = e[3] - t125;
-    const real t127 = Rc[0] * t126;
-    const real t128 = V[4] * t54;
-    const real t129 = V[10] * t62;
-    const real t130 = t128 + t129;
-    const real t131 = V[16] * t70;
-    const real t132 = t130 + t131;
-    const real t133 = V[22] * t78;
-    const real t134 = t132 + t133;
-    const real t135 = e[4] - t134;
-    const real t136 = Rc[1] * t135;
-    const real t137 = t127 + t136;
-    const real t138 = V[5] * t54;
-    const real t139 = V[11] * t62;
-    const real t140 = t138 + t139;
-    const real t141 = V[17] * t70;
-    const real t142 = t140 + t141;
-    const real t143 = V[23] * t78;
-    const real t144 = t142 + t143;
-    const real t145 = e[5] - t144;
-    const real t146 = Rc[2] * t145;
-    const real t147 = t137 + t146;
-    const real t148 = Rc[6] * r[1];
-    const real t149 = Rc[3] * r[2];
-    const real t150 = t148 - t149;
-    const real t151 = t87 * t150;
-    const real t152 = Rc[7] * r[1];
-    const real t153 = Rc[4] * r[2];
-    const real t154 = t152 - t153;
-    const real t155 = t96 * t154;
-    const real t156 = t151 + t155;
-    const real t157 = Rc[8] * r[1];
-    const real t158 = Rc[5] * r[2];
-    const real t159 = t157 - t158;
-    const real t160 = t106 * t159;
-    const real t161 = t156 + t160;
-    const real t162 = t147 + t161;
-    e_I[3] += t162;
-    const real t163 = Rc[3] * t126;
-    const real t164 = Rc[4] * t135;
-    const real t165 = t163 + t164;
-    const real t166 = Rc[5] * t145;
-    const real t167 = t165 + t166;
-    const real t168 = Rc[0] * r[2];
-    const real t169 = Rc[6] * r[0];
-    const real t170 = t168 - t169;
-    const real t171 = t87 * t170;
-    const real t172 = Rc[1] * r[2];
-    const real t173 = Rc[7] * r[0];
-    const real t174 = t172 - t173;
-    const real t175 = t96 * t174;
-    const real t176 = t171 + t175;
-    const real t177 = Rc[2] * r[2];
-    const real t178 = Rc[8] * r[0];
-    const real t179 = t177 - t178;
-    const real t180 = t106 * t179;
-    const real t181 = t176 + t180;
-    const real t182 = t167 + t181;
-    e_I[4] += t182;
-    const real t183 = Rc[6] * t126;
-    const real t184 = Rc[7] * t135;
-    const real t185 = t183 + t184;
-    const real t186 = Rc[8] * t145;
-    const real t187 = t185 + t186;
-    const real t188 = Rc[3] * r[0];
-    const real t189 = Rc[0] * r[1];
-    const real t190 = t188 - t189;
-    const real t191 = t87 * t190;
-    const real t192 = Rc[4] * r[0];
-    const real t193 = Rc[1] * r[1];
-    const real t194 = t192 - t193;
-    const real t195 = t96 * t194;
-    const real t196 = t191 + t195;
-    const real t197 = Rc[5] * r[0];
-    const real t198 = Rc[2] * r[1];
-    const real t199 = t197 - t198;
-    const real t200 = t106 * t199;
-    const real t201 = t196 + t200;
-    const real t202 = t187 + t201;
-    e_I[5] += t202;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[4] * e[1] + H[8] * e[2] + H[12] * e[3] + H[16] * e[4] + H[20]
+    * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[5] * e[1] + H[9] * e[2] + H[13] * e[3] + H[17] * e[4] + H[21]
+    * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[6] * e[1] + H[10] * e[2] + H[14] * e[3] + H[18] * e[4] +
+    H[22] * e[5]);
+  real t52 = e_f[3] + (H[3] * e[0] + H[7] * e[1] + H[11] * e[2] + H[15] * e[3] + H[19] * e[4] +
+    H[23] * e[5]);
+  real t54 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38 + inverse[3] * t52;
+  y[0] = -t54;
+  real t62 = inverse[4] * t11 + inverse[5] * t24 + inverse[6] * t38 + inverse[7] * t52;
+  y[1] = -t62;
+  real t70 = inverse[8] * t11 + inverse[9] * t24 + inverse[10] * t38 + inverse[11] * t52;
+  y[2] = -t70;
+  real t78 = inverse[12] * t11 + inverse[13] * t24 + inverse[14] * t38 + inverse[15] * t52;
+  y[3] = -t78;
+  real t87 = e[0] - (V[0] * t54 + V[6] * t62 + V[12] * t70 + V[18] * t78);
+  real t96 = e[1] - (V[1] * t54 + V[7] * t62 + V[13] * t70 + V[19] * t78);
+  real t106 = e[2] - (V[2] * t54 + V[8] * t62 + V[14] * t70 + V[20] * t78);
+  e_I[0] += Rc[0] * t87 + Rc[1] * t96 + Rc[2] * t106;
+  e_I[1] += Rc[3] * t87 + Rc[4] * t96 + Rc[5] * t106;
+  e_I[2] += Rc[6] * t87 + Rc[7] * t96 + Rc[8] * t106;
+  real t126 = e[3] - (V[3] * t54 + V[9] * t62 + V[15] * t70 + V[21] * t78);
+  real t135 = e[4] - (V[4] * t54 + V[10] * t62 + V[16] * t70 + V[22] * t78);
+  real t145 = e[5] - (V[5] * t54 + V[11] * t62 + V[17] * t70 + V[23] * t78);
+  e_I[3] += Rc[0] * t126 + Rc[1] * t135 + Rc[2] * t145 + (t87 * (Rc[6] * r[1] - Rc[3] * r[2]) + t96
+    * (Rc[7] * r[1] - Rc[4] * r[2]) + t106 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t126 + Rc[4] * t135 + Rc[5] * t145 + (t87 * (Rc[0] * r[2] - Rc[6] * r[0]) + t96
+    * (Rc[1] * r[2] - Rc[7] * r[0]) + t106 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t126 + Rc[7] * t135 + Rc[8] * t145 + (t87 * (Rc[3] * r[0] - Rc[0] * r[1]) + t96
+    * (Rc[4] * r[0] - Rc[1] * r[1]) + t106 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"V", 24, "", 0, 0},
-    {"inverse", 16, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_load_outputs[] = {
-    {"y", 4, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_load, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* solution of a hinge with 4 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7942,319 +2267,62 @@ static const mstmm_port mstmm_sweep_generic4_tangent_load_outputs[] = {
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic4_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z)
+int mstmm_sweep_generic4_tangent_solution(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I,
+    in_t B, in_t gain, in_t y, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = gain[0] * t4;
-    const real t6 = Rc[1] * z_I[0];
-    const real t7 = Rc[4] * z_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[7] * z_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = gain[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[2] * z_I[0];
-    const real t14 = Rc[5] * z_I[1];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[8] * z_I[2];
-    const real t17 = t15 + t16;
-    const real t18 = gain[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = w[2] * t10;
-    const real t21 = w[1] * t17;
-    const real t22 = t20 - t21;
-    const real t23 = Rc[0] * z_I[3];
-    const real t24 = Rc[3] * z_I[4];
-    const real t25 = t23 + t24;
-    const real t26 = Rc[6] * z_I[5];
-    const real t27 = t25 + t26;
-    const real t28 = t22 + t27;
-    const real t29 = gain[3] * t28;
-    const real t30 = t19 + t29;
-    const real t31 = w[0] * t17;
-    const real t32 = w[2] * t4;
-    const real t33 = t31 - t32;
-    const real t34 = Rc[1] * z_I[3];
-    const real t35 = Rc[4] * z_I[4];
-    const real t36 = t34 + t35;
-    const real t37 = Rc[7] * z_I[5];
-    const real t38 = t36 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = gain[4] * t39;
-    const real t41 = t30 + t40;
-    const real t42 = w[1] * t4;
-    const real t43 = w[0] * t10;
-    const real t44 = t42 - t43;
-    const real t45 = Rc[2] * z_I[3];
-    const real t46 = Rc[5] * z_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[8] * z_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = t44 + t49;
-    const real t51 = gain[5] * t50;
-    const real t52 = t41 + t51;
-    const real t53 = v[2] * 2.0;
-    const real t54 = t10 * t53;
-    const real t55 = v[1] * 2.0;
-    const real t56 = t17 * t55;
-    const real t57 = t54 - t56;
-    const real t58 = r[2] * z_I[4];
-    const real t59 = r[1] * w_I[1];
-    const real t60 = r[2] * w_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = z_I[0] * t61;
-    const real t63 = r[0] * w_I[1];
-    const real t64 = 2.0 * t63;
-    const real t65 = r[1] * w_I[0];
-    const real t66 = t64 - t65;
-    const real t67 = z_I[1] * t66;
-    const real t68 = r[0] * w_I[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = r[2] * w_I[0];
-    const real t71 = t69 - t70;
-    const real t72 = z_I[2] * t71;
-    const real t73 = t67 + t72;
-    const real t74 = t62 - t73;
-    const real t75 = r[1] * z_I[5];
-    const real t76 = t74 - t75;
-    const real t77 = t58 + t76;
-    const real t78 = z_I[6] + t77;
-    const real t79 = Rc[0] * t78;
-    const real t80 = r[0] * z_I[5];
-    const real t81 = r[0] * w_I[0];
-    const real t82 = t60 + t81;
-    const real t83 = z_I[1] * t82;
-    const real t84 = 2.0 * t65;
-    const real t85 = t84 - t63;
-    const real t86 = z_I[0] * t85;
-    const real t87 = t83 - t86;
-    const real t88 = r[1] * w_I[2];
-    const real t89 = 2.0 * t88;
-    const real t90 = r[2] * w_I[1];
-    const real t91 = t89 - t90;
-    const real t92 = z_I[2] * t91;
-    const real t93 = t87 - t92;
-    const real t94 = t80 + t93;
-    const real t95 = r[2] * z_I[3];
-    const real t96 = t94 - t95;
-    const real t97 = z_I[7] + t96;
-    const real t98 = Rc[3] * t97;
-    const real t99 = t79 + t98;
-    const real t100 = r[1] * z_I[3];
-    const real t101 = t59 + t81;
-    const real t102 = z_I[2] * t101;
-    const real t103 = 2.0 * t70;
-    const real t104 = t103 - t68;
-    const real t105 = z_I[0] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = 2.0 * t90;
-    const real t108 = t107 - t88;
-    const real t109 = z_I[1] * t108;
-    const real t110 = t106 - t109;
-    const real t111 = r[0] * z_I[4];
-    const real t112 = t110 - t111;
-    const real t113 = t100 + t112;
-    const real t114 = z_I[8] + t113;
-    const real t115 = Rc[6] * t114;
-    const real t116 = t99 + t115;
-    const real t117 = t57 + t116;
-    const real t118 = gain[6] * t117;
-    const real t119 = t52 + t118;
-    const real t120 = v[0] * 2.0;
-    const real t121 = t17 * t120;
-    const real t122 = t4 * t53;
-    const real t123 = t121 - t122;
-    const real t124 = Rc[1] * t78;
-    const real t125 = Rc[4] * t97;
-    const real t126 = t124 + t125;
-    const real t127 = Rc[7] * t114;
-    const real t128 = t126 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = gain[7] * t129;
-    const real t131 = t119 + t130;
-    const real t132 = t4 * t55;
-    const real t133 = t10 * t120;
-    const real t134 = t132 - t133;
-    const real t135 = Rc[2] * t78;
-    const real t136 = Rc[5] * t97;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * t114;
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = gain[8] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = y[0] - t142;
-    x[0] = t143;
-    const real t144 = gain[9] * t4;
-    const real t145 = gain[10] * t10;
-    const real t146 = t144 + t145;
-    const real t147 = gain[11] * t17;
-    const real t148 = t146 + t147;
-    const real t149 = gain[12] * t28;
-    const real t150 = t148 + t149;
-    const real t151 = gain[13] * t39;
-    const real t152 = t150 + t151;
-    const real t153 = gain[14] * t50;
-    const real t154 = t152 + t153;
-    const real t155 = gain[15] * t117;
-    const real t156 = t154 + t155;
-    const real t157 = gain[16] * t129;
-    const real t158 = t156 + t157;
-    const real t159 = gain[17] * t140;
-    const real t160 = t158 + t159;
-    const real t161 = y[1] - t160;
-    x[1] = t161;
-    const real t162 = gain[18] * t4;
-    const real t163 = gain[19] * t10;
-    const real t164 = t162 + t163;
-    const real t165 = gain[20] * t17;
-    const real t166 = t164 + t165;
-    const real t167 = gain[21] * t28;
-    const real t168 = t166 + t167;
-    const real t169 = gain[22] * t39;
-    const real t170 = t168 + t169;
-    const real t171 = gain[23] * t50;
-    const real t172 = t170 + t171;
-    const real t173 = gain[24] * t117;
-    const real t174 = t172 + t173;
-    const real t175 = gain[25] * t129;
-    const real t176 = t174 + t175;
-    const real t177 = gain[26] * t140;
-    const real t178 = t176 + t177;
-    const real t179 = y[2] - t178;
-    x[2] = t179;
-    const real t180 = gain[27] * t4;
-    const real t181 = gain[28] * t10;
-    const real t182 = t180 + t181;
-    const real t183 = gain[29] * t17;
-    const real t184 = t182 + t183;
-    const real t185 = gain[30] * t28;
-    const real t186 = t184 + t185;
-    const real t187 = gain[31] * t39;
-    const real t188 = t186 + t187;
-    const real t189 = gain[32] * t50;
-    const real t190 = t188 + t189;
-    const real t191 = gain[33] * t117;
-    const real t192 = t190 + t191;
-    const real t193 = gain[34] * t129;
-    const real t194 = t192 + t193;
-    const real t195 = gain[35] * t140;
-    const real t196 = t194 + t195;
-    const real t197 = y[3] - t196;
-    x[3] = t197;
-    const real t198 = B[0] * t143;
-    const real t199 = B[9] * t161;
-    const real t200 = t198 + t199;
-    const real t201 = B[18] * t179;
-    const real t202 = t200 + t201;
-    const real t203 = B[27] * t197;
-    const real t204 = t202 + t203;
-    const real t205 = t4 + t204;
-    z[0] = t205;
-    const real t206 = B[1] * t143;
-    const real t207 = B[10] * t161;
-    const real t208 = t206 + t207;
-    const real t209 = B[19] * t179;
-    const real t210 = t208 + t209;
-    const real t211 = B[28] * t197;
-    const real t212 = t210 + t211;
-    const real t213 = t10 + t212;
-    z[1] = t213;
-    const real t214 = B[2] * t143;
-    const real t215 = B[11] * t161;
-    const real t216 = t214 + t215;
-    const real t217 = B[20] * t179;
-    const real t218 = t216 + t217;
-    const real t219 = B[29] * t197;
-    const real t220 = t218 + t219;
-    const real t221 = t17 + t220;
-    z[2] = t221;
-    const real t222 = B[3] * t143;
-    const real t223 = B[12] * t161;
-    const real t224 = t222 + t223;
-    const real t225 = B[21] * t179;
-    const real t226 = t224 + t225;
-    const real t227 = B[30] * t197;
-    const real t228 = t226 + t227;
-    const real t229 = t28 + t228;
-    z[3] = t229;
-    const real t230 = B[4] * t143;
-    const real t231 = B[13] * t161;
-    const real t232 = t230 + t231;
-    const real t233 = B[22] * t179;
-    const real t234 = t232 + t233;
-    const real t235 = B[31] * t197;
-    const real t236 = t234 + t235;
-    const real t237 = t39 + t236;
-    z[4] = t237;
-    const real t238 = B[5] * t143;
-    const real t239 = B[14] * t161;
-    const real t240 = t238 + t239;
-    const real t241 = B[23] * t179;
-    const real t242 = t240 + t241;
-    const real t243 = B[32] * t197;
-    const real t244 = t242 + t243;
-    const real t245 = t50 + t244;
-    z[5] = t245;
-    const real t246 = B[6] * t143;
-    const real t247 = B[15] * t161;
-    const real t248 = t246 + t247;
-    const real t249 = B[24] * t179;
-    const real t250 = t248 + t249;
-    const real t251 = B[33] * t197;
-    const real t252 = t250 + t251;
-    const real t253 = t117 + t252;
-    z[6] = t253;
-    const real t254 = B[7] * t143;
-    const real t255 = B[16] * t161;
-    const real t256 = t254 + t255;
-    const real t257 = B[25] * t179;
-    const real t258 = t256 + t257;
-    const real t259 = B[34] * t197;
-    const real t260 = t258 + t259;
-    const real t261 = t129 + t260;
-    z[7] = t261;
-    const real t262 = B[8] * t143;
-    const real t263 = B[17] * t161;
-    const real t264 = t262 + t263;
-    const real t265 = B[26] * t179;
-    const real t266 = t264 + t265;
-    const real t267 = B[35] * t197;
-    const real t268 = t266 + t267;
-    const real t269 = t140 + t268;
-    z[8] = t269;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t10 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t17 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t28 = w[2] * t10 - w[1] * t17 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  real t39 = w[0] * t17 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  real t50 = w[1] * t4 - w[0] * t10 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t53 = v[2] * 2.0;
+  real t55 = v[1] * 2.0;
+  real t59 = r[1] * w_I[1];
+  real t60 = r[2] * w_I[2];
+  real t63 = r[0] * w_I[1];
+  real t65 = r[1] * w_I[0];
+  real t68 = r[0] * w_I[2];
+  real t70 = r[2] * w_I[0];
+  real t78 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t59 + t60) - (z_I[1] * (2.0 * t63 - t65) + z_I[2]
+    * (2.0 * t68 - t70)) - r[1] * z_I[5]));
+  real t81 = r[0] * w_I[0];
+  real t88 = r[1] * w_I[2];
+  real t90 = r[2] * w_I[1];
+  real t97 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t60 + t81) - z_I[0] * (2.0 * t65 - t63) - z_I[2] *
+    (2.0 * t88 - t90)) - r[2] * z_I[3]);
+  real t114 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t59 + t81) - z_I[0] * (2.0 * t70 - t68) - z_I[1]
+    * (2.0 * t90 - t88) - r[0] * z_I[4]));
+  real t117 = t10 * t53 - t17 * t55 + (Rc[0] * t78 + Rc[3] * t97 + Rc[6] * t114);
+  real t120 = v[0] * 2.0;
+  real t129 = t17 * t120 - t4 * t53 + (Rc[1] * t78 + Rc[4] * t97 + Rc[7] * t114);
+  real t140 = t4 * t55 - t10 * t120 + (Rc[2] * t78 + Rc[5] * t97 + Rc[8] * t114);
+  real t143 = y[0] - (gain[0] * t4 + gain[1] * t10 + gain[2] * t17 + gain[3] * t28 + gain[4] * t39 +
+    gain[5] * t50 + gain[6] * t117 + gain[7] * t129 + gain[8] * t140);
+  x[0] = t143;
+  real t161 = y[1] - (gain[9] * t4 + gain[10] * t10 + gain[11] * t17 + gain[12] * t28 + gain[13] *
+    t39 + gain[14] * t50 + gain[15] * t117 + gain[16] * t129 + gain[17] * t140);
+  x[1] = t161;
+  real t179 = y[2] - (gain[18] * t4 + gain[19] * t10 + gain[20] * t17 + gain[21] * t28 + gain[22] *
+    t39 + gain[23] * t50 + gain[24] * t117 + gain[25] * t129 + gain[26] * t140);
+  x[2] = t179;
+  real t197 = y[3] - (gain[27] * t4 + gain[28] * t10 + gain[29] * t17 + gain[30] * t28 + gain[31] *
+    t39 + gain[32] * t50 + gain[33] * t117 + gain[34] * t129 + gain[35] * t140);
+  x[3] = t197;
+  z[0] = t4 + (B[0] * t143 + B[9] * t161 + B[18] * t179 + B[27] * t197);
+  z[1] = t10 + (B[1] * t143 + B[10] * t161 + B[19] * t179 + B[28] * t197);
+  z[2] = t17 + (B[2] * t143 + B[11] * t161 + B[20] * t179 + B[29] * t197);
+  z[3] = t28 + (B[3] * t143 + B[12] * t161 + B[21] * t179 + B[30] * t197);
+  z[4] = t39 + (B[4] * t143 + B[13] * t161 + B[22] * t179 + B[31] * t197);
+  z[5] = t50 + (B[5] * t143 + B[14] * t161 + B[23] * t179 + B[32] * t197);
+  z[6] = t117 + (B[6] * t143 + B[15] * t161 + B[24] * t179 + B[33] * t197);
+  z[7] = t129 + (B[7] * t143 + B[16] * t161 + B[25] * t179 + B[34] * t197);
+  z[8] = t140 + (B[8] * t143 + B[17] * t161 + B[26] * t179 + B[35] * t197);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_solution_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_solution_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 36, "", 0, 0},
-    {"gain", 36, "", 0, 0},
-    {"y", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_solution_outputs[] = {
-    {"x", 4, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_solution, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1]))
 
 /* a right-hand side carried across a hinge with 4 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -8270,254 +2338,45 @@ static const mstmm_port mstmm_sweep_generic4_tangent_solution_outputs[] = {
  * out y[4] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic4_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic4_tangent_load_with_increments(in_t Rc, in_t r, in_t H, in_t V, in_t inverse,
+    in_t e, in_t e_f, in_t e_b, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[4] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[5] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[9] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[13] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[17] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[21] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[6] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[10] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[14] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[18] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[22] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = H[3] * e[0];
-    const real t42 = H[7] * e[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[11] * e[2];
-    const real t45 = t43 + t44;
-    const real t46 = H[15] * e[3];
-    const real t47 = t45 + t46;
-    const real t48 = H[19] * e[4];
-    const real t49 = t47 + t48;
-    const real t50 = H[23] * e[5];
-    const real t51 = t49 + t50;
-    const real t52 = e_f[3] + t51;
-    const real t53 = inverse[3] * t52;
-    const real t54 = t40 + t53;
-    const real t55 = -t54;
-    y[0] = t55;
-    const real t56 = inverse[4] * t11;
-    const real t57 = inverse[5] * t24;
-    const real t58 = t56 + t57;
-    const real t59 = inverse[6] * t38;
-    const real t60 = t58 + t59;
-    const real t61 = inverse[7] * t52;
-    const real t62 = t60 + t61;
-    const real t63 = -t62;
-    y[1] = t63;
-    const real t64 = inverse[8] * t11;
-    const real t65 = inverse[9] * t24;
-    const real t66 = t64 + t65;
-    const real t67 = inverse[10] * t38;
-    const real t68 = t66 + t67;
-    const real t69 = inverse[11] * t52;
-    const real t70 = t68 + t69;
-    const real t71 = -t70;
-    y[2] = t71;
-    const real t72 = inverse[12] * t11;
-    const real t73 = inverse[13] * t24;
-    const real t74 = t72 + t73;
-    const real t75 = inverse[14] * t38;
-    const real t76 = t74 + t75;
-    const real t77 = inverse[15] * t52;
-    const real t78 = t76 + t77;
-    const real t79 = -t78;
-    y[3] = t79;
-    const real t80 = V[0] * t54;
-    const real t81 = V[6] * t62;
-    const real t82 = t80 + t81;
-    const real t83 = V[12] * t70;
-    const real t84 = t82 + t83;
-    const real t85 = V[18] * t78;
-    const real t86 = t84 + t85;
-    const real t87 = e[0] - t86;
-    const real t88 = e_b[0] + t87;
-    const real t89 = Rc[0] * t88;
-    const real t90 = V[1] * t54;
-    const real t91 = V[7] * t62;
-    const real t92 = t90 + t91;
-    const real t93 = V[13] * t70;
-    const real t94 = t92 + t93;
-    const real t95 = V[19] * t78;
-    const real t96 = t94 + t95;
-    const real t97 = e[1] - t96;
-    const real t98 = e_b[1] + t97;
-    const real t99 = Rc[1] * t98;
-    const real t100 = t89 + t99;
-    const real t101 = V[2] * t54;
-    const real t102 = V[8] * t62;
-    const real t103 = t101 + t102;
-    const real t104 = V[14] * t70;
-    const real t105 = t103 + t104;
-    const real t106 = V[20] * t78;
-    const real t107 = t105 + t106;
-    const real t108 = e[2] - t107;
-    const real t109 = e_b[2] + t108;
-    const real t110 = Rc[2] * t109;
-    const real t111 = t100 + t110;
-    e_I[0] += t111;
-    const real t112 = Rc[3] * t88;
-    const real t113 = Rc[4] * t98;
-    const real t114 = t112 + t113;
-    const real t115 = Rc[5] * t109;
-    const real t116 = t114 + t115;
-    e_I[1] += t116;
-    const real t117 = Rc[6] * t88;
-    const real t118 = Rc[7] * t98;
-    const real t119 = t117 + t118;
-    const real t120 = Rc[8] * t109;
-    const real t121 = t119 + t120;
-    e_I[2] += t121;
-    const real t122 = V[3] * t54;
-    const real t123 = V[9] * t62;
-    const real t124 = t122 + t123;
-    const real t125 = V[15] * t70;
-    const real t126 = t124 + t125;
-    const real t127 = V[21] * t78;
-    const real t128 = t126 + t127;
-    const real t129 = e[3] - t128;
-    const real t130 = e_b[3] + t129;
-    const real t131 = Rc[0] * t130;
-    const real t132 = V[4] * t54;
-    const real t133 = V[10] * t62;
-    const real t134 = t132 + t133;
-    const real t135 = V[16] * t70;
-    const real t136 = t134 + t135;
-    const real t137 = V[22] * t78;
-    const real t138 = t136 + t137;
-    const real t139 = e[4] - t138;
-    const real t140 = e_b[4] + t139;
-    const real t141 = Rc[1] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = V[5] * t54;
-    const real t144 = V[11] * t62;
-    const real t145 = t143 + t144;
-    const real t146 = V[17] * t70;
-    const real t147 = t145 + t146;
-    const real t148 = V[23] * t78;
-    const real t149 = t147 + t148;
-    const real t150 = e[5] - t149;
-    const real t151 = e_b[5] + t150;
-    const real t152 = Rc[2] * t151;
-    const real t153 = t142 + t152;
-    const real t154 = Rc[6] * r[1];
-    const real t155 = Rc[3] * r[2];
-    const real t156 = t154 - t155;
-    const real t157 = t88 * t156;
-    const real t158 = Rc[7] * r[1];
-    const real t159 = Rc[4] * r[2];
-    const real t160 = t158 - t159;
-    const real t161 = t98 * t160;
-    const real t162 = t157 + t161;
-    const real t163 = Rc[8] * r[1];
-    const real t164 = Rc[5] * r[2];
-    const real t165 = t163 - t164;
-    const real t166 = t109 * t165;
-    const real t167 = t162 + t166;
-    const real t168 = t153 + t167;
-    e_I[3] += t168;
-    const real t169 = Rc[3] * t130;
-    const real t170 = Rc[4] * t140;
-    const real t171 = t169 + t170;
-    const real t172 = Rc[5] * t151;
-    const real t173 = t171 + t172;
-    const real t174 = Rc[0] * r[2];
-    const real t175 = Rc[6] * r[0];
-    const real t176 = t174 - t175;
-    const real t177 = t88 * t176;
-    const real t178 = Rc[1] * r[2];
-    const real t179 = Rc[7] * r[0];
-    const real t180 = t178 - t179;
-    const real t181 = t98 * t180;
-    const real t182 = t177 + t181;
-    const real t183 = Rc[2] * r[2];
-    const real t184 = Rc[8] * r[0];
-    const real t185 = t183 - t184;
-    const real t186 = t109 * t185;
-    const real t187 = t182 + t186;
-    const real t188 = t173 + t187;
-    e_I[4] += t188;
-    const real t189 = Rc[6] * t130;
-    const real t190 = Rc[7] * t140;
-    const real t191 = t189 + t190;
-    const real t192 = Rc[8] * t151;
-    const real t193 = t191 + t192;
-    const real t194 = Rc[3] * r[0];
-    const real t195 = Rc[0] * r[1];
-    const real t196 = t194 - t195;
-    const real t197 = t88 * t196;
-    const real t198 = Rc[4] * r[0];
-    const real t199 = Rc[1] * r[1];
-    const real t200 = t198 - t199;
-    const real t201 = t98 * t200;
-    const real t202 = t197 + t201;
-    const real t203 = Rc[5] * r[0];
-    const real t204 = Rc[2] * r[1];
-    const real t205 = t203 - t204;
-    const real t206 = t109 * t205;
-    const real t207 = t202 + t206;
-    const real t208 = t193 + t207;
-    e_I[5] += t208;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[4] * e[1] + H[8] * e[2] + H[12] * e[3] + H[16] * e[4] + H[20]
+    * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[5] * e[1] + H[9] * e[2] + H[13] * e[3] + H[17] * e[4] + H[21]
+    * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[6] * e[1] + H[10] * e[2] + H[14] * e[3] + H[18] * e[4] +
+    H[22] * e[5]);
+  real t52 = e_f[3] + (H[3] * e[0] + H[7] * e[1] + H[11] * e[2] + H[15] * e[3] + H[19] * e[4] +
+    H[23] * e[5]);
+  real t54 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38 + inverse[3] * t52;
+  y[0] = -t54;
+  real t62 = inverse[4] * t11 + inverse[5] * t24 + inverse[6] * t38 + inverse[7] * t52;
+  y[1] = -t62;
+  real t70 = inverse[8] * t11 + inverse[9] * t24 + inverse[10] * t38 + inverse[11] * t52;
+  y[2] = -t70;
+  real t78 = inverse[12] * t11 + inverse[13] * t24 + inverse[14] * t38 + inverse[15] * t52;
+  y[3] = -t78;
+  real t88 = e_b[0] + (e[0] - (V[0] * t54 + V[6] * t62 + V[12] * t70 + V[18] * t78));
+  real t98 = e_b[1] + (e[1] - (V[1] * t54 + V[7] * t62 + V[13] * t70 + V[19] * t78));
+  real t109 = e_b[2] + (e[2] - (V[2] * t54 + V[8] * t62 + V[14] * t70 + V[20] * t78));
+  e_I[0] += Rc[0] * t88 + Rc[1] * t98 + Rc[2] * t109;
+  e_I[1] += Rc[3] * t88 + Rc[4] * t98 + Rc[5] * t109;
+  e_I[2] += Rc[6] * t88 + Rc[7] * t98 + Rc[8] * t109;
+  real t130 = e_b[3] + (e[3] - (V[3] * t54 + V[9] * t62 + V[15] * t70 + V[21] * t78));
+  real t140 = e_b[4] + (e[4] - (V[4] * t54 + V[10] * t62 + V[16] * t70 + V[22] * t78));
+  real t151 = e_b[5] + (e[5] - (V[5] * t54 + V[11] * t62 + V[17] * t70 + V[23] * t78));
+  e_I[3] += Rc[0] * t130 + Rc[1] * t140 + Rc[2] * t151 + (t88 * (Rc[6] * r[1] - Rc[3] * r[2]) + t98
+    * (Rc[7] * r[1] - Rc[4] * r[2]) + t109 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t130 + Rc[4] * t140 + Rc[5] * t151 + (t88 * (Rc[0] * r[2] - Rc[6] * r[0]) + t98
+    * (Rc[1] * r[2] - Rc[7] * r[0]) + t109 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t130 + Rc[7] * t140 + Rc[8] * t151 + (t88 * (Rc[3] * r[0] - Rc[0] * r[1]) + t98
+    * (Rc[4] * r[0] - Rc[1] * r[1]) + t109 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_load_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"V", 24, "", 0, 0},
-    {"inverse", 16, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 4, "", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_load_with_increments_outputs[] = {
-    {"y", 4, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_load_with_increments, (in[0], in[1], in[2], in[3], in[4],
+  in[5], in[6], in[7], out[0], out[1]))
 
 /* solution of a hinge with 4 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -8535,1003 +2394,278 @@ static const mstmm_port mstmm_sweep_generic4_tangent_load_with_increments_output
  * out x[4] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic4_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_generic4_tangent_solution_with_increments(in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t z_I, in_t B, in_t gain, in_t y, in_t b, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = b[0] + t4;
-    const real t6 = gain[0] * t5;
-    const real t7 = Rc[1] * z_I[0];
-    const real t8 = Rc[4] * z_I[1];
-    const real t9 = t7 + t8;
-    const real t10 = Rc[7] * z_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = b[1] + t11;
-    const real t13 = gain[1] * t12;
-    const real t14 = t6 + t13;
-    const real t15 = Rc[2] * z_I[0];
-    const real t16 = Rc[5] * z_I[1];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[8] * z_I[2];
-    const real t19 = t17 + t18;
-    const real t20 = b[2] + t19;
-    const real t21 = gain[2] * t20;
-    const real t22 = t14 + t21;
-    const real t23 = w[2] * t11;
-    const real t24 = w[1] * t19;
-    const real t25 = t23 - t24;
-    const real t26 = Rc[0] * z_I[3];
-    const real t27 = Rc[3] * z_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[6] * z_I[5];
-    const real t30 = t28 + t29;
-    const real t31 = t25 + t30;
-    const real t32 = b[3] + t31;
-    const real t33 = gain[3] * t32;
-    const real t34 = t22 + t33;
-    const real t35 = w[0] * t19;
-    const real t36 = w[2] * t4;
-    const real t37 = t35 - t36;
-    const real t38 = Rc[1] * z_I[3];
-    const real t39 = Rc[4] * z_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[7] * z_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = b[4] + t43;
-    const real t45 = gain[4] * t44;
-    const real t46 = t34 + t45;
-    const real t47 = w[1] * t4;
-    const real t48 = w[0] * t11;
-    const real t49 = t47 - t48;
-    const real t50 = Rc[2] * z_I[3];
-    const real t51 = Rc[5] * z_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rc[8] * z_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = b[5] + t55;
-    const real t57 = gain[5] * t56;
-    const real t58 = t46 + t57;
-    const real t59 = v[2] * 2.0;
-    const real t60 = t11 * t59;
-    const real t61 = v[1] * 2.0;
-    const real t62 = t19 * t61;
-    const real t63 = t60 - t62;
-    const real t64 = r[2] * z_I[4];
-    const real t65 = r[1] * w_I[1];
-    const real t66 = r[2] * w_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = z_I[0] * t67;
-    const real t69 = r[0] * w_I[1];
-    const real t70 = 2.0 * t69;
-    const real t71 = r[1] * w_I[0];
-    const real t72 = t70 - t71;
-    const real t73 = z_I[1] * t72;
-    const real t74 = r[0] * w_I[2];
-    const real t75 = 2.0 * t74;
-    const real t76 = r[2] * w_I[0];
-    const real t77 = t75 - t76;
-    const real t78 = z_I[2] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = t68 - t79;
-    const real t81 = r[1] * z_I[5];
-    const real t82 = t80 - t81;
-    const real t83 = t64 + t82;
-    const real t84 = z_I[6] + t83;
-    const real t85 = Rc[0] * t84;
-    const real t86 = r[0] * z_I[5];
-    const real t87 = r[0] * w_I[0];
-    const real t88 = t66 + t87;
-    const real t89 = z_I[1] * t88;
-    const real t90 = 2.0 * t71;
-    const real t91 = t90 - t69;
-    const real t92 = z_I[0] * t91;
-    const real t93 = t89 - t92;
-    const real t94 = r[1] * w_I[2];
-    const real t95 = 2.0 * t94;
-    const real t96 = r[2] * w_I[1];
-    const real t97 = t95 - t96;
-    const real t98 = z_I[2] * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t86 + t99;
-    const real t101 = r[2] * z_I[3];
-    const real t102 = t100 - t101;
-    const real t103 = z_I[7] + t102;
-    const real t104 = Rc[3] * t103;
-    const real t105 = t85 + t104;
-    const real t106 = r[1] * z_I[3];
-    const real t107 = t65 + t87;
-    const real t108 = z_I[2] * t107;
-    const real t109 = 2.0 * t76;
-    const real t110 = t109 - t74;
-    const real t111 = z_I[0] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = 2.0 * t96;
-    const real t114 = t113 - t94;
-    const real t115 = z_I[1] * t114;
-    const real t116 = t112 - t115;
-    const real t117 = r[0] * z_I[4];
-    const real t118 = t116 - t117;
-    const real t119 = t106 + t118;
-    const real t120 = z_I[8] + t119;
-    const real t121 = Rc[6] * t120;
-    const real t122 = t105 + t121;
-    const real t123 = t63 + t122;
-    const real t124 = b[6] + t123;
-    const real t125 = gain[6] * t124;
-    const real t126 = t58 + t125;
-    const real t127 = v[0] * 2.0;
-    const real t128 = t19 * t127;
-    const real t129 = t4 * t59;
-    const real t130 = t128 - t129;
-    const real t131 = Rc[1] * t84;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[7] * t120;
-    const real t135 = t133 + t134;
-    const real t136 = t130 + t135;
-    const real t137 = b[7] + t136;
-    const real t138 = gain[7] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = t4 * t61;
-    const real t141 = t11 * t127;
-    const real t142 = t140 - t141;
-    const real t143 = Rc[2] * t84;
-    const real t144 = Rc[5] * t103;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[8] * t120;
-    const real t147 = t145 + t146;
-    const real t148 = t142 + t147;
-    const real t149 = b[8] + t148;
-    const real t150 = gain[8] * t149;
-    const real t151 = t139 + t150;
-    const real t152 = y[0] - t151;
-    x[0] = t152;
-    const real t153 = gain[9] * t5;
-    const real t154 = gain[10] * t12;
-    const real t155 = t153 + t154;
-    const real t156 = gain[11] * t20;
-    const real t157 = t155 + t156;
-    const real t158 = gain[12] * t32;
-    const real t159 = t157 + t158;
-    const real t160 = gain[13] * t44;
-    const real t161 = t159 + t160;
-    const real t162 = gain[14] * t56;
-    const real t163 = t161 + t162;
-    const real t164 = gain[15] * t124;
-    const real t165 = t163 + t164;
-    const real t166 = gain[16] * t137;
-    const real t167 = t165 + t166;
-    const real t168 = gain[17] * t149;
-    const real t169 = t167 + t168;
-    const real t170 = y[1] - t169;
-    x[1] = t170;
-    const real t171 = gain[18] * t5;
-    const real t172 = gain[19] * t12;
-    const real t173 = t171 + t172;
-    const real t174 = gain[20] * t20;
-    const real t175 = t173 + t174;
-    const real t176 = gain[21] * t32;
-    const real t177 = t175 + t176;
-    const real t178 = gain[22] * t44;
-    const real t179 = t177 + t178;
-    const real t180 = gain[23] * t56;
-    const real t181 = t179 + t180;
-    const real t182 = gain[24] * t124;
-    const real t183 = t181 + t182;
-    const real t184 = gain[25] * t137;
-    const real t185 = t183 + t184;
-    const real t186 = gain[26] * t149;
-    const real t187 = t185 + t186;
-    const real t188 = y[2] - t187;
-    x[2] = t188;
-    const real t189 = gain[27] * t5;
-    const real t190 = gain[28] * t12;
-    const real t191 = t189 + t190;
-    const real t192 = gain[29] * t20;
-    const real t193 = t191 + t192;
-    const real t194 = gain[30] * t32;
-    const real t195 = t193 + t194;
-    const real t196 = gain[31] * t44;
-    const real t197 = t195 + t196;
-    const real t198 = gain[32] * t56;
-    const real t199 = t197 + t198;
-    const real t200 = gain[33] * t124;
-    const real t201 = t199 + t200;
-    const real t202 = gain[34] * t137;
-    const real t203 = t201 + t202;
-    const real t204 = gain[35] * t149;
-    const real t205 = t203 + t204;
-    const real t206 = y[3] - t205;
-    x[3] = t206;
-    const real t207 = B[0] * t152;
-    const real t208 = B[9] * t170;
-    const real t209 = t207 + t208;
-    const real t210 = B[18] * t188;
-    const real t211 = t209 + t210;
-    const real t212 = B[27] * t206;
-    const real t213 = t211 + t212;
-    const real t214 = t5 + t213;
-    z[0] = t214;
-    const real t215 = B[1] * t152;
-    const real t216 = B[10] * t170;
-    const real t217 = t215 + t216;
-    const real t218 = B[19] * t188;
-    const real t219 = t217 + t218;
-    const real t220 = B[28] * t206;
-    const real t221 = t219 + t220;
-    const real t222 = t12 + t221;
-    z[1] = t222;
-    const real t223 = B[2] * t152;
-    const real t224 = B[11] * t170;
-    const real t225 = t223 + t224;
-    const real t226 = B[20] * t188;
-    const real t227 = t225 + t226;
-    const real t228 = B[29] * t206;
-    const real t229 = t227 + t228;
-    const real t230 = t20 + t229;
-    z[2] = t230;
-    const real t231 = B[3] * t152;
-    const real t232 = B[12] * t170;
-    const real t233 = t231 + t232;
-    const real t234 = B[21] * t188;
-    const real t235 = t233 + t234;
-    const real t236 = B[30] * t206;
-    const real t237 = t235 + t236;
-    const real t238 = t32 + t237;
-    z[3] = t238;
-    const real t239 = B[4] * t152;
-    const real t240 = B[13] * t170;
-    const real t241 = t239 + t240;
-    const real t242 = B[22] * t188;
-    const real t243 = t241 + t242;
-    const real t244 = B[31] * t206;
-    const real t245 = t243 + t244;
-    const real t246 = t44 + t245;
-    z[4] = t246;
-    const real t247 = B[5] * t152;
-    const real t248 = B[14] * t170;
-    const real t249 = t247 + t248;
-    const real t250 = B[23] * t188;
-    const real t251 = t249 + t250;
-    const real t252 = B[32] * t206;
-    const real t253 = t251 + t252;
-    const real t254 = t56 + t253;
-    z[5] = t254;
-    const real t255 = B[6] * t152;
-    const real t256 = B[15] * t170;
-    const real t257 = t255 + t256;
-    const real t258 = B[24] * t188;
-    const real t259 = t257 + t258;
-    const real t260 = B[33] * t206;
-    const real t261 = t259 + t260;
-    const real t262 = t124 + t261;
-    z[6] = t262;
-    const real t263 = B[7] * t152;
-    const real t264 = B[16] * t170;
-    const real t265 = t263 + t264;
-    const real t266 = B[25] * t188;
-    const real t267 = t265 + t266;
-    const real t268 = B[34] * t206;
-    const real t269 = t267 + t268;
-    const real t270 = t137 + t269;
-    z[7] = t270;
-    const real t271 = B[8] * t152;
-    const real t272 = B[17] * t170;
-    const real t273 = t271 + t272;
-    const real t274 = B[26] * t188;
-    const real t275 = t273 + t274;
-    const real t276 = B[35] * t206;
-    const real t277 = t275 + t276;
-    const real t278 = t149 + t277;
-    z[8] = t278;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t5 = b[0] + t4;
+  real t11 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t12 = b[1] + t11;
+  real t19 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t20 = b[2] + t19;
+  real t32 = b[3] + (w[2] * t11 - w[1] * t19 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]));
+  real t44 = b[4] + (w[0] * t19 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]));
+  real t56 = b[5] + (w[1] * t4 - w[0] * t11 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]));
+  real t59 = v[2] * 2.0;
+  real t61 = v[1] * 2.0;
+  real t65 = r[1] * w_I[1];
+  real t66 = r[2] * w_I[2];
+  real t69 = r[0] * w_I[1];
+  real t71 = r[1] * w_I[0];
+  real t74 = r[0] * w_I[2];
+  real t76 = r[2] * w_I[0];
+  real t84 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t65 + t66) - (z_I[1] * (2.0 * t69 - t71) + z_I[2]
+    * (2.0 * t74 - t76)) - r[1] * z_I[5]));
+  real t87 = r[0] * w_I[0];
+  real t94 = r[1] * w_I[2];
+  real t96 = r[2] * w_I[1];
+  real t103 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t66 + t87) - z_I[0] * (2.0 * t71 - t69) - z_I[2]
+    * (2.0 * t94 - t96)) - r[2] * z_I[3]);
+  real t120 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t65 + t87) - z_I[0] * (2.0 * t76 - t74) - z_I[1]
+    * (2.0 * t96 - t94) - r[0] * z_I[4]));
+  real t124 = b[6] + (t11 * t59 - t19 * t61 + (Rc[0] * t84 + Rc[3] * t103 + Rc[6] * t120));
+  real t127 = v[0] * 2.0;
+  real t137 = b[7] + (t19 * t127 - t4 * t59 + (Rc[1] * t84 + Rc[4] * t103 + Rc[7] * t120));
+  real t149 = b[8] + (t4 * t61 - t11 * t127 + (Rc[2] * t84 + Rc[5] * t103 + Rc[8] * t120));
+  real t152 = y[0] - (gain[0] * t5 + gain[1] * t12 + gain[2] * t20 + gain[3] * t32 + gain[4] * t44 +
+    gain[5] * t56 + gain[6] * t124 + gain[7] * t137 + gain[8] * t149);
+  x[0] = t152;
+  real t170 = y[1] - (gain[9] * t5 + gain[10] * t12 + gain[11] * t20 + gain[12] * t32 + gain[13] *
+    t44 + gain[14] * t56 + gain[15] * t124 + gain[16] * t137 + gain[17] * t149);
+  x[1] = t170;
+  real t188 = y[2] - (gain[18] * t5 + gain[19] * t12 + gain[20] * t20 + gain[21] * t32 + gain[22] *
+    t44 + gain[23] * t56 + gain[24] * t124 + gain[25] * t137 + gain[26] * t149);
+  x[2] = t188;
+  real t206 = y[3] - (gain[27] * t5 + gain[28] * t12 + gain[29] * t20 + gain[30] * t32 + gain[31] *
+    t44 + gain[32] * t56 + gain[33] * t124 + gain[34] * t137 + gain[35] * t149);
+  x[3] = t206;
+  z[0] = t5 + (B[0] * t152 + B[9] * t170 + B[18] * t188 + B[27] * t206);
+  z[1] = t12 + (B[1] * t152 + B[10] * t170 + B[19] * t188 + B[28] * t206);
+  z[2] = t20 + (B[2] * t152 + B[11] * t170 + B[20] * t188 + B[29] * t206);
+  z[3] = t32 + (B[3] * t152 + B[12] * t170 + B[21] * t188 + B[30] * t206);
+  z[4] = t44 + (B[4] * t152 + B[13] * t170 + B[22] * t188 + B[31] * t206);
+  z[5] = t56 + (B[5] * t152 + B[14] * t170 + B[23] * t188 + B[32] * t206);
+  z[6] = t124 + (B[6] * t152 + B[15] * t170 + B[24] * t188 + B[33] * t206);
+  z[7] = t137 + (B[7] * t152 + B[16] * t170 + B[25] * t188 + B[34] * t206);
+  z[8] = t149 + (B[8] * t152 + B[17] * t170 + B[26] * t188 + B[35] * t206);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_tangent_solution_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 36, "", 0, 0},
-    {"gain", 36, "", 0, 0},
-    {"y", 4, "", 0, 0},
-    {"b", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_tangent_solution_with_increments_outputs[] = {
-    {"x", 4, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_tangent_solution_with_increments, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]))
 
 /* free and constrained directions of a hinge with 4 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][4] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic4_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic4_complement(in_t H, out_t W)
 {
-    const real t0 = H[20] * H[20];
-    const real t1 = H[16] * H[16];
-    const real t2 = H[12] * H[12];
-    const real t3 = H[8] * H[8];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[4] * H[4];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[5] * H[5];
-    const real t14 = t12 + t13;
-    const real t15 = H[9] * H[9];
-    const real t16 = t14 + t15;
-    const real t17 = H[13] * H[13];
-    const real t18 = t16 + t17;
-    const real t19 = H[17] * H[17];
-    const real t20 = t18 + t19;
-    const real t21 = H[21] * H[21];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[20] * H[21];
-    const real t25 = H[16] * H[17];
-    const real t26 = H[12] * H[13];
-    const real t27 = H[8] * H[9];
-    const real t28 = H[4] * H[5];
-    const real t29 = H[0] * H[1];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t26 + t31;
-    const real t33 = t25 + t32;
-    const real t34 = t24 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[6] * H[6];
-    const real t42 = t40 + t41;
-    const real t43 = H[10] * H[10];
-    const real t44 = t42 + t43;
-    const real t45 = H[14] * H[14];
-    const real t46 = t44 + t45;
-    const real t47 = H[18] * H[18];
-    const real t48 = t46 + t47;
-    const real t49 = H[22] * H[22];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[20] * H[22];
-    const real t53 = H[16] * H[18];
-    const real t54 = H[12] * H[14];
-    const real t55 = H[8] * H[10];
-    const real t56 = H[4] * H[6];
-    const real t57 = H[0] * H[2];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    const real t60 = t54 + t59;
-    const real t61 = t53 + t60;
-    const real t62 = t52 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[5] * H[6];
-    const real t68 = t66 + t67;
-    const real t69 = H[9] * H[10];
-    const real t70 = t68 + t69;
-    const real t71 = H[13] * H[14];
-    const real t72 = t70 + t71;
-    const real t73 = H[17] * H[18];
-    const real t74 = t72 + t73;
-    const real t75 = H[21] * H[22];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[3] * H[3];
-    const real t85 = H[7] * H[7];
-    const real t86 = t84 + t85;
-    const real t87 = H[11] * H[11];
-    const real t88 = t86 + t87;
-    const real t89 = H[15] * H[15];
-    const real t90 = t88 + t89;
-    const real t91 = H[19] * H[19];
-    const real t92 = t90 + t91;
-    const real t93 = H[23] * H[23];
-    const real t94 = t92 + t93;
-    const real t95 = t94 * ((real)1 / (real)10000000000000);
-    const real t96 = H[20] * H[23];
-    const real t97 = H[16] * H[19];
-    const real t98 = H[12] * H[15];
-    const real t99 = H[8] * H[11];
-    const real t100 = H[4] * H[7];
-    const real t101 = H[0] * H[3];
-    const real t102 = t100 + t101;
-    const real t103 = t99 + t102;
-    const real t104 = t98 + t103;
-    const real t105 = t97 + t104;
-    const real t106 = t96 + t105;
-    const real t107 = t106 * t35;
-    const real t108 = t106 * t107;
-    const real t109 = t94 - t108;
-    const real t110 = H[1] * H[3];
-    const real t111 = H[5] * H[7];
-    const real t112 = t110 + t111;
-    const real t113 = H[9] * H[11];
-    const real t114 = t112 + t113;
-    const real t115 = H[13] * H[15];
-    const real t116 = t114 + t115;
-    const real t117 = H[17] * H[19];
-    const real t118 = t116 + t117;
-    const real t119 = H[21] * H[23];
-    const real t120 = t118 + t119;
-    const real t121 = t106 * t36;
-    const real t122 = t120 - t121;
-    const real t123 = t79 * t122;
-    const real t124 = t122 * t123;
-    const real t125 = t109 - t124;
-    const real t126 = H[2] * H[3];
-    const real t127 = H[6] * H[7];
-    const real t128 = t126 + t127;
-    const real t129 = H[10] * H[11];
-    const real t130 = t128 + t129;
-    const real t131 = H[14] * H[15];
-    const real t132 = t130 + t131;
-    const real t133 = H[18] * H[19];
-    const real t134 = t132 + t133;
-    const real t135 = H[22] * H[23];
-    const real t136 = t134 + t135;
-    const real t137 = t106 * t63;
-    const real t138 = t136 - t137;
-    const real t139 = t80 * t122;
-    const real t140 = t138 - t139;
-    const real t141 = 1.0 / t82;
-    const real t142 = t141 * t140;
-    const real t143 = t140 * t142;
-    const real t144 = t125 - t143;
-    const real t145 = t95 < t144;
-    if (!(t145 != 0)) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
-    const real t146 = H[0] * t35;
-    const real t147 = H[0] * t36;
-    const real t148 = H[1] - t147;
-    const real t149 = t79 * t148;
-    const real t150 = H[0] * t63;
-    const real t151 = H[2] - t150;
-    const real t152 = t80 * t148;
-    const real t153 = t151 - t152;
-    const real t154 = t141 * t153;
-    const real t155 = 1.0 / t144;
-    const real t156 = H[0] * t107;
-    const real t157 = H[3] - t156;
-    const real t158 = t123 * t148;
-    const real t159 = t157 - t158;
-    const real t160 = t142 * t153;
-    const real t161 = t159 - t160;
-    const real t162 = t155 * t161;
-    const real t163 = t142 * t162;
-    const real t164 = t154 - t163;
-    const real t165 = t80 * t164;
-    const real t166 = t149 - t165;
-    const real t167 = t123 * t162;
-    const real t168 = t166 - t167;
-    const real t169 = t36 * t168;
-    const real t170 = t146 - t169;
-    const real t171 = t63 * t164;
-    const real t172 = t170 - t171;
-    const real t173 = t107 * t162;
-    const real t174 = t172 - t173;
-    W[0] = t174;
-    const real t175 = H[4] * t35;
-    const real t176 = H[4] * t36;
-    const real t177 = H[5] - t176;
-    const real t178 = t79 * t177;
-    const real t179 = H[4] * t63;
-    const real t180 = H[6] - t179;
-    const real t181 = t80 * t177;
-    const real t182 = t180 - t181;
-    const real t183 = t141 * t182;
-    const real t184 = H[4] * t107;
-    const real t185 = H[7] - t184;
-    const real t186 = t123 * t177;
-    const real t187 = t185 - t186;
-    const real t188 = t142 * t182;
-    const real t189 = t187 - t188;
-    const real t190 = t155 * t189;
-    const real t191 = t142 * t190;
-    const real t192 = t183 - t191;
-    const real t193 = t80 * t192;
-    const real t194 = t178 - t193;
-    const real t195 = t123 * t190;
-    const real t196 = t194 - t195;
-    const real t197 = t36 * t196;
-    const real t198 = t175 - t197;
-    const real t199 = t63 * t192;
-    const real t200 = t198 - t199;
-    const real t201 = t107 * t190;
-    const real t202 = t200 - t201;
-    W[1] = t202;
-    const real t203 = H[8] * t35;
-    const real t204 = H[8] * t36;
-    const real t205 = H[9] - t204;
-    const real t206 = t79 * t205;
-    const real t207 = H[8] * t63;
-    const real t208 = H[10] - t207;
-    const real t209 = t80 * t205;
-    const real t210 = t208 - t209;
-    const real t211 = t141 * t210;
-    const real t212 = H[8] * t107;
-    const real t213 = H[11] - t212;
-    const real t214 = t123 * t205;
-    const real t215 = t213 - t214;
-    const real t216 = t142 * t210;
-    const real t217 = t215 - t216;
-    const real t218 = t155 * t217;
-    const real t219 = t142 * t218;
-    const real t220 = t211 - t219;
-    const real t221 = t80 * t220;
-    const real t222 = t206 - t221;
-    const real t223 = t123 * t218;
-    const real t224 = t222 - t223;
-    const real t225 = t36 * t224;
-    const real t226 = t203 - t225;
-    const real t227 = t63 * t220;
-    const real t228 = t226 - t227;
-    const real t229 = t107 * t218;
-    const real t230 = t228 - t229;
-    W[2] = t230;
-    const real t231 = H[12] * t35;
-    const real t232 = H[12] * t36;
-    const real t233 = H[13] - t232;
-    const real t234 = t79 * t233;
-    const real t235 = H[12] * t63;
-    const real t236 = H[14] - t235;
-    const real t237 = t80 * t233;
-    const real t238 = t236 - t237;
-    const real t239 = t141 * t238;
-    const real t240 = H[12] * t107;
-    const real t241 = H[15] - t240;
-    const real t242 = t123 * t233;
-    const real t243 = t241 - t242;
-    const real t244 = t142 * t238;
-    const real t245 = t243 - t244;
-    const real t246 = t155 * t245;
-    const real t247 = t142 * t246;
-    const real t248 = t239 - t247;
-    const real t249 = t80 * t248;
-    const real t250 = t234 - t249;
-    const real t251 = t123 * t246;
-    const real t252 = t250 - t251;
-    const real t253 = t36 * t252;
-    const real t254 = t231 - t253;
-    const real t255 = t63 * t248;
-    const real t256 = t254 - t255;
-    const real t257 = t107 * t246;
-    const real t258 = t256 - t257;
-    W[3] = t258;
-    const real t259 = H[16] * t35;
-    const real t260 = H[16] * t36;
-    const real t261 = H[17] - t260;
-    const real t262 = t79 * t261;
-    const real t263 = H[16] * t63;
-    const real t264 = H[18] - t263;
-    const real t265 = t80 * t261;
-    const real t266 = t264 - t265;
-    const real t267 = t141 * t266;
-    const real t268 = H[16] * t107;
-    const real t269 = H[19] - t268;
-    const real t270 = t123 * t261;
-    const real t271 = t269 - t270;
-    const real t272 = t142 * t266;
-    const real t273 = t271 - t272;
-    const real t274 = t155 * t273;
-    const real t275 = t142 * t274;
-    const real t276 = t267 - t275;
-    const real t277 = t80 * t276;
-    const real t278 = t262 - t277;
-    const real t279 = t123 * t274;
-    const real t280 = t278 - t279;
-    const real t281 = t36 * t280;
-    const real t282 = t259 - t281;
-    const real t283 = t63 * t276;
-    const real t284 = t282 - t283;
-    const real t285 = t107 * t274;
-    const real t286 = t284 - t285;
-    W[4] = t286;
-    const real t287 = H[20] * t35;
-    const real t288 = H[20] * t36;
-    const real t289 = H[21] - t288;
-    const real t290 = t79 * t289;
-    const real t291 = H[20] * t63;
-    const real t292 = H[22] - t291;
-    const real t293 = t80 * t289;
-    const real t294 = t292 - t293;
-    const real t295 = t141 * t294;
-    const real t296 = H[20] * t107;
-    const real t297 = H[23] - t296;
-    const real t298 = t123 * t289;
-    const real t299 = t297 - t298;
-    const real t300 = t142 * t294;
-    const real t301 = t299 - t300;
-    const real t302 = t155 * t301;
-    const real t303 = t142 * t302;
-    const real t304 = t295 - t303;
-    const real t305 = t80 * t304;
-    const real t306 = t290 - t305;
-    const real t307 = t123 * t302;
-    const real t308 = t306 - t307;
-    const real t309 = t36 * t308;
-    const real t310 = t287 - t309;
-    const real t311 = t63 * t304;
-    const real t312 = t310 - t311;
-    const real t313 = t107 * t302;
-    const real t314 = t312 - t313;
-    W[5] = t314;
-    W[6] = t168;
-    W[7] = t196;
-    W[8] = t224;
-    W[9] = t252;
-    W[10] = t280;
-    W[11] = t308;
-    W[12] = t164;
-    W[13] = t192;
-    W[14] = t220;
-    W[15] = t248;
-    W[16] = t276;
-    W[17] = t304;
-    W[18] = t162;
-    W[19] = t190;
-    W[20] = t218;
-    W[21] = t246;
-    W[22] = t274;
-    W[23] = t302;
-    const real t315 = H[0] < 0.0;
-    const real t316 = sqrt(t10);
-    const real t317 = -t316;
-    const real t318 = t315 != 0 ? t317 : t316;
-    const real t319 = H[0] + t318;
-    const real t320 = fabs(H[0]);
-    const real t321 = t316 + t320;
-    const real t322 = t316 * t321;
-    const real t323 = 0.0 < t322;
-    const real t324 = 1.0 / t322;
-    const real t325 = t323 != 0 ? t324 : 0.0;
-    const real t326 = H[3] * t319;
-    const real t327 = t326 + t100;
-    const real t328 = t99 + t327;
-    const real t329 = t98 + t328;
-    const real t330 = t97 + t329;
-    const real t331 = t96 + t330;
-    const real t332 = t325 * t331;
-    const real t333 = H[16] * t332;
-    const real t334 = H[19] - t333;
-    const real t335 = H[1] * t319;
-    const real t336 = t335 + t28;
-    const real t337 = t27 + t336;
-    const real t338 = t26 + t337;
-    const real t339 = t25 + t338;
-    const real t340 = t24 + t339;
-    const real t341 = t325 * t340;
-    const real t342 = H[16] * t341;
-    const real t343 = H[17] - t342;
-    const real t344 = H[20] * t341;
-    const real t345 = H[21] - t344;
-    const real t346 = t345 * t345;
-    const real t347 = t343 * t343;
-    const real t348 = H[12] * t341;
-    const real t349 = H[13] - t348;
-    const real t350 = t349 * t349;
-    const real t351 = H[4] * t341;
-    const real t352 = H[5] - t351;
-    const real t353 = t352 * t352;
-    const real t354 = H[8] * t341;
-    const real t355 = H[9] - t354;
-    const real t356 = t355 * t355;
-    const real t357 = t353 + t356;
-    const real t358 = t350 + t357;
-    const real t359 = t347 + t358;
-    const real t360 = t346 + t359;
-    const real t361 = sqrt(t360);
-    const real t362 = fabs(t352);
-    const real t363 = t361 + t362;
-    const real t364 = t361 * t363;
-    const real t365 = 0.0 < t364;
-    const real t366 = 1.0 / t364;
-    const real t367 = t365 != 0 ? t366 : 0.0;
-    const real t368 = H[20] * t332;
-    const real t369 = H[23] - t368;
-    const real t370 = t345 * t369;
-    const real t371 = t343 * t334;
-    const real t372 = H[12] * t332;
-    const real t373 = H[15] - t372;
-    const real t374 = t349 * t373;
-    const real t375 = H[4] * t332;
-    const real t376 = H[7] - t375;
-    const real t377 = t352 < 0.0;
-    const real t378 = -t361;
-    const real t379 = t377 != 0 ? t378 : t361;
-    const real t380 = t352 + t379;
-    const real t381 = t376 * t380;
-    const real t382 = H[8] * t332;
-    const real t383 = H[11] - t382;
-    const real t384 = t355 * t383;
-    const real t385 = t381 + t384;
-    const real t386 = t374 + t385;
-    const real t387 = t371 + t386;
-    const real t388 = t370 + t387;
-    const real t389 = t367 * t388;
-    const real t390 = t343 * t389;
-    const real t391 = t334 - t390;
-    const real t392 = H[2] * t319;
-    const real t393 = t392 + t56;
-    const real t394 = t55 + t393;
-    const real t395 = t54 + t394;
-    const real t396 = t53 + t395;
-    const real t397 = t52 + t396;
-    const real t398 = t325 * t397;
-    const real t399 = H[16] * t398;
-    const real t400 = H[18] - t399;
-    const real t401 = H[20] * t398;
-    const real t402 = H[22] - t401;
-    const real t403 = t345 * t402;
-    const real t404 = t343 * t400;
-    const real t405 = H[12] * t398;
-    const real t406 = H[14] - t405;
-    const real t407 = t349 * t406;
-    const real t408 = H[4] * t398;
-    const real t409 = H[6] - t408;
-    const real t410 = t409 * t380;
-    const real t411 = H[8] * t398;
-    const real t412 = H[10] - t411;
-    const real t413 = t355 * t412;
-    const real t414 = t410 + t413;
-    const real t415 = t407 + t414;
-    const real t416 = t404 + t415;
-    const real t417 = t403 + t416;
-    const real t418 = t367 * t417;
-    const real t419 = t343 * t418;
-    const real t420 = t400 - t419;
-    const real t421 = t345 * t418;
-    const real t422 = t402 - t421;
-    const real t423 = t422 * t422;
-    const real t424 = t420 * t420;
-    const real t425 = t355 * t418;
-    const real t426 = t412 - t425;
-    const real t427 = t426 * t426;
-    const real t428 = t349 * t418;
-    const real t429 = t406 - t428;
-    const real t430 = t429 * t429;
-    const real t431 = t427 + t430;
-    const real t432 = t424 + t431;
-    const real t433 = t423 + t432;
-    const real t434 = sqrt(t433);
-    const real t435 = fabs(t426);
-    const real t436 = t434 + t435;
-    const real t437 = t434 * t436;
-    const real t438 = 0.0 < t437;
-    const real t439 = 1.0 / t437;
-    const real t440 = t438 != 0 ? t439 : 0.0;
-    const real t441 = t345 * t389;
-    const real t442 = t369 - t441;
-    const real t443 = t422 * t442;
-    const real t444 = t420 * t391;
-    const real t445 = t355 * t389;
-    const real t446 = t383 - t445;
-    const real t447 = t426 < 0.0;
-    const real t448 = -t434;
-    const real t449 = t447 != 0 ? t448 : t434;
-    const real t450 = t426 + t449;
-    const real t451 = t446 * t450;
-    const real t452 = t349 * t389;
-    const real t453 = t373 - t452;
-    const real t454 = t429 * t453;
-    const real t455 = t451 + t454;
-    const real t456 = t444 + t455;
-    const real t457 = t443 + t456;
-    const real t458 = t440 * t457;
-    const real t459 = t420 * t458;
-    const real t460 = t391 - t459;
-    const real t461 = t460 * t460;
-    const real t462 = t422 * t458;
-    const real t463 = t442 - t462;
-    const real t464 = t463 * t463;
-    const real t465 = t429 * t458;
-    const real t466 = t453 - t465;
-    const real t467 = t466 * t466;
-    const real t468 = t467 + t461;
-    const real t469 = t464 + t468;
-    const real t470 = sqrt(t469);
-    const real t471 = fabs(t466);
-    const real t472 = t470 + t471;
-    const real t473 = t470 * t472;
-    const real t474 = 0.0 < t473;
-    const real t475 = 1.0 / t473;
-    const real t476 = t474 != 0 ? t475 : 0.0;
-    const real t477 = t461 * t476;
-    const real t478 = 1.0 - t477;
-    const real t479 = t420 * t478;
-    const real t480 = t466 < 0.0;
-    const real t481 = -t470;
-    const real t482 = t480 != 0 ? t481 : t470;
-    const real t483 = t466 + t482;
-    const real t484 = t483 * t476;
-    const real t485 = t460 * t484;
-    const real t486 = t429 * t485;
-    const real t487 = t479 - t486;
-    const real t488 = t460 * t476;
-    const real t489 = t463 * t488;
-    const real t490 = t422 * t489;
-    const real t491 = t487 - t490;
-    const real t492 = t440 * t491;
-    const real t493 = t420 * t492;
-    const real t494 = t478 - t493;
-    const real t495 = t343 * t494;
-    const real t496 = t450 * t492;
-    const real t497 = t355 * t496;
-    const real t498 = t429 * t492;
-    const real t499 = t485 + t498;
-    const real t500 = t349 * t499;
-    const real t501 = t497 + t500;
-    const real t502 = t495 - t501;
-    const real t503 = t422 * t492;
-    const real t504 = t489 + t503;
-    const real t505 = t345 * t504;
-    const real t506 = t502 - t505;
-    const real t507 = t367 * t506;
-    const real t508 = t343 * t507;
-    const real t509 = t494 - t508;
-    const real t510 = H[16] * t509;
-    const real t511 = t349 * t507;
-    const real t512 = t499 + t511;
-    const real t513 = H[12] * t512;
-    const real t514 = t380 * t507;
-    const real t515 = H[4] * t514;
-    const real t516 = t355 * t507;
-    const real t517 = t496 + t516;
-    const real t518 = H[8] * t517;
-    const real t519 = t515 + t518;
-    const real t520 = t513 + t519;
-    const real t521 = t510 - t520;
-    const real t522 = t345 * t507;
-    const real t523 = t504 + t522;
-    const real t524 = H[20] * t523;
-    const real t525 = t521 - t524;
-    const real t526 = t325 * t525;
-    const real t527 = t319 * t526;
-    const real t528 = -t527;
-    W[24] = t528;
-    const real t529 = H[4] * t526;
-    const real t530 = t514 + t529;
-    const real t531 = -t530;
-    W[25] = t531;
-    const real t532 = H[8] * t526;
-    const real t533 = t517 + t532;
-    const real t534 = -t533;
-    W[26] = t534;
-    const real t535 = H[12] * t526;
-    const real t536 = t512 + t535;
-    const real t537 = -t536;
-    W[27] = t537;
-    const real t538 = H[16] * t526;
-    const real t539 = t509 - t538;
-    W[28] = t539;
-    const real t540 = H[20] * t526;
-    const real t541 = t523 + t540;
-    const real t542 = -t541;
-    W[29] = t542;
-    const real t543 = t464 * t476;
-    const real t544 = 1.0 - t543;
-    const real t545 = t422 * t544;
-    const real t546 = t463 * t484;
-    const real t547 = t429 * t546;
-    const real t548 = t420 * t489;
-    const real t549 = t547 + t548;
-    const real t550 = t545 - t549;
-    const real t551 = t440 * t550;
-    const real t552 = t422 * t551;
-    const real t553 = t544 - t552;
-    const real t554 = t345 * t553;
-    const real t555 = t420 * t551;
-    const real t556 = t489 + t555;
-    const real t557 = t343 * t556;
-    const real t558 = t450 * t551;
-    const real t559 = t355 * t558;
-    const real t560 = t429 * t551;
-    const real t561 = t546 + t560;
-    const real t562 = t349 * t561;
-    const real t563 = t559 + t562;
-    const real t564 = t557 + t563;
-    const real t565 = t554 - t564;
-    const real t566 = t367 * t565;
-    const real t567 = t345 * t566;
-    const real t568 = t553 - t567;
-    const real t569 = H[20] * t568;
-    const real t570 = t343 * t566;
-    const real t571 = t556 + t570;
-    const real t572 = H[16] * t571;
-    const real t573 = t349 * t566;
-    const real t574 = t561 + t573;
-    const real t575 = H[12] * t574;
-    const real t576 = t380 * t566;
-    const real t577 = H[4] * t576;
-    const real t578 = t355 * t566;
-    const real t579 = t558 + t578;
-    const real t580 = H[8] * t579;
-    const real t581 = t577 + t580;
-    const real t582 = t575 + t581;
-    const real t583 = t572 + t582;
-    const real t584 = t569 - t583;
-    const real t585 = t325 * t584;
-    const real t586 = t319 * t585;
-    const real t587 = -t586;
-    W[30] = t587;
-    const real t588 = H[4] * t585;
-    const real t589 = t576 + t588;
-    const real t590 = -t589;
-    W[31] = t590;
-    const real t591 = H[8] * t585;
-    const real t592 = t579 + t591;
-    const real t593 = -t592;
-    W[32] = t593;
-    const real t594 = H[12] * t585;
-    const real t595 = t574 + t594;
-    const real t596 = -t595;
-    W[33] = t596;
-    const real t597 = H[16] * t585;
-    const real t598 = t571 + t597;
-    const real t599 = -t598;
-    W[34] = t599;
-    const real t600 = H[20] * t585;
-    const real t601 = t568 - t600;
-    W[35] = t601;
-    return 0;
+  real t10 = H[20] * H[20] + (H[16] * H[16] + (H[12] * H[12] + (H[8] * H[8] + (H[0] * H[0] + H[4] *
+    H[4]))));
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 4 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[5] * H[5] + H[9] * H[9] + H[13] * H[13] + H[17] * H[17] + H[21] *
+    H[21];
+  real t24 = H[20] * H[21];
+  real t25 = H[16] * H[17];
+  real t26 = H[12] * H[13];
+  real t27 = H[8] * H[9];
+  real t28 = H[4] * H[5];
+  real t34 = t24 + (t25 + (t26 + (t27 + (t28 + H[0] * H[1]))));
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 4 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[6] * H[6] + H[10] * H[10] + H[14] * H[14] + H[18] * H[18] + H[22] *
+    H[22];
+  real t52 = H[20] * H[22];
+  real t53 = H[16] * H[18];
+  real t54 = H[12] * H[14];
+  real t55 = H[8] * H[10];
+  real t56 = H[4] * H[6];
+  real t62 = t52 + (t53 + (t54 + (t55 + (t56 + H[0] * H[2]))));
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[5] * H[6] + H[9] * H[10] + H[13] * H[14] + H[17] * H[18] + H[21] *
+    H[22] - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 4 vanishes: a motion of the hinge is undetermined */
+  real t94 = H[3] * H[3] + H[7] * H[7] + H[11] * H[11] + H[15] * H[15] + H[19] * H[19] + H[23] *
+    H[23];
+  real t96 = H[20] * H[23];
+  real t97 = H[16] * H[19];
+  real t98 = H[12] * H[15];
+  real t99 = H[8] * H[11];
+  real t100 = H[4] * H[7];
+  real t106 = t96 + (t97 + (t98 + (t99 + (t100 + H[0] * H[3]))));
+  real t107 = t106 * t35;
+  real t122 = H[1] * H[3] + H[5] * H[7] + H[9] * H[11] + H[13] * H[15] + H[17] * H[19] + H[21] *
+    H[23] - t106 * t36;
+  real t123 = t79 * t122;
+  real t140 = H[2] * H[3] + H[6] * H[7] + H[10] * H[11] + H[14] * H[15] + H[18] * H[19] + H[22] *
+    H[23] - t106 * t63 - t80 * t122;
+  real t141 = 1.0 / t82;
+  real t142 = t141 * t140;
+  real t144 = t94 - t106 * t107 - t122 * t123 - t140 * t142;
+  if (!((t94 * ((real)1 / (real)10000000000000) < t144))) return 1; /* pivot 4 of 4 vanishes: a motion of the hinge is undetermined */
+  real t148 = H[1] - H[0] * t36;
+  real t153 = H[2] - H[0] * t63 - t80 * t148;
+  real t155 = 1.0 / t144;
+  real t162 = t155 * (H[3] - H[0] * t107 - t123 * t148 - t142 * t153);
+  real t164 = t141 * t153 - t142 * t162;
+  real t168 = t79 * t148 - t80 * t164 - t123 * t162;
+  W[0] = H[0] * t35 - t36 * t168 - t63 * t164 - t107 * t162;
+  real t177 = H[5] - H[4] * t36;
+  real t182 = H[6] - H[4] * t63 - t80 * t177;
+  real t190 = t155 * (H[7] - H[4] * t107 - t123 * t177 - t142 * t182);
+  real t192 = t141 * t182 - t142 * t190;
+  real t196 = t79 * t177 - t80 * t192 - t123 * t190;
+  W[1] = H[4] * t35 - t36 * t196 - t63 * t192 - t107 * t190;
+  real t205 = H[9] - H[8] * t36;
+  real t210 = H[10] - H[8] * t63 - t80 * t205;
+  real t218 = t155 * (H[11] - H[8] * t107 - t123 * t205 - t142 * t210);
+  real t220 = t141 * t210 - t142 * t218;
+  real t224 = t79 * t205 - t80 * t220 - t123 * t218;
+  W[2] = H[8] * t35 - t36 * t224 - t63 * t220 - t107 * t218;
+  real t233 = H[13] - H[12] * t36;
+  real t238 = H[14] - H[12] * t63 - t80 * t233;
+  real t246 = t155 * (H[15] - H[12] * t107 - t123 * t233 - t142 * t238);
+  real t248 = t141 * t238 - t142 * t246;
+  real t252 = t79 * t233 - t80 * t248 - t123 * t246;
+  W[3] = H[12] * t35 - t36 * t252 - t63 * t248 - t107 * t246;
+  real t261 = H[17] - H[16] * t36;
+  real t266 = H[18] - H[16] * t63 - t80 * t261;
+  real t274 = t155 * (H[19] - H[16] * t107 - t123 * t261 - t142 * t266);
+  real t276 = t141 * t266 - t142 * t274;
+  real t280 = t79 * t261 - t80 * t276 - t123 * t274;
+  W[4] = H[16] * t35 - t36 * t280 - t63 * t276 - t107 * t274;
+  real t289 = H[21] - H[20] * t36;
+  real t294 = H[22] - H[20] * t63 - t80 * t289;
+  real t302 = t155 * (H[23] - H[20] * t107 - t123 * t289 - t142 * t294);
+  real t304 = t141 * t294 - t142 * t302;
+  real t308 = t79 * t289 - t80 * t304 - t123 * t302;
+  W[5] = H[20] * t35 - t36 * t308 - t63 * t304 - t107 * t302;
+  W[6] = t168;
+  W[7] = t196;
+  W[8] = t224;
+  W[9] = t252;
+  W[10] = t280;
+  W[11] = t308;
+  W[12] = t164;
+  W[13] = t192;
+  W[14] = t220;
+  W[15] = t248;
+  W[16] = t276;
+  W[17] = t304;
+  W[18] = t162;
+  W[19] = t190;
+  W[20] = t218;
+  W[21] = t246;
+  W[22] = t274;
+  W[23] = t302;
+  real t316 = sqrt(t10);
+  real t317 = -t316;
+  real t319 = H[0] + ((H[0] < 0.0) ? t317 : t316);
+  real t322 = t316 * (t316 + (fabs(H[0])));
+  real t324 = 1.0 / t322;
+  real t325 = (0.0 < t322) ? t324 : 0.0;
+  real t332 = t325 * (t96 + (t97 + (t98 + (t99 + (H[3] * t319 + t100)))));
+  real t334 = H[19] - H[16] * t332;
+  real t341 = t325 * (t24 + (t25 + (t26 + (t27 + (H[1] * t319 + t28)))));
+  real t343 = H[17] - H[16] * t341;
+  real t345 = H[21] - H[20] * t341;
+  real t349 = H[13] - H[12] * t341;
+  real t352 = H[5] - H[4] * t341;
+  real t355 = H[9] - H[8] * t341;
+  real t361 = sqrt(t345 * t345 + (t343 * t343 + (t349 * t349 + (t352 * t352 + t355 * t355))));
+  real t364 = t361 * (t361 + (fabs(t352)));
+  real t366 = 1.0 / t364;
+  real t367 = (0.0 < t364) ? t366 : 0.0;
+  real t369 = H[23] - H[20] * t332;
+  real t373 = H[15] - H[12] * t332;
+  real t378 = -t361;
+  real t380 = t352 + ((t352 < 0.0) ? t378 : t361);
+  real t383 = H[11] - H[8] * t332;
+  real t389 = t367 * (t345 * t369 + (t343 * t334 + (t349 * t373 + ((H[7] - H[4] * t332) * t380 +
+    t355 * t383))));
+  real t391 = t334 - t343 * t389;
+  real t398 = t325 * (t52 + (t53 + (t54 + (t55 + (H[2] * t319 + t56)))));
+  real t400 = H[18] - H[16] * t398;
+  real t402 = H[22] - H[20] * t398;
+  real t406 = H[14] - H[12] * t398;
+  real t412 = H[10] - H[8] * t398;
+  real t418 = t367 * (t345 * t402 + (t343 * t400 + (t349 * t406 + ((H[6] - H[4] * t398) * t380 +
+    t355 * t412))));
+  real t420 = t400 - t343 * t418;
+  real t422 = t402 - t345 * t418;
+  real t426 = t412 - t355 * t418;
+  real t429 = t406 - t349 * t418;
+  real t434 = sqrt(t422 * t422 + (t420 * t420 + (t426 * t426 + t429 * t429)));
+  real t437 = t434 * (t434 + (fabs(t426)));
+  real t439 = 1.0 / t437;
+  real t440 = (0.0 < t437) ? t439 : 0.0;
+  real t442 = t369 - t345 * t389;
+  real t448 = -t434;
+  real t450 = t426 + ((t426 < 0.0) ? t448 : t434);
+  real t453 = t373 - t349 * t389;
+  real t458 = t440 * (t422 * t442 + (t420 * t391 + ((t383 - t355 * t389) * t450 + t429 * t453)));
+  real t460 = t391 - t420 * t458;
+  real t461 = t460 * t460;
+  real t463 = t442 - t422 * t458;
+  real t464 = t463 * t463;
+  real t466 = t453 - t429 * t458;
+  real t470 = sqrt(t464 + (t466 * t466 + t461));
+  real t473 = t470 * (t470 + (fabs(t466)));
+  real t475 = 1.0 / t473;
+  real t476 = (0.0 < t473) ? t475 : 0.0;
+  real t478 = 1.0 - t461 * t476;
+  real t481 = -t470;
+  real t484 = (t466 + ((t466 < 0.0) ? t481 : t470)) * t476;
+  real t485 = t460 * t484;
+  real t489 = t463 * (t460 * t476);
+  real t492 = t440 * (t420 * t478 - t429 * t485 - t422 * t489);
+  real t494 = t478 - t420 * t492;
+  real t496 = t450 * t492;
+  real t499 = t485 + t429 * t492;
+  real t504 = t489 + t422 * t492;
+  real t507 = t367 * (t343 * t494 - (t355 * t496 + t349 * t499) - t345 * t504);
+  real t509 = t494 - t343 * t507;
+  real t512 = t499 + t349 * t507;
+  real t514 = t380 * t507;
+  real t517 = t496 + t355 * t507;
+  real t523 = t504 + t345 * t507;
+  real t526 = t325 * (H[16] * t509 - (H[12] * t512 + (H[4] * t514 + H[8] * t517)) - H[20] * t523);
+  W[24] = -(t319 * t526);
+  W[25] = -(t514 + H[4] * t526);
+  W[26] = -(t517 + H[8] * t526);
+  W[27] = -(t512 + H[12] * t526);
+  W[28] = t509 - H[16] * t526;
+  W[29] = -(t523 + H[20] * t526);
+  real t544 = 1.0 - t464 * t476;
+  real t546 = t463 * t484;
+  real t551 = t440 * (t422 * t544 - (t429 * t546 + t420 * t489));
+  real t553 = t544 - t422 * t551;
+  real t556 = t489 + t420 * t551;
+  real t558 = t450 * t551;
+  real t561 = t546 + t429 * t551;
+  real t566 = t367 * (t345 * t553 - (t343 * t556 + (t355 * t558 + t349 * t561)));
+  real t568 = t553 - t345 * t566;
+  real t571 = t556 + t343 * t566;
+  real t574 = t561 + t349 * t566;
+  real t576 = t380 * t566;
+  real t579 = t558 + t355 * t566;
+  real t585 = t325 * (H[20] * t568 - (H[16] * t571 + (H[12] * t574 + (H[4] * t576 + H[8] * t579))));
+  W[30] = -(t319 * t585);
+  W[31] = -(t576 + H[4] * t585);
+  W[32] = -(t579 + H[8] * t585);
+  W[33] = -(t574 + H[12] * t585);
+  W[34] = -(t571 + H[16] * t585);
+  W[35] = t568 - H[20] * t585;
+  return 0;
 }
 
-static int mstmm_sweep_generic4_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_complement_inputs[] = {
-    {"H", 24, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic4_complement_guards[] = {
-    {1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic4_complement, (in[0], out[0]))
 
 /* a column's rows divided by D, across a hinge with 4 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -9540,57 +2674,21 @@ static const mstmm_guard mstmm_sweep_generic4_complement_guards[] = {
  * in  y[4] -H^T K - C
  * out z[4] D^-1 y
  */
-int mstmm_sweep_generic4_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_generic4_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[4] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[5] * t2;
-    const real t4 = F[8] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[9] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[10] * t7;
-    const real t9 = F[12] * y[0];
-    const real t10 = y[3] - t9;
-    const real t11 = F[13] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = F[14] * t7;
-    const real t14 = t12 - t13;
-    const real t15 = F[15] * t14;
-    const real t16 = F[14] * t15;
-    const real t17 = t8 - t16;
-    const real t18 = F[9] * t17;
-    const real t19 = t3 - t18;
-    const real t20 = F[13] * t15;
-    const real t21 = t19 - t20;
-    const real t22 = F[4] * t21;
-    const real t23 = t0 - t22;
-    const real t24 = F[8] * t17;
-    const real t25 = t23 - t24;
-    const real t26 = F[12] * t15;
-    const real t27 = t25 - t26;
-    z[0] = t27;
-    z[1] = t21;
-    z[2] = t17;
-    z[3] = t15;
-    return 0;
+  real t2 = y[1] - F[4] * y[0];
+  real t7 = y[2] - F[8] * y[0] - F[9] * t2;
+  real t15 = F[15] * (y[3] - F[12] * y[0] - F[13] * t2 - F[14] * t7);
+  real t17 = F[10] * t7 - F[14] * t15;
+  real t21 = F[5] * t2 - F[9] * t17 - F[13] * t15;
+  z[0] = F[0] * y[0] - F[4] * t21 - F[8] * t17 - F[12] * t15;
+  z[1] = t21;
+  z[2] = t17;
+  z[3] = t15;
+  return 0;
 }
 
-static int mstmm_sweep_generic4_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_divide_inputs[] = {
-    {"F", 16, "", 0, 0},
-    {"y", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_divide_outputs[] = {
-    {"z", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 4 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -9599,33 +2697,13 @@ static const mstmm_port mstmm_sweep_generic4_divide_outputs[] = {
  * in  z[4] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_generic4_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+int mstmm_sweep_generic4_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = y[3] * z[3];
-    const real t6 = t4 + t5;
-    L_ij[0] += t6;
-    return 0;
+  L_ij[0] += y[0] * z[0] + y[1] * z[1] + y[2] * z[2] + y[3] * z[3];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_couple_inputs[] = {
-    {"y", 4, "", 0, 0},
-    {"z", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 4 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -9634,35 +2712,13 @@ static const mstmm_port mstmm_sweep_generic4_couple_outputs[] = {
  * in  z[4] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic4_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_generic4_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = y[3] * z[3];
-    const real t6 = t4 + t5;
-    const real t7 = -t6;
-    l[0] += t7;
-    return 0;
+  l[0] += -(y[0] * z[0] + y[1] * z[1] + y[2] * z[2] + y[3] * z[3]);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_add_known_part_inputs[] = {
-    {"y", 4, "", 0, 0},
-    {"z", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 4 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -9671,34 +2727,16 @@ static const mstmm_port mstmm_sweep_generic4_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[4] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic4_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_generic4_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    const real t1 = y[1] * x[0];
-    y_0[1] += t1;
-    const real t2 = y[2] * x[0];
-    y_0[2] += t2;
-    const real t3 = y[3] * x[0];
-    y_0[3] += t3;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  y_0[1] += y[1] * x[0];
+  y_0[2] += y[2] * x[0];
+  y_0[3] += y[3] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_inputs[] = {
-    {"y", 4, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_outputs[] = {
-    {"y_0", 4, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of the bodies accelerated by a hinge with 4 speeds
  * in  S[21] inertia of everything outboard, at P
@@ -9706,425 +2744,65 @@ static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_outputs[] = {
  * in  udot[4] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic4_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e)
+int mstmm_sweep_generic4_required_load(in_t S, in_t H, in_t udot, out_t e)
 {
-    const real t0 = S[0] * H[0];
-    const real t1 = S[1] * H[4];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * H[8];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * H[12];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * H[16];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * H[20];
-    const real t10 = t8 + t9;
-    const real t11 = udot[0] * t10;
-    const real t12 = S[0] * H[1];
-    const real t13 = S[1] * H[5];
-    const real t14 = t12 + t13;
-    const real t15 = S[2] * H[9];
-    const real t16 = t14 + t15;
-    const real t17 = S[3] * H[13];
-    const real t18 = t16 + t17;
-    const real t19 = S[4] * H[17];
-    const real t20 = t18 + t19;
-    const real t21 = S[5] * H[21];
-    const real t22 = t20 + t21;
-    const real t23 = udot[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = S[0] * H[2];
-    const real t26 = S[1] * H[6];
-    const real t27 = t25 + t26;
-    const real t28 = S[2] * H[10];
-    const real t29 = t27 + t28;
-    const real t30 = S[3] * H[14];
-    const real t31 = t29 + t30;
-    const real t32 = S[4] * H[18];
-    const real t33 = t31 + t32;
-    const real t34 = S[5] * H[22];
-    const real t35 = t33 + t34;
-    const real t36 = udot[2] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = S[0] * H[3];
-    const real t39 = S[1] * H[7];
-    const real t40 = t38 + t39;
-    const real t41 = S[2] * H[11];
-    const real t42 = t40 + t41;
-    const real t43 = S[3] * H[15];
-    const real t44 = t42 + t43;
-    const real t45 = S[4] * H[19];
-    const real t46 = t44 + t45;
-    const real t47 = S[5] * H[23];
-    const real t48 = t46 + t47;
-    const real t49 = udot[3] * t48;
-    const real t50 = t37 + t49;
-    e[0] = t50;
-    const real t51 = S[1] * H[0];
-    const real t52 = S[6] * H[4];
-    const real t53 = t51 + t52;
-    const real t54 = S[7] * H[8];
-    const real t55 = t53 + t54;
-    const real t56 = S[8] * H[12];
-    const real t57 = t55 + t56;
-    const real t58 = S[9] * H[16];
-    const real t59 = t57 + t58;
-    const real t60 = S[10] * H[20];
-    const real t61 = t59 + t60;
-    const real t62 = udot[0] * t61;
-    const real t63 = S[1] * H[1];
-    const real t64 = S[6] * H[5];
-    const real t65 = t63 + t64;
-    const real t66 = S[7] * H[9];
-    const real t67 = t65 + t66;
-    const real t68 = S[8] * H[13];
-    const real t69 = t67 + t68;
-    const real t70 = S[9] * H[17];
-    const real t71 = t69 + t70;
-    const real t72 = S[10] * H[21];
-    const real t73 = t71 + t72;
-    const real t74 = udot[1] * t73;
-    const real t75 = t62 + t74;
-    const real t76 = S[1] * H[2];
-    const real t77 = S[6] * H[6];
-    const real t78 = t76 + t77;
-    const real t79 = S[7] * H[10];
-    const real t80 = t78 + t79;
-    const real t81 = S[8] * H[14];
-    const real t82 = t80 + t81;
-    const real t83 = S[9] * H[18];
-    const real t84 = t82 + t83;
-    const real t85 = S[10] * H[22];
-    const real t86 = t84 + t85;
-    const real t87 = udot[2] * t86;
-    const real t88 = t75 + t87;
-    const real t89 = S[1] * H[3];
-    const real t90 = S[6] * H[7];
-    const real t91 = t89 + t90;
-    const real t92 = S[7] * H[11];
-    const real t93 = t91 + t92;
-    const real t94 = S[8] * H[15];
-    const real t95 = t93 + t94;
-    const real t96 = S[9] * H[19];
-    const real t97 = t95 + t96;
-    const real t98 = S[10] * H[23];
-    const real t99 = t97 + t98;
-    const real t100 = udot[3] * t99;
-    const real t101 = t88 + t100;
-    e[1] = t101;
-    const real t102 = S[2] * H[0];
-    const real t103 = S[7] * H[4];
-    const real t104 = t102 + t103;
-    const real t105 = S[11] * H[8];
-    const real t106 = t104 + t105;
-    const real t107 = S[12] * H[12];
-    const real t108 = t106 + t107;
-    const real t109 = S[13] * H[16];
-    const real t110 = t108 + t109;
-    const real t111 = S[14] * H[20];
-    const real t112 = t110 + t111;
-    const real t113 = udot[0] * t112;
-    const real t114 = S[2] * H[1];
-    const real t115 = S[7] * H[5];
-    const real t116 = t114 + t115;
-    const real t117 = S[11] * H[9];
-    const real t118 = t116 + t117;
-    const real t119 = S[12] * H[13];
-    const real t120 = t118 + t119;
-    const real t121 = S[13] * H[17];
-    const real t122 = t120 + t121;
-    const real t123 = S[14] * H[21];
-    const real t124 = t122 + t123;
-    const real t125 = udot[1] * t124;
-    const real t126 = t113 + t125;
-    const real t127 = S[2] * H[2];
-    const real t128 = S[7] * H[6];
-    const real t129 = t127 + t128;
-    const real t130 = S[11] * H[10];
-    const real t131 = t129 + t130;
-    const real t132 = S[12] * H[14];
-    const real t133 = t131 + t132;
-    const real t134 = S[13] * H[18];
-    const real t135 = t133 + t134;
-    const real t136 = S[14] * H[22];
-    const real t137 = t135 + t136;
-    const real t138 = udot[2] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = S[2] * H[3];
-    const real t141 = S[7] * H[7];
-    const real t142 = t140 + t141;
-    const real t143 = S[11] * H[11];
-    const real t144 = t142 + t143;
-    const real t145 = S[12] * H[15];
-    const real t146 = t144 + t145;
-    const real t147 = S[13] * H[19];
-    const real t148 = t146 + t147;
-    const real t149 = S[14] * H[23];
-    const real t150 = t148 + t149;
-    const real t151 = udot[3] * t150;
-    const real t152 = t139 + t151;
-    e[2] = t152;
-    const real t153 = S[3] * H[0];
-    const real t154 = S[8] * H[4];
-    const real t155 = t153 + t154;
-    const real t156 = S[12] * H[8];
-    const real t157 = t155 + t156;
-    const real t158 = S[15] * H[12];
-    const real t159 = t157 + t158;
-    const real t160 = S[16] * H[16];
-    const real t161 = t159 + t160;
-    const real t162 = S[17] * H[20];
-    const real t163 = t161 + t162;
-    const real t164 = udot[0] * t163;
-    const real t165 = S[3] * H[1];
-    const real t166 = S[8] * H[5];
-    const real t167 = t165 + t166;
-    const real t168 = S[12] * H[9];
-    const real t169 = t167 + t168;
-    const real t170 = S[15] * H[13];
-    const real t171 = t169 + t170;
-    const real t172 = S[16] * H[17];
-    const real t173 = t171 + t172;
-    const real t174 = S[17] * H[21];
-    const real t175 = t173 + t174;
-    const real t176 = udot[1] * t175;
-    const real t177 = t164 + t176;
-    const real t178 = S[3] * H[2];
-    const real t179 = S[8] * H[6];
-    const real t180 = t178 + t179;
-    const real t181 = S[12] * H[10];
-    const real t182 = t180 + t181;
-    const real t183 = S[15] * H[14];
-    const real t184 = t182 + t183;
-    const real t185 = S[16] * H[18];
-    const real t186 = t184 + t185;
-    const real t187 = S[17] * H[22];
-    const real t188 = t186 + t187;
-    const real t189 = udot[2] * t188;
-    const real t190 = t177 + t189;
-    const real t191 = S[3] * H[3];
-    const real t192 = S[8] * H[7];
-    const real t193 = t191 + t192;
-    const real t194 = S[12] * H[11];
-    const real t195 = t193 + t194;
-    const real t196 = S[15] * H[15];
-    const real t197 = t195 + t196;
-    const real t198 = S[16] * H[19];
-    const real t199 = t197 + t198;
-    const real t200 = S[17] * H[23];
-    const real t201 = t199 + t200;
-    const real t202 = udot[3] * t201;
-    const real t203 = t190 + t202;
-    e[3] = t203;
-    const real t204 = S[4] * H[0];
-    const real t205 = S[9] * H[4];
-    const real t206 = t204 + t205;
-    const real t207 = S[13] * H[8];
-    const real t208 = t206 + t207;
-    const real t209 = S[16] * H[12];
-    const real t210 = t208 + t209;
-    const real t211 = S[18] * H[16];
-    const real t212 = t210 + t211;
-    const real t213 = S[19] * H[20];
-    const real t214 = t212 + t213;
-    const real t215 = udot[0] * t214;
-    const real t216 = S[4] * H[1];
-    const real t217 = S[9] * H[5];
-    const real t218 = t216 + t217;
-    const real t219 = S[13] * H[9];
-    const real t220 = t218 + t219;
-    const real t221 = S[16] * H[13];
-    const real t222 = t220 + t221;
-    const real t223 = S[18] * H[17];
-    const real t224 = t222 + t223;
-    const real t225 = S[19] * H[21];
-    const real t226 = t224 + t225;
-    const real t227 = udot[1] * t226;
-    const real t228 = t215 + t227;
-    const real t229 = S[4] * H[2];
-    const real t230 = S[9] * H[6];
-    const real t231 = t229 + t230;
-    const real t232 = S[13] * H[10];
-    const real t233 = t231 + t232;
-    const real t234 = S[16] * H[14];
-    const real t235 = t233 + t234;
-    const real t236 = S[18] * H[18];
-    const real t237 = t235 + t236;
-    const real t238 = S[19] * H[22];
-    const real t239 = t237 + t238;
-    const real t240 = udot[2] * t239;
-    const real t241 = t228 + t240;
-    const real t242 = S[4] * H[3];
-    const real t243 = S[9] * H[7];
-    const real t244 = t242 + t243;
-    const real t245 = S[13] * H[11];
-    const real t246 = t244 + t245;
-    const real t247 = S[16] * H[15];
-    const real t248 = t246 + t247;
-    const real t249 = S[18] * H[19];
-    const real t250 = t248 + t249;
-    const real t251 = S[19] * H[23];
-    const real t252 = t250 + t251;
-    const real t253 = udot[3] * t252;
-    const real t254 = t241 + t253;
-    e[4] = t254;
-    const real t255 = S[5] * H[0];
-    const real t256 = S[10] * H[4];
-    const real t257 = t255 + t256;
-    const real t258 = S[14] * H[8];
-    const real t259 = t257 + t258;
-    const real t260 = S[17] * H[12];
-    const real t261 = t259 + t260;
-    const real t262 = S[19] * H[16];
-    const real t263 = t261 + t262;
-    const real t264 = S[20] * H[20];
-    const real t265 = t263 + t264;
-    const real t266 = udot[0] * t265;
-    const real t267 = S[5] * H[1];
-    const real t268 = S[10] * H[5];
-    const real t269 = t267 + t268;
-    const real t270 = S[14] * H[9];
-    const real t271 = t269 + t270;
-    const real t272 = S[17] * H[13];
-    const real t273 = t271 + t272;
-    const real t274 = S[19] * H[17];
-    const real t275 = t273 + t274;
-    const real t276 = S[20] * H[21];
-    const real t277 = t275 + t276;
-    const real t278 = udot[1] * t277;
-    const real t279 = t266 + t278;
-    const real t280 = S[5] * H[2];
-    const real t281 = S[10] * H[6];
-    const real t282 = t280 + t281;
-    const real t283 = S[14] * H[10];
-    const real t284 = t282 + t283;
-    const real t285 = S[17] * H[14];
-    const real t286 = t284 + t285;
-    const real t287 = S[19] * H[18];
-    const real t288 = t286 + t287;
-    const real t289 = S[20] * H[22];
-    const real t290 = t288 + t289;
-    const real t291 = udot[2] * t290;
-    const real t292 = t279 + t291;
-    const real t293 = S[5] * H[3];
-    const real t294 = S[10] * H[7];
-    const real t295 = t293 + t294;
-    const real t296 = S[14] * H[11];
-    const real t297 = t295 + t296;
-    const real t298 = S[17] * H[15];
-    const real t299 = t297 + t298;
-    const real t300 = S[19] * H[19];
-    const real t301 = t299 + t300;
-    const real t302 = S[20] * H[23];
-    const real t303 = t301 + t302;
-    const real t304 = udot[3] * t303;
-    const real t305 = t292 + t304;
-    e[5] = t305;
-    return 0;
+  e[0] = udot[0] * (S[0] * H[0] + S[1] * H[4] + S[2] * H[8] + S[3] * H[12] + S[4] * H[16] + S[5] *
+    H[20]) + udot[1] * (S[0] * H[1] + S[1] * H[5] + S[2] * H[9] + S[3] * H[13] + S[4] * H[17] + S[5]
+    * H[21]) + udot[2] * (S[0] * H[2] + S[1] * H[6] + S[2] * H[10] + S[3] * H[14] + S[4] * H[18] +
+    S[5] * H[22]) + udot[3] * (S[0] * H[3] + S[1] * H[7] + S[2] * H[11] + S[3] * H[15] + S[4] *
+    H[19] + S[5] * H[23]);
+  e[1] = udot[0] * (S[1] * H[0] + S[6] * H[4] + S[7] * H[8] + S[8] * H[12] + S[9] * H[16] + S[10] *
+    H[20]) + udot[1] * (S[1] * H[1] + S[6] * H[5] + S[7] * H[9] + S[8] * H[13] + S[9] * H[17] +
+    S[10] * H[21]) + udot[2] * (S[1] * H[2] + S[6] * H[6] + S[7] * H[10] + S[8] * H[14] + S[9] *
+    H[18] + S[10] * H[22]) + udot[3] * (S[1] * H[3] + S[6] * H[7] + S[7] * H[11] + S[8] * H[15] +
+    S[9] * H[19] + S[10] * H[23]);
+  e[2] = udot[0] * (S[2] * H[0] + S[7] * H[4] + S[11] * H[8] + S[12] * H[12] + S[13] * H[16] + S[14]
+    * H[20]) + udot[1] * (S[2] * H[1] + S[7] * H[5] + S[11] * H[9] + S[12] * H[13] + S[13] * H[17] +
+    S[14] * H[21]) + udot[2] * (S[2] * H[2] + S[7] * H[6] + S[11] * H[10] + S[12] * H[14] + S[13] *
+    H[18] + S[14] * H[22]) + udot[3] * (S[2] * H[3] + S[7] * H[7] + S[11] * H[11] + S[12] * H[15] +
+    S[13] * H[19] + S[14] * H[23]);
+  e[3] = udot[0] * (S[3] * H[0] + S[8] * H[4] + S[12] * H[8] + S[15] * H[12] + S[16] * H[16] + S[17]
+    * H[20]) + udot[1] * (S[3] * H[1] + S[8] * H[5] + S[12] * H[9] + S[15] * H[13] + S[16] * H[17] +
+    S[17] * H[21]) + udot[2] * (S[3] * H[2] + S[8] * H[6] + S[12] * H[10] + S[15] * H[14] + S[16] *
+    H[18] + S[17] * H[22]) + udot[3] * (S[3] * H[3] + S[8] * H[7] + S[12] * H[11] + S[15] * H[15] +
+    S[16] * H[19] + S[17] * H[23]);
+  e[4] = udot[0] * (S[4] * H[0] + S[9] * H[4] + S[13] * H[8] + S[16] * H[12] + S[18] * H[16] + S[19]
+    * H[20]) + udot[1] * (S[4] * H[1] + S[9] * H[5] + S[13] * H[9] + S[16] * H[13] + S[18] * H[17] +
+    S[19] * H[21]) + udot[2] * (S[4] * H[2] + S[9] * H[6] + S[13] * H[10] + S[16] * H[14] + S[18] *
+    H[18] + S[19] * H[22]) + udot[3] * (S[4] * H[3] + S[9] * H[7] + S[13] * H[11] + S[16] * H[15] +
+    S[18] * H[19] + S[19] * H[23]);
+  e[5] = udot[0] * (S[5] * H[0] + S[10] * H[4] + S[14] * H[8] + S[17] * H[12] + S[19] * H[16] +
+    S[20] * H[20]) + udot[1] * (S[5] * H[1] + S[10] * H[5] + S[14] * H[9] + S[17] * H[13] + S[19] *
+    H[17] + S[20] * H[21]) + udot[2] * (S[5] * H[2] + S[10] * H[6] + S[14] * H[10] + S[17] * H[14] +
+    S[19] * H[18] + S[20] * H[22]) + udot[3] * (S[5] * H[3] + S[10] * H[7] + S[14] * H[11] + S[17] *
+    H[15] + S[19] * H[19] + S[20] * H[23]);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_required_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_required_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_required_load_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"udot", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_required_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_required_load, (in[0], in[1], in[2], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 4 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][4] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[4] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[4] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic4_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y)
+int mstmm_sweep_generic4_ground_column_load(in_t H, in_t e, in_t tau, out_t y)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[4] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[8] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[12] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[16] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[5] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[9] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[13] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[17] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[21] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[6] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[10] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[14] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[18] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[22] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = H[3] * e[0];
-    const real t37 = H[7] * e[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[11] * e[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[15] * e[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[19] * e[4];
-    const real t44 = t42 + t43;
-    const real t45 = H[23] * e[5];
-    const real t46 = t44 + t45;
-    const real t47 = tau[3] - t46;
-    y[3] = t47;
-    return 0;
+  y[0] = tau[0] - (H[0] * e[0] + H[4] * e[1] + H[8] * e[2] + H[12] * e[3] + H[16] * e[4] + H[20] *
+    e[5]);
+  y[1] = tau[1] - (H[1] * e[0] + H[5] * e[1] + H[9] * e[2] + H[13] * e[3] + H[17] * e[4] + H[21] *
+    e[5]);
+  y[2] = tau[2] - (H[2] * e[0] + H[6] * e[1] + H[10] * e[2] + H[14] * e[3] + H[18] * e[4] + H[22] *
+    e[5]);
+  y[3] = tau[3] - (H[3] * e[0] + H[7] * e[1] + H[11] * e[2] + H[15] * e[3] + H[19] * e[4] + H[23] *
+    e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic4_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_ground_column_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_ground_column_load_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 4, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_ground_column_load_outputs[] = {
-    {"y", 4, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_ground_column_load, (in[0], in[1], in[2], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -10147,560 +2825,122 @@ static const mstmm_port mstmm_sweep_generic4_ground_column_load_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic4_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic4_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)c;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = s[3] * d_H[15];
-    const real t159 = H[15] * d_s[3];
-    const real t160 = t158 + t159;
-    const real t161 = s[2] * d_H[14];
-    const real t162 = H[14] * d_s[2];
-    const real t163 = t161 + t162;
-    const real t164 = s[1] * d_H[13];
-    const real t165 = H[13] * d_s[1];
-    const real t166 = t164 + t165;
-    const real t167 = s[0] * d_H[12];
-    const real t168 = H[12] * d_s[0];
-    const real t169 = t167 + t168;
-    const real t170 = t166 + t169;
-    const real t171 = t163 + t170;
-    const real t172 = t160 + t171;
-    const real t173 = d_c[3] + t172;
-    const real t174 = t157 + t173;
-    const real t175 = motion_I[5] * t34;
-    const real t176 = t65 * d_motion_I[5];
-    const real t177 = t175 + t176;
-    const real t178 = motion_I[4] * t19;
-    const real t179 = t73 * d_motion_I[4];
-    const real t180 = t178 + t179;
-    const real t181 = motion_I[3] * t4;
-    const real t182 = t81 * d_motion_I[3];
-    const real t183 = t181 + t182;
-    const real t184 = t180 + t183;
-    const real t185 = t177 + t184;
-    const real t186 = t174 + t185;
-    d_motion[3] = t186;
-    const real t187 = t153 * d_w[0];
-    const real t188 = w[0] * t139;
-    const real t189 = t187 + t188;
-    const real t190 = w[2] * t85;
-    const real t191 = t81 * motion_I[0];
-    const real t192 = t73 * motion_I[1];
-    const real t193 = t191 + t192;
-    const real t194 = t65 * motion_I[2];
-    const real t195 = t193 + t194;
-    const real t196 = t195 * d_w[2];
-    const real t197 = t190 + t196;
-    const real t198 = t189 - t197;
-    const real t199 = H[19] * d_s[3];
-    const real t200 = s[3] * d_H[19];
-    const real t201 = t199 + t200;
-    const real t202 = H[18] * d_s[2];
-    const real t203 = s[2] * d_H[18];
-    const real t204 = t202 + t203;
-    const real t205 = H[17] * d_s[1];
-    const real t206 = s[1] * d_H[17];
-    const real t207 = t205 + t206;
-    const real t208 = H[16] * d_s[0];
-    const real t209 = s[0] * d_H[16];
-    const real t210 = t208 + t209;
-    const real t211 = t207 + t210;
-    const real t212 = t204 + t211;
-    const real t213 = t201 + t212;
-    const real t214 = d_c[4] + t213;
-    const real t215 = t198 + t214;
-    const real t216 = motion_I[5] * t39;
-    const real t217 = t92 * d_motion_I[5];
-    const real t218 = t216 + t217;
-    const real t219 = motion_I[4] * t24;
-    const real t220 = t100 * d_motion_I[4];
-    const real t221 = t219 + t220;
-    const real t222 = motion_I[3] * t9;
-    const real t223 = t108 * d_motion_I[3];
-    const real t224 = t222 + t223;
-    const real t225 = t221 + t224;
-    const real t226 = t218 + t225;
-    const real t227 = t215 + t226;
-    d_motion[4] = t227;
-    const real t228 = w[1] * t85;
-    const real t229 = t195 * d_w[1];
-    const real t230 = t228 + t229;
-    const real t231 = t146 * d_w[0];
-    const real t232 = w[0] * t112;
-    const real t233 = t231 + t232;
-    const real t234 = t230 - t233;
-    const real t235 = H[23] * d_s[3];
-    const real t236 = s[3] * d_H[23];
-    const real t237 = t235 + t236;
-    const real t238 = H[22] * d_s[2];
-    const real t239 = s[2] * d_H[22];
-    const real t240 = t238 + t239;
-    const real t241 = H[21] * d_s[1];
-    const real t242 = s[1] * d_H[21];
-    const real t243 = t241 + t242;
-    const real t244 = H[20] * d_s[0];
-    const real t245 = s[0] * d_H[20];
-    const real t246 = t244 + t245;
-    const real t247 = t243 + t246;
-    const real t248 = t240 + t247;
-    const real t249 = t237 + t248;
-    const real t250 = d_c[5] + t249;
-    const real t251 = t234 + t250;
-    const real t252 = motion_I[5] * t44;
-    const real t253 = t119 * d_motion_I[5];
-    const real t254 = t252 + t253;
-    const real t255 = motion_I[4] * t29;
-    const real t256 = t127 * d_motion_I[4];
-    const real t257 = t255 + t256;
-    const real t258 = motion_I[3] * t14;
-    const real t259 = t135 * d_motion_I[3];
-    const real t260 = t258 + t259;
-    const real t261 = t257 + t260;
-    const real t262 = t254 + t261;
-    const real t263 = t251 + t262;
-    d_motion[5] = t263;
-    const real t264 = v[2] * t112;
-    const real t265 = t146 * d_v[2];
-    const real t266 = t264 + t265;
-    const real t267 = 2.0 * t266;
-    const real t268 = v[1] * t139;
-    const real t269 = t153 * d_v[1];
-    const real t270 = t268 + t269;
-    const real t271 = 2.0 * t270;
-    const real t272 = t267 - t271;
-    const real t273 = H[3] * d_s[3];
-    const real t274 = s[3] * d_H[3];
-    const real t275 = t273 + t274;
-    const real t276 = H[2] * d_s[2];
-    const real t277 = s[2] * d_H[2];
-    const real t278 = t276 + t277;
-    const real t279 = H[1] * d_s[1];
-    const real t280 = s[1] * d_H[1];
-    const real t281 = t279 + t280;
-    const real t282 = H[0] * d_s[0];
-    const real t283 = s[0] * d_H[0];
-    const real t284 = t282 + t283;
-    const real t285 = t281 + t284;
-    const real t286 = t278 + t285;
-    const real t287 = t275 + t286;
-    const real t288 = d_c[0] + t287;
-    const real t289 = t272 + t288;
-    const real t290 = Rt[0] * d[0];
-    const real t291 = Rt[1] * d[1];
-    const real t292 = t290 + t291;
-    const real t293 = Rt[2] * d[2];
-    const real t294 = t292 + t293;
-    const real t295 = t294 + ro[0];
-    const real t296 = motion_I[0] * motion_I[2];
-    const real t297 = t296 - motion_I[4];
-    const real t298 = t295 * t297;
-    const real t299 = Rt[3] * d[0];
-    const real t300 = Rt[4] * d[1];
-    const real t301 = t299 + t300;
-    const real t302 = Rt[5] * d[2];
-    const real t303 = t301 + t302;
-    const real t304 = t303 + ro[1];
-    const real t305 = motion_I[1] * motion_I[2];
-    const real t306 = motion_I[3] + t305;
-    const real t307 = t304 * t306;
-    const real t308 = t298 + t307;
-    const real t309 = Rt[6] * d[0];
-    const real t310 = Rt[7] * d[1];
-    const real t311 = t309 + t310;
-    const real t312 = Rt[8] * d[2];
-    const real t313 = t311 + t312;
-    const real t314 = t313 + ro[2];
-    const real t315 = motion_I[1] * motion_I[1];
-    const real t316 = motion_I[0] * motion_I[0];
-    const real t317 = t315 + t316;
-    const real t318 = t314 * t317;
-    const real t319 = t308 - t318;
-    const real t320 = t319 + motion_I[8];
-    const real t321 = t320 * t34;
-    const real t322 = t306 * t54;
-    const real t323 = motion_I[2] * d_motion_I[1];
-    const real t324 = motion_I[1] * d_motion_I[2];
-    const real t325 = t323 + t324;
-    const real t326 = d_motion_I[3] + t325;
-    const real t327 = t304 * t326;
-    const real t328 = t322 + t327;
-    const real t329 = t297 * t49;
-    const real t330 = motion_I[2] * d_motion_I[0];
-    const real t331 = motion_I[0] * d_motion_I[2];
-    const real t332 = t330 + t331;
-    const real t333 = t332 - d_motion_I[4];
-    const real t334 = t295 * t333;
-    const real t335 = t329 + t334;
-    const real t336 = t328 + t335;
-    const real t337 = t317 * t59;
-    const real t338 = motion_I[0] * d_motion_I[0];
-    const real t339 = t338 + t338;
-    const real t340 = motion_I[1] * d_motion_I[1];
-    const real t341 = t340 + t340;
-    const real t342 = t339 + t341;
-    const real t343 = t314 * t342;
-    const real t344 = t337 + t343;
-    const real t345 = t336 - t344;
-    const real t346 = d_motion_I[8] + t345;
-    const real t347 = t65 * t346;
-    const real t348 = t321 + t347;
-    const real t349 = motion_I[0] * motion_I[1];
-    const real t350 = motion_I[5] + t349;
-    const real t351 = t295 * t350;
-    const real t352 = motion_I[2] * motion_I[2];
-    const real t353 = t352 + t316;
-    const real t354 = t304 * t353;
-    const real t355 = t351 - t354;
-    const real t356 = t305 - motion_I[3];
-    const real t357 = t314 * t356;
-    const real t358 = t355 + t357;
-    const real t359 = t358 + motion_I[7];
-    const real t360 = t359 * t19;
-    const real t361 = t356 * t59;
-    const real t362 = t325 - d_motion_I[3];
-    const real t363 = t314 * t362;
-    const real t364 = t361 + t363;
-    const real t365 = t350 * t49;
-    const real t366 = motion_I[1] * d_motion_I[0];
-    const real t367 = motion_I[0] * d_motion_I[1];
-    const real t368 = t366 + t367;
-    const real t369 = d_motion_I[5] + t368;
-    const real t370 = t295 * t369;
-    const real t371 = t365 + t370;
-    const real t372 = t353 * t54;
-    const real t373 = motion_I[2] * d_motion_I[2];
-    const real t374 = t373 + t373;
-    const real t375 = t339 + t374;
-    const real t376 = t304 * t375;
-    const real t377 = t372 + t376;
-    const real t378 = t371 - t377;
-    const real t379 = t364 + t378;
-    const real t380 = d_motion_I[7] + t379;
-    const real t381 = t73 * t380;
-    const real t382 = t360 + t381;
-    const real t383 = t349 - motion_I[5];
-    const real t384 = t304 * t383;
-    const real t385 = t315 + t352;
-    const real t386 = t295 * t385;
-    const real t387 = t384 - t386;
-    const real t388 = motion_I[4] + t296;
-    const real t389 = t314 * t388;
-    const real t390 = t387 + t389;
-    const real t391 = t390 + motion_I[6];
-    const real t392 = t391 * t4;
-    const real t393 = t388 * t59;
-    const real t394 = d_motion_I[4] + t332;
-    const real t395 = t314 * t394;
-    const real t396 = t393 + t395;
-    const real t397 = t383 * t54;
-    const real t398 = t368 - d_motion_I[5];
-    const real t399 = t304 * t398;
-    const real t400 = t397 + t399;
-    const real t401 = t385 * t49;
-    const real t402 = t341 + t374;
-    const real t403 = t295 * t402;
-    const real t404 = t401 + t403;
-    const real t405 = t400 - t404;
-    const real t406 = t396 + t405;
-    const real t407 = d_motion_I[6] + t406;
-    const real t408 = t81 * t407;
-    const real t409 = t392 + t408;
-    const real t410 = t382 + t409;
-    const real t411 = t348 + t410;
-    const real t412 = t289 + t411;
-    d_motion[6] = t412;
-    const real t413 = v[0] * t139;
-    const real t414 = t153 * d_v[0];
-    const real t415 = t413 + t414;
-    const real t416 = 2.0 * t415;
-    const real t417 = v[2] * t85;
-    const real t418 = t195 * d_v[2];
-    const real t419 = t417 + t418;
-    const real t420 = 2.0 * t419;
-    const real t421 = t416 - t420;
-    const real t422 = H[7] * d_s[3];
-    const real t423 = s[3] * d_H[7];
-    const real t424 = t422 + t423;
-    const real t425 = H[6] * d_s[2];
-    const real t426 = s[2] * d_H[6];
-    const real t427 = t425 + t426;
-    const real t428 = H[5] * d_s[1];
-    const real t429 = s[1] * d_H[5];
-    const real t430 = t428 + t429;
-    const real t431 = H[4] * d_s[0];
-    const real t432 = s[0] * d_H[4];
-    const real t433 = t431 + t432;
-    const real t434 = t430 + t433;
-    const real t435 = t427 + t434;
-    const real t436 = t424 + t435;
-    const real t437 = d_c[1] + t436;
-    const real t438 = t421 + t437;
-    const real t439 = t320 * t39;
-    const real t440 = t92 * t346;
-    const real t441 = t439 + t440;
-    const real t442 = t359 * t24;
-    const real t443 = t100 * t380;
-    const real t444 = t442 + t443;
-    const real t445 = t391 * t9;
-    const real t446 = t108 * t407;
-    const real t447 = t445 + t446;
-    const real t448 = t444 + t447;
-    const real t449 = t441 + t448;
-    const real t450 = t438 + t449;
-    d_motion[7] = t450;
-    const real t451 = v[1] * t85;
-    const real t452 = t195 * d_v[1];
-    const real t453 = t451 + t452;
-    const real t454 = 2.0 * t453;
-    const real t455 = v[0] * t112;
-    const real t456 = t146 * d_v[0];
-    const real t457 = t455 + t456;
-    const real t458 = 2.0 * t457;
-    const real t459 = t454 - t458;
-    const real t460 = H[11] * d_s[3];
-    const real t461 = s[3] * d_H[11];
-    const real t462 = t460 + t461;
-    const real t463 = H[10] * d_s[2];
-    const real t464 = s[2] * d_H[10];
-    const real t465 = t463 + t464;
-    const real t466 = H[9] * d_s[1];
-    const real t467 = s[1] * d_H[9];
-    const real t468 = t466 + t467;
-    const real t469 = H[8] * d_s[0];
-    const real t470 = s[0] * d_H[8];
-    const real t471 = t469 + t470;
-    const real t472 = t468 + t471;
-    const real t473 = t465 + t472;
-    const real t474 = t462 + t473;
-    const real t475 = d_c[2] + t474;
-    const real t476 = t459 + t475;
-    const real t477 = t320 * t44;
-    const real t478 = t119 * t346;
-    const real t479 = t477 + t478;
-    const real t480 = t359 * t29;
-    const real t481 = t127 * t380;
-    const real t482 = t480 + t481;
-    const real t483 = t391 * t14;
-    const real t484 = t135 * t407;
-    const real t485 = t483 + t484;
-    const real t486 = t482 + t485;
-    const real t487 = t479 + t486;
-    const real t488 = t476 + t487;
-    d_motion[8] = t488;
-    return 0;
+  (void)c;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139) + (d_c[3] + (s[3] *
+    d_H[15] + H[15] * d_s[3] + (s[2] * d_H[14] + H[14] * d_s[2] + (s[1] * d_H[13] + H[13] * d_s[1] +
+    (s[0] * d_H[12] + H[12] * d_s[0]))))) + (motion_I[5] * t34 + t65 * d_motion_I[5] + (motion_I[4]
+    * t19 + t73 * d_motion_I[4] + (motion_I[3] * t4 + t81 * d_motion_I[3])));
+  real t195 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t195 * d_w[2]) + (d_c[4] + (H[19] *
+    d_s[3] + s[3] * d_H[19] + (H[18] * d_s[2] + s[2] * d_H[18] + (H[17] * d_s[1] + s[1] * d_H[17] +
+    (H[16] * d_s[0] + s[0] * d_H[16]))))) + (motion_I[5] * t39 + t92 * d_motion_I[5] + (motion_I[4]
+    * t24 + t100 * d_motion_I[4] + (motion_I[3] * t9 + t108 * d_motion_I[3])));
+  d_motion[5] = w[1] * t85 + t195 * d_w[1] - (t146 * d_w[0] + w[0] * t112) + (d_c[5] + (H[23] *
+    d_s[3] + s[3] * d_H[23] + (H[22] * d_s[2] + s[2] * d_H[22] + (H[21] * d_s[1] + s[1] * d_H[21] +
+    (H[20] * d_s[0] + s[0] * d_H[20]))))) + (motion_I[5] * t44 + t119 * d_motion_I[5] + (motion_I[4]
+    * t29 + t127 * d_motion_I[4] + (motion_I[3] * t14 + t135 * d_motion_I[3])));
+  real t295 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t296 = motion_I[0] * motion_I[2];
+  real t297 = t296 - motion_I[4];
+  real t304 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t305 = motion_I[1] * motion_I[2];
+  real t306 = motion_I[3] + t305;
+  real t314 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t315 = motion_I[1] * motion_I[1];
+  real t316 = motion_I[0] * motion_I[0];
+  real t317 = t315 + t316;
+  real t320 = t295 * t297 + t304 * t306 - t314 * t317 + motion_I[8];
+  real t325 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t332 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t338 = motion_I[0] * d_motion_I[0];
+  real t339 = t338 + t338;
+  real t340 = motion_I[1] * d_motion_I[1];
+  real t341 = t340 + t340;
+  real t346 = d_motion_I[8] + (t306 * t54 + t304 * (d_motion_I[3] + t325) + (t297 * t49 + t295 *
+    (t332 - d_motion_I[4])) - (t317 * t59 + t314 * (t339 + t341)));
+  real t349 = motion_I[0] * motion_I[1];
+  real t350 = motion_I[5] + t349;
+  real t352 = motion_I[2] * motion_I[2];
+  real t353 = t352 + t316;
+  real t356 = t305 - motion_I[3];
+  real t359 = t295 * t350 - t304 * t353 + t314 * t356 + motion_I[7];
+  real t368 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t373 = motion_I[2] * d_motion_I[2];
+  real t374 = t373 + t373;
+  real t380 = d_motion_I[7] + (t356 * t59 + t314 * (t325 - d_motion_I[3]) + (t350 * t49 + t295 *
+    (d_motion_I[5] + t368) - (t353 * t54 + t304 * (t339 + t374))));
+  real t383 = t349 - motion_I[5];
+  real t385 = t315 + t352;
+  real t388 = motion_I[4] + t296;
+  real t391 = t304 * t383 - t295 * t385 + t314 * t388 + motion_I[6];
+  real t407 = d_motion_I[6] + (t388 * t59 + t314 * (d_motion_I[4] + t332) + (t383 * t54 + t304 *
+    (t368 - d_motion_I[5]) - (t385 * t49 + t295 * (t341 + t374))));
+  d_motion[6] = 2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]) + (d_c[0]
+    + (H[3] * d_s[3] + s[3] * d_H[3] + (H[2] * d_s[2] + s[2] * d_H[2] + (H[1] * d_s[1] + s[1] *
+    d_H[1] + (H[0] * d_s[0] + s[0] * d_H[0]))))) + (t320 * t34 + t65 * t346 + (t359 * t19 + t73 *
+    t380 + (t391 * t4 + t81 * t407)));
+  d_motion[7] = 2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t195 * d_v[2]) + (d_c[1] +
+    (H[7] * d_s[3] + s[3] * d_H[7] + (H[6] * d_s[2] + s[2] * d_H[6] + (H[5] * d_s[1] + s[1] * d_H[5]
+    + (H[4] * d_s[0] + s[0] * d_H[4]))))) + (t320 * t39 + t92 * t346 + (t359 * t24 + t100 * t380 +
+    (t391 * t9 + t108 * t407)));
+  d_motion[8] = 2.0 * (v[1] * t85 + t195 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]) + (d_c[2] +
+    (H[11] * d_s[3] + s[3] * d_H[11] + (H[10] * d_s[2] + s[2] * d_H[10] + (H[9] * d_s[1] + s[1] *
+    d_H[9] + (H[8] * d_s[0] + s[0] * d_H[8]))))) + (t320 * t44 + t119 * t346 + (t359 * t29 + t127 *
+    t380 + (t391 * t14 + t135 * t407)));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 24, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 4, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 24, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 4, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6][4] motion subspace
@@ -10709,124 +2949,24 @@ static const mstmm_port mstmm_sweep_generic4_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[4] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic4_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic4_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    const real t0 = f[5] * d_H[20];
-    const real t1 = H[20] * d_f[5];
-    const real t2 = t0 + t1;
-    const real t3 = f[4] * d_H[16];
-    const real t4 = H[16] * d_f[4];
-    const real t5 = t3 + t4;
-    const real t6 = f[3] * d_H[12];
-    const real t7 = H[12] * d_f[3];
-    const real t8 = t6 + t7;
-    const real t9 = f[2] * d_H[8];
-    const real t10 = H[8] * d_f[2];
-    const real t11 = t9 + t10;
-    const real t12 = f[1] * d_H[4];
-    const real t13 = H[4] * d_f[1];
-    const real t14 = t12 + t13;
-    const real t15 = f[0] * d_H[0];
-    const real t16 = H[0] * d_f[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_tau[0] = t22;
-    const real t23 = H[21] * d_f[5];
-    const real t24 = f[5] * d_H[21];
-    const real t25 = t23 + t24;
-    const real t26 = H[17] * d_f[4];
-    const real t27 = f[4] * d_H[17];
-    const real t28 = t26 + t27;
-    const real t29 = H[13] * d_f[3];
-    const real t30 = f[3] * d_H[13];
-    const real t31 = t29 + t30;
-    const real t32 = H[9] * d_f[2];
-    const real t33 = f[2] * d_H[9];
-    const real t34 = t32 + t33;
-    const real t35 = H[5] * d_f[1];
-    const real t36 = f[1] * d_H[5];
-    const real t37 = t35 + t36;
-    const real t38 = H[1] * d_f[0];
-    const real t39 = f[0] * d_H[1];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t31 + t42;
-    const real t44 = t28 + t43;
-    const real t45 = t25 + t44;
-    d_tau[1] = t45;
-    const real t46 = H[22] * d_f[5];
-    const real t47 = f[5] * d_H[22];
-    const real t48 = t46 + t47;
-    const real t49 = H[18] * d_f[4];
-    const real t50 = f[4] * d_H[18];
-    const real t51 = t49 + t50;
-    const real t52 = H[14] * d_f[3];
-    const real t53 = f[3] * d_H[14];
-    const real t54 = t52 + t53;
-    const real t55 = H[10] * d_f[2];
-    const real t56 = f[2] * d_H[10];
-    const real t57 = t55 + t56;
-    const real t58 = H[6] * d_f[1];
-    const real t59 = f[1] * d_H[6];
-    const real t60 = t58 + t59;
-    const real t61 = H[2] * d_f[0];
-    const real t62 = f[0] * d_H[2];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    const real t66 = t54 + t65;
-    const real t67 = t51 + t66;
-    const real t68 = t48 + t67;
-    d_tau[2] = t68;
-    const real t69 = H[23] * d_f[5];
-    const real t70 = f[5] * d_H[23];
-    const real t71 = t69 + t70;
-    const real t72 = H[19] * d_f[4];
-    const real t73 = f[4] * d_H[19];
-    const real t74 = t72 + t73;
-    const real t75 = H[15] * d_f[3];
-    const real t76 = f[3] * d_H[15];
-    const real t77 = t75 + t76;
-    const real t78 = H[11] * d_f[2];
-    const real t79 = f[2] * d_H[11];
-    const real t80 = t78 + t79;
-    const real t81 = H[7] * d_f[1];
-    const real t82 = f[1] * d_H[7];
-    const real t83 = t81 + t82;
-    const real t84 = H[3] * d_f[0];
-    const real t85 = f[0] * d_H[3];
-    const real t86 = t84 + t85;
-    const real t87 = t83 + t86;
-    const real t88 = t80 + t87;
-    const real t89 = t77 + t88;
-    const real t90 = t74 + t89;
-    const real t91 = t71 + t90;
-    d_tau[3] = t91;
-    return 0;
+  d_tau[0] = f[5] * d_H[20] + H[20] * d_f[5] + (f[4] * d_H[16] + H[16] * d_f[4] + (f[3] * d_H[12] +
+    H[12] * d_f[3] + (f[2] * d_H[8] + H[8] * d_f[2] + (f[1] * d_H[4] + H[4] * d_f[1] + (f[0] *
+    d_H[0] + H[0] * d_f[0])))));
+  d_tau[1] = H[21] * d_f[5] + f[5] * d_H[21] + (H[17] * d_f[4] + f[4] * d_H[17] + (H[13] * d_f[3] +
+    f[3] * d_H[13] + (H[9] * d_f[2] + f[2] * d_H[9] + (H[5] * d_f[1] + f[1] * d_H[5] + (H[1] *
+    d_f[0] + f[0] * d_H[1])))));
+  d_tau[2] = H[22] * d_f[5] + f[5] * d_H[22] + (H[18] * d_f[4] + f[4] * d_H[18] + (H[14] * d_f[3] +
+    f[3] * d_H[14] + (H[10] * d_f[2] + f[2] * d_H[10] + (H[6] * d_f[1] + f[1] * d_H[6] + (H[2] *
+    d_f[0] + f[0] * d_H[2])))));
+  d_tau[3] = H[23] * d_f[5] + f[5] * d_H[23] + (H[19] * d_f[4] + f[4] * d_H[19] + (H[15] * d_f[3] +
+    f[3] * d_H[15] + (H[11] * d_f[2] + f[2] * d_H[11] + (H[7] * d_f[1] + f[1] * d_H[7] + (H[3] *
+    d_f[0] + f[0] * d_H[3])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_effort_slope_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 24, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_effort_slope_outputs[] = {
-    {"d_tau", 4, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -10834,1762 +2974,456 @@ static const mstmm_port mstmm_sweep_generic4_effort_slope_outputs[] = {
  * in  d_H[6][4] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic4_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic4_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    const real t0 = H[20] * H[20];
-    const real t1 = H[16] * H[16];
-    const real t2 = H[12] * H[12];
-    const real t3 = H[8] * H[8];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[4] * H[4];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 1.0 / t10;
-    const real t12 = t11 * d_H[0];
-    const real t13 = H[4] * d_H[4];
-    const real t14 = t13 + t13;
-    const real t15 = H[0] * d_H[0];
-    const real t16 = t15 + t15;
-    const real t17 = t14 + t16;
-    const real t18 = H[8] * d_H[8];
-    const real t19 = t18 + t18;
-    const real t20 = t17 + t19;
-    const real t21 = H[12] * d_H[12];
-    const real t22 = t21 + t21;
-    const real t23 = t20 + t22;
-    const real t24 = H[16] * d_H[16];
-    const real t25 = t24 + t24;
-    const real t26 = t23 + t25;
-    const real t27 = H[20] * d_H[20];
-    const real t28 = t27 + t27;
-    const real t29 = t26 + t28;
-    const real t30 = t11 * t29;
-    const real t31 = t30 / t10;
-    const real t32 = H[0] * t31;
-    const real t33 = t12 - t32;
-    const real t34 = H[1] * H[1];
-    const real t35 = H[5] * H[5];
-    const real t36 = t34 + t35;
-    const real t37 = H[9] * H[9];
-    const real t38 = t36 + t37;
-    const real t39 = H[13] * H[13];
-    const real t40 = t38 + t39;
-    const real t41 = H[17] * H[17];
-    const real t42 = t40 + t41;
-    const real t43 = H[21] * H[21];
-    const real t44 = t42 + t43;
-    const real t45 = H[20] * H[21];
-    const real t46 = H[16] * H[17];
-    const real t47 = H[12] * H[13];
-    const real t48 = H[8] * H[9];
-    const real t49 = H[4] * H[5];
-    const real t50 = H[0] * H[1];
-    const real t51 = t49 + t50;
-    const real t52 = t48 + t51;
-    const real t53 = t47 + t52;
-    const real t54 = t46 + t53;
-    const real t55 = t45 + t54;
-    const real t56 = t55 * t11;
-    const real t57 = t55 * t56;
-    const real t58 = t44 - t57;
-    const real t59 = 1.0 / t58;
-    const real t60 = H[0] * t56;
-    const real t61 = H[1] - t60;
-    const real t62 = t59 * t61;
-    const real t63 = H[1] * H[2];
-    const real t64 = H[5] * H[6];
-    const real t65 = t63 + t64;
-    const real t66 = H[9] * H[10];
-    const real t67 = t65 + t66;
-    const real t68 = H[13] * H[14];
-    const real t69 = t67 + t68;
-    const real t70 = H[17] * H[18];
-    const real t71 = t69 + t70;
-    const real t72 = H[21] * H[22];
-    const real t73 = t71 + t72;
-    const real t74 = H[20] * H[22];
-    const real t75 = H[16] * H[18];
-    const real t76 = H[12] * H[14];
-    const real t77 = H[8] * H[10];
-    const real t78 = H[4] * H[6];
-    const real t79 = H[0] * H[2];
-    const real t80 = t78 + t79;
-    const real t81 = t77 + t80;
-    const real t82 = t76 + t81;
-    const real t83 = t75 + t82;
-    const real t84 = t74 + t83;
-    const real t85 = t56 * t84;
-    const real t86 = t73 - t85;
-    const real t87 = t86 * t59;
-    const real t88 = H[2] * H[2];
-    const real t89 = H[6] * H[6];
-    const real t90 = t88 + t89;
-    const real t91 = H[10] * H[10];
-    const real t92 = t90 + t91;
-    const real t93 = H[14] * H[14];
-    const real t94 = t92 + t93;
-    const real t95 = H[18] * H[18];
-    const real t96 = t94 + t95;
-    const real t97 = H[22] * H[22];
-    const real t98 = t96 + t97;
-    const real t99 = t11 * t84;
-    const real t100 = t84 * t99;
-    const real t101 = t98 - t100;
-    const real t102 = t86 * t87;
-    const real t103 = t101 - t102;
-    const real t104 = 1.0 / t103;
-    const real t105 = H[0] * t99;
-    const real t106 = H[2] - t105;
-    const real t107 = t87 * t61;
-    const real t108 = t106 - t107;
-    const real t109 = t104 * t108;
-    const real t110 = H[2] * H[3];
-    const real t111 = H[6] * H[7];
-    const real t112 = t110 + t111;
-    const real t113 = H[10] * H[11];
-    const real t114 = t112 + t113;
-    const real t115 = H[14] * H[15];
-    const real t116 = t114 + t115;
-    const real t117 = H[18] * H[19];
-    const real t118 = t116 + t117;
-    const real t119 = H[22] * H[23];
-    const real t120 = t118 + t119;
-    const real t121 = H[20] * H[23];
-    const real t122 = H[16] * H[19];
-    const real t123 = H[12] * H[15];
-    const real t124 = H[8] * H[11];
-    const real t125 = H[4] * H[7];
-    const real t126 = H[0] * H[3];
-    const real t127 = t125 + t126;
-    const real t128 = t124 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = t122 + t129;
-    const real t131 = t121 + t130;
-    const real t132 = t99 * t131;
-    const real t133 = t120 - t132;
-    const real t134 = H[1] * H[3];
-    const real t135 = H[5] * H[7];
-    const real t136 = t134 + t135;
-    const real t137 = H[9] * H[11];
-    const real t138 = t136 + t137;
-    const real t139 = H[13] * H[15];
-    const real t140 = t138 + t139;
-    const real t141 = H[17] * H[19];
-    const real t142 = t140 + t141;
-    const real t143 = H[21] * H[23];
-    const real t144 = t142 + t143;
-    const real t145 = t56 * t131;
-    const real t146 = t144 - t145;
-    const real t147 = t87 * t146;
-    const real t148 = t133 - t147;
-    const real t149 = t148 * t104;
-    const real t150 = H[3] * H[3];
-    const real t151 = H[7] * H[7];
-    const real t152 = t150 + t151;
-    const real t153 = H[11] * H[11];
-    const real t154 = t152 + t153;
-    const real t155 = H[15] * H[15];
-    const real t156 = t154 + t155;
-    const real t157 = H[19] * H[19];
-    const real t158 = t156 + t157;
-    const real t159 = H[23] * H[23];
-    const real t160 = t158 + t159;
-    const real t161 = t11 * t131;
-    const real t162 = t131 * t161;
-    const real t163 = t160 - t162;
-    const real t164 = t59 * t146;
-    const real t165 = t146 * t164;
-    const real t166 = t163 - t165;
-    const real t167 = t148 * t149;
-    const real t168 = t166 - t167;
-    const real t169 = 1.0 / t168;
-    const real t170 = H[0] * t161;
-    const real t171 = H[3] - t170;
-    const real t172 = t164 * t61;
-    const real t173 = t171 - t172;
-    const real t174 = t149 * t108;
-    const real t175 = t173 - t174;
-    const real t176 = t169 * t175;
-    const real t177 = t149 * t176;
-    const real t178 = t109 - t177;
-    const real t179 = t87 * t178;
-    const real t180 = t62 - t179;
-    const real t181 = t164 * t176;
-    const real t182 = t180 - t181;
-    const real t183 = H[1] * d_H[0];
-    const real t184 = H[0] * d_H[1];
-    const real t185 = t183 + t184;
-    const real t186 = H[5] * d_H[4];
-    const real t187 = H[4] * d_H[5];
-    const real t188 = t186 + t187;
-    const real t189 = t185 + t188;
-    const real t190 = H[9] * d_H[8];
-    const real t191 = H[8] * d_H[9];
-    const real t192 = t190 + t191;
-    const real t193 = t189 + t192;
-    const real t194 = H[13] * d_H[12];
-    const real t195 = H[12] * d_H[13];
-    const real t196 = t194 + t195;
-    const real t197 = t193 + t196;
-    const real t198 = H[17] * d_H[16];
-    const real t199 = H[16] * d_H[17];
-    const real t200 = t198 + t199;
-    const real t201 = t197 + t200;
-    const real t202 = H[21] * d_H[20];
-    const real t203 = H[20] * d_H[21];
-    const real t204 = t202 + t203;
-    const real t205 = t201 + t204;
-    const real t206 = t11 * t205;
-    const real t207 = t55 * t31;
-    const real t208 = t206 - t207;
-    const real t209 = t182 * t208;
-    const real t210 = t56 * d_H[0];
-    const real t211 = H[0] * t208;
-    const real t212 = t210 + t211;
-    const real t213 = d_H[1] - t212;
-    const real t214 = t59 * t213;
-    const real t215 = H[21] * d_H[21];
-    const real t216 = t215 + t215;
-    const real t217 = H[17] * d_H[17];
-    const real t218 = t217 + t217;
-    const real t219 = H[13] * d_H[13];
-    const real t220 = t219 + t219;
-    const real t221 = H[9] * d_H[9];
-    const real t222 = t221 + t221;
-    const real t223 = H[5] * d_H[5];
-    const real t224 = t223 + t223;
-    const real t225 = H[1] * d_H[1];
-    const real t226 = t225 + t225;
-    const real t227 = t224 + t226;
-    const real t228 = t222 + t227;
-    const real t229 = t220 + t228;
-    const real t230 = t218 + t229;
-    const real t231 = t216 + t230;
-    const real t232 = t56 * t205;
-    const real t233 = t55 * t208;
-    const real t234 = t232 + t233;
-    const real t235 = t231 - t234;
-    const real t236 = t59 * t235;
-    const real t237 = t236 / t58;
-    const real t238 = t61 * t237;
-    const real t239 = t214 - t238;
-    const real t240 = H[22] * d_H[21];
-    const real t241 = H[21] * d_H[22];
-    const real t242 = t240 + t241;
-    const real t243 = H[18] * d_H[17];
-    const real t244 = H[17] * d_H[18];
-    const real t245 = t243 + t244;
-    const real t246 = H[14] * d_H[13];
-    const real t247 = H[13] * d_H[14];
-    const real t248 = t246 + t247;
-    const real t249 = H[10] * d_H[9];
-    const real t250 = H[9] * d_H[10];
-    const real t251 = t249 + t250;
-    const real t252 = H[6] * d_H[5];
-    const real t253 = H[5] * d_H[6];
-    const real t254 = t252 + t253;
-    const real t255 = H[2] * d_H[1];
-    const real t256 = H[1] * d_H[2];
-    const real t257 = t255 + t256;
-    const real t258 = t254 + t257;
-    const real t259 = t251 + t258;
-    const real t260 = t248 + t259;
-    const real t261 = t245 + t260;
-    const real t262 = t242 + t261;
-    const real t263 = t84 * t208;
-    const real t264 = H[2] * d_H[0];
-    const real t265 = H[0] * d_H[2];
-    const real t266 = t264 + t265;
-    const real t267 = H[6] * d_H[4];
-    const real t268 = H[4] * d_H[6];
-    const real t269 = t267 + t268;
-    const real t270 = t266 + t269;
-    const real t271 = H[10] * d_H[8];
-    const real t272 = H[8] * d_H[10];
-    const real t273 = t271 + t272;
-    const real t274 = t270 + t273;
-    const real t275 = H[14] * d_H[12];
-    const real t276 = H[12] * d_H[14];
-    const real t277 = t275 + t276;
-    const real t278 = t274 + t277;
-    const real t279 = H[18] * d_H[16];
-    const real t280 = H[16] * d_H[18];
-    const real t281 = t279 + t280;
-    const real t282 = t278 + t281;
-    const real t283 = H[22] * d_H[20];
-    const real t284 = H[20] * d_H[22];
-    const real t285 = t283 + t284;
-    const real t286 = t282 + t285;
-    const real t287 = t56 * t286;
-    const real t288 = t263 + t287;
-    const real t289 = t262 - t288;
-    const real t290 = t59 * t289;
-    const real t291 = t86 * t237;
-    const real t292 = t290 - t291;
-    const real t293 = t178 * t292;
-    const real t294 = t99 * d_H[0];
-    const real t295 = t11 * t286;
-    const real t296 = t84 * t31;
-    const real t297 = t295 - t296;
-    const real t298 = H[0] * t297;
-    const real t299 = t294 + t298;
-    const real t300 = d_H[2] - t299;
-    const real t301 = t61 * t292;
-    const real t302 = t87 * t213;
-    const real t303 = t301 + t302;
-    const real t304 = t300 - t303;
-    const real t305 = t104 * t304;
-    const real t306 = H[22] * d_H[22];
-    const real t307 = t306 + t306;
-    const real t308 = H[18] * d_H[18];
-    const real t309 = t308 + t308;
-    const real t310 = H[14] * d_H[14];
-    const real t311 = t310 + t310;
-    const real t312 = H[10] * d_H[10];
-    const real t313 = t312 + t312;
-    const real t314 = H[6] * d_H[6];
-    const real t315 = t314 + t314;
-    const real t316 = H[2] * d_H[2];
-    const real t317 = t316 + t316;
-    const real t318 = t315 + t317;
-    const real t319 = t313 + t318;
-    const real t320 = t311 + t319;
-    const real t321 = t309 + t320;
-    const real t322 = t307 + t321;
-    const real t323 = t99 * t286;
-    const real t324 = t84 * t297;
-    const real t325 = t323 + t324;
-    const real t326 = t322 - t325;
-    const real t327 = t87 * t289;
-    const real t328 = t86 * t292;
-    const real t329 = t327 + t328;
-    const real t330 = t326 - t329;
-    const real t331 = t104 * t330;
-    const real t332 = t331 / t103;
-    const real t333 = t108 * t332;
-    const real t334 = t305 - t333;
-    const real t335 = H[23] * d_H[22];
-    const real t336 = H[22] * d_H[23];
-    const real t337 = t335 + t336;
-    const real t338 = H[19] * d_H[18];
-    const real t339 = H[18] * d_H[19];
-    const real t340 = t338 + t339;
-    const real t341 = H[15] * d_H[14];
-    const real t342 = H[14] * d_H[15];
-    const real t343 = t341 + t342;
-    const real t344 = H[11] * d_H[10];
-    const real t345 = H[10] * d_H[11];
-    const real t346 = t344 + t345;
-    const real t347 = H[7] * d_H[6];
-    const real t348 = H[6] * d_H[7];
-    const real t349 = t347 + t348;
-    const real t350 = H[3] * d_H[2];
-    const real t351 = H[2] * d_H[3];
-    const real t352 = t350 + t351;
-    const real t353 = t349 + t352;
-    const real t354 = t346 + t353;
-    const real t355 = t343 + t354;
-    const real t356 = t340 + t355;
-    const real t357 = t337 + t356;
-    const real t358 = t131 * t297;
-    const real t359 = H[3] * d_H[0];
-    const real t360 = H[0] * d_H[3];
-    const real t361 = t359 + t360;
-    const real t362 = H[7] * d_H[4];
-    const real t363 = H[4] * d_H[7];
-    const real t364 = t362 + t363;
-    const real t365 = t361 + t364;
-    const real t366 = H[11] * d_H[8];
-    const real t367 = H[8] * d_H[11];
-    const real t368 = t366 + t367;
-    const real t369 = t365 + t368;
-    const real t370 = H[15] * d_H[12];
-    const real t371 = H[12] * d_H[15];
-    const real t372 = t370 + t371;
-    const real t373 = t369 + t372;
-    const real t374 = H[19] * d_H[16];
-    const real t375 = H[16] * d_H[19];
-    const real t376 = t374 + t375;
-    const real t377 = t373 + t376;
-    const real t378 = H[23] * d_H[20];
-    const real t379 = H[20] * d_H[23];
-    const real t380 = t378 + t379;
-    const real t381 = t377 + t380;
-    const real t382 = t99 * t381;
-    const real t383 = t358 + t382;
-    const real t384 = t357 - t383;
-    const real t385 = t146 * t292;
-    const real t386 = H[23] * d_H[21];
-    const real t387 = H[21] * d_H[23];
-    const real t388 = t386 + t387;
-    const real t389 = H[19] * d_H[17];
-    const real t390 = H[17] * d_H[19];
-    const real t391 = t389 + t390;
-    const real t392 = H[15] * d_H[13];
-    const real t393 = H[13] * d_H[15];
-    const real t394 = t392 + t393;
-    const real t395 = H[11] * d_H[9];
-    const real t396 = H[9] * d_H[11];
-    const real t397 = t395 + t396;
-    const real t398 = H[7] * d_H[5];
-    const real t399 = H[5] * d_H[7];
-    const real t400 = t398 + t399;
-    const real t401 = H[3] * d_H[1];
-    const real t402 = H[1] * d_H[3];
-    const real t403 = t401 + t402;
-    const real t404 = t400 + t403;
-    const real t405 = t397 + t404;
-    const real t406 = t394 + t405;
-    const real t407 = t391 + t406;
-    const real t408 = t388 + t407;
-    const real t409 = t131 * t208;
-    const real t410 = t56 * t381;
-    const real t411 = t409 + t410;
-    const real t412 = t408 - t411;
-    const real t413 = t87 * t412;
-    const real t414 = t385 + t413;
-    const real t415 = t384 - t414;
-    const real t416 = t104 * t415;
-    const real t417 = t148 * t332;
-    const real t418 = t416 - t417;
-    const real t419 = t176 * t418;
-    const real t420 = t161 * d_H[0];
-    const real t421 = t11 * t381;
-    const real t422 = t131 * t31;
-    const real t423 = t421 - t422;
-    const real t424 = H[0] * t423;
-    const real t425 = t420 + t424;
-    const real t426 = d_H[3] - t425;
-    const real t427 = t59 * t412;
-    const real t428 = t146 * t237;
-    const real t429 = t427 - t428;
-    const real t430 = t61 * t429;
-    const real t431 = t164 * t213;
-    const real t432 = t430 + t431;
-    const real t433 = t426 - t432;
-    const real t434 = t108 * t418;
-    const real t435 = t149 * t304;
-    const real t436 = t434 + t435;
-    const real t437 = t433 - t436;
-    const real t438 = t169 * t437;
-    const real t439 = H[23] * d_H[23];
-    const real t440 = t439 + t439;
-    const real t441 = H[19] * d_H[19];
-    const real t442 = t441 + t441;
-    const real t443 = H[15] * d_H[15];
-    const real t444 = t443 + t443;
-    const real t445 = H[11] * d_H[11];
-    const real t446 = t445 + t445;
-    const real t447 = H[7] * d_H[7];
-    const real t448 = t447 + t447;
-    const real t449 = H[3] * d_H[3];
-    const real t450 = t449 + t449;
-    const real t451 = t448 + t450;
-    const real t452 = t446 + t451;
-    const real t453 = t444 + t452;
-    const real t454 = t442 + t453;
-    const real t455 = t440 + t454;
-    const real t456 = t161 * t381;
-    const real t457 = t131 * t423;
-    const real t458 = t456 + t457;
-    const real t459 = t455 - t458;
-    const real t460 = t164 * t412;
-    const real t461 = t146 * t429;
-    const real t462 = t460 + t461;
-    const real t463 = t459 - t462;
-    const real t464 = t149 * t415;
-    const real t465 = t148 * t418;
-    const real t466 = t464 + t465;
-    const real t467 = t463 - t466;
-    const real t468 = t169 * t467;
-    const real t469 = t468 / t168;
-    const real t470 = t175 * t469;
-    const real t471 = t438 - t470;
-    const real t472 = t149 * t471;
-    const real t473 = t419 + t472;
-    const real t474 = t334 - t473;
-    const real t475 = t87 * t474;
-    const real t476 = t293 + t475;
-    const real t477 = t239 - t476;
-    const real t478 = t176 * t429;
-    const real t479 = t164 * t471;
-    const real t480 = t478 + t479;
-    const real t481 = t477 - t480;
-    const real t482 = t56 * t481;
-    const real t483 = t209 + t482;
-    const real t484 = t33 - t483;
-    const real t485 = t178 * t297;
-    const real t486 = t99 * t474;
-    const real t487 = t485 + t486;
-    const real t488 = t484 - t487;
-    const real t489 = t176 * t423;
-    const real t490 = t161 * t471;
-    const real t491 = t489 + t490;
-    const real t492 = t488 - t491;
-    d_W[0] = t492;
-    const real t493 = t11 * d_H[4];
-    const real t494 = H[4] * t31;
-    const real t495 = t493 - t494;
-    const real t496 = H[4] * t56;
-    const real t497 = H[5] - t496;
-    const real t498 = t59 * t497;
-    const real t499 = H[4] * t99;
-    const real t500 = H[6] - t499;
-    const real t501 = t87 * t497;
-    const real t502 = t500 - t501;
-    const real t503 = t104 * t502;
-    const real t504 = H[4] * t161;
-    const real t505 = H[7] - t504;
-    const real t506 = t164 * t497;
-    const real t507 = t505 - t506;
-    const real t508 = t149 * t502;
-    const real t509 = t507 - t508;
-    const real t510 = t169 * t509;
-    const real t511 = t149 * t510;
-    const real t512 = t503 - t511;
-    const real t513 = t87 * t512;
-    const real t514 = t498 - t513;
-    const real t515 = t164 * t510;
-    const real t516 = t514 - t515;
-    const real t517 = t516 * t208;
-    const real t518 = t56 * d_H[4];
-    const real t519 = H[4] * t208;
-    const real t520 = t518 + t519;
-    const real t521 = d_H[5] - t520;
-    const real t522 = t59 * t521;
-    const real t523 = t497 * t237;
-    const real t524 = t522 - t523;
-    const real t525 = t512 * t292;
-    const real t526 = t99 * d_H[4];
-    const real t527 = H[4] * t297;
-    const real t528 = t526 + t527;
-    const real t529 = d_H[6] - t528;
-    const real t530 = t497 * t292;
-    const real t531 = t87 * t521;
-    const real t532 = t530 + t531;
-    const real t533 = t529 - t532;
-    const real t534 = t104 * t533;
-    const real t535 = t502 * t332;
-    const real t536 = t534 - t535;
-    const real t537 = t510 * t418;
-    const real t538 = t161 * d_H[4];
-    const real t539 = H[4] * t423;
-    const real t540 = t538 + t539;
-    const real t541 = d_H[7] - t540;
-    const real t542 = t497 * t429;
-    const real t543 = t164 * t521;
-    const real t544 = t542 + t543;
-    const real t545 = t541 - t544;
-    const real t546 = t502 * t418;
-    const real t547 = t149 * t533;
-    const real t548 = t546 + t547;
-    const real t549 = t545 - t548;
-    const real t550 = t169 * t549;
-    const real t551 = t509 * t469;
-    const real t552 = t550 - t551;
-    const real t553 = t149 * t552;
-    const real t554 = t537 + t553;
-    const real t555 = t536 - t554;
-    const real t556 = t87 * t555;
-    const real t557 = t525 + t556;
-    const real t558 = t524 - t557;
-    const real t559 = t510 * t429;
-    const real t560 = t164 * t552;
-    const real t561 = t559 + t560;
-    const real t562 = t558 - t561;
-    const real t563 = t56 * t562;
-    const real t564 = t517 + t563;
-    const real t565 = t495 - t564;
-    const real t566 = t512 * t297;
-    const real t567 = t99 * t555;
-    const real t568 = t566 + t567;
-    const real t569 = t565 - t568;
-    const real t570 = t510 * t423;
-    const real t571 = t161 * t552;
-    const real t572 = t570 + t571;
-    const real t573 = t569 - t572;
-    d_W[1] = t573;
-    const real t574 = t11 * d_H[8];
-    const real t575 = H[8] * t31;
-    const real t576 = t574 - t575;
-    const real t577 = H[8] * t56;
-    const real t578 = H[9] - t577;
-    const real t579 = t59 * t578;
-    const real t580 = H[8] * t99;
-    const real t581 = H[10] - t580;
-    const real t582 = t87 * t578;
-    const real t583 = t581 - t582;
-    const real t584 = t104 * t583;
-    const real t585 = H[8] * t161;
-    const real t586 = H[11] - t585;
-    const real t587 = t164 * t578;
-    const real t588 = t586 - t587;
-    const real t589 = t149 * t583;
-    const real t590 = t588 - t589;
-    const real t591 = t169 * t590;
-    const real t592 = t149 * t591;
-    const real t593 = t584 - t592;
-    const real t594 = t87 * t593;
-    const real t595 = t579 - t594;
-    const real t596 = t164 * t591;
-    const real t597 = t595 - t596;
-    const real t598 = t597 * t208;
-    const real t599 = t56 * d_H[8];
-    const real t600 = H[8] * t208;
-    const real t601 = t599 + t600;
-    const real t602 = d_H[9] - t601;
-    const real t603 = t59 * t602;
-    const real t604 = t578 * t237;
-    const real t605 = t603 - t604;
-    const real t606 = t593 * t292;
-    const real t607 = t99 * d_H[8];
-    const real t608 = H[8] * t297;
-    const real t609 = t607 + t608;
-    const real t610 = d_H[10] - t609;
-    const real t611 = t578 * t292;
-    const real t612 = t87 * t602;
-    const real t613 = t611 + t612;
-    const real t614 = t610 - t613;
-    const real t615 = t104 * t614;
-    const real t616 = t583 * t332;
-    const real t617 = t615 - t616;
-    const real t618 = t591 * t418;
-    const real t619 = t161 * d_H[8];
-    const real t620 = H[8] * t423;
-    const real t621 = t619 + t620;
-    const real t622 = d_H[11] - t621;
-    const real t623 = t578 * t429;
-    const real t624 = t164 * t602;
-    const real t625 = t623 + t624;
-    const real t626 = t622 - t625;
-    const real t627 = t583 * t418;
-    const real t628 = t149 * t614;
-    const real t629 = t627 + t628;
-    const real t630 = t626 - t629;
-    const real t631 = t169 * t630;
-    const real t632 = t590 * t469;
-    const real t633 = t631 - t632;
-    const real t634 = t149 * t633;
-    const real t635 = t618 + t634;
-    const real t636 = t617 - t635;
-    const real t637 = t87 * t636;
-    const real t638 = t606 + t637;
-    const real t639 = t605 - t638;
-    const real t640 = t591 * t429;
-    const real t641 = t164 * t633;
-    const real t642 = t640 + t641;
-    const real t643 = t639 - t642;
-    const real t644 = t56 * t643;
-    const real t645 = t598 + t644;
-    const real t646 = t576 - t645;
-    const real t647 = t593 * t297;
-    const real t648 = t99 * t636;
-    const real t649 = t647 + t648;
-    const real t650 = t646 - t649;
-    const real t651 = t591 * t423;
-    const real t652 = t161 * t633;
-    const real t653 = t651 + t652;
-    const real t654 = t650 - t653;
-    d_W[2] = t654;
-    const real t655 = t11 * d_H[12];
-    const real t656 = H[12] * t31;
-    const real t657 = t655 - t656;
-    const real t658 = H[12] * t56;
-    const real t659 = H[13] - t658;
-    const real t660 = t59 * t659;
-    const real t661 = H[12] * t99;
-    const real t662 = H[14] - t661;
-    const real t663 = t87 * t659;
-    const real t664 = t662 - t663;
-    const real t665 = t104 * t664;
-    const real t666 = H[12] * t161;
-    const real t667 = H[15] - t666;
-    const real t668 = t164 * t659;
-    const real t669 = t667 - t668;
-    const real t670 = t149 * t664;
-    const real t671 = t669 - t670;
-    const real t672 = t169 * t671;
-    const real t673 = t149 * t672;
-    const real t674 = t665 - t673;
-    const real t675 = t87 * t674;
-    const real t676 = t660 - t675;
-    const real t677 = t164 * t672;
-    const real t678 = t676 - t677;
-    const real t679 = t678 * t208;
-    const real t680 = t56 * d_H[12];
-    const real t681 = H[12] * t208;
-    const real t682 = t680 + t681;
-    const real t683 = d_H[13] - t682;
-    const real t684 = t59 * t683;
-    const real t685 = t659 * t237;
-    const real t686 = t684 - t685;
-    const real t687 = t674 * t292;
-    const real t688 = t99 * d_H[12];
-    const real t689 = H[12] * t297;
-    const real t690 = t688 + t689;
-    const real t691 = d_H[14] - t690;
-    const real t692 = t659 * t292;
-    const real t693 = t87 * t683;
-    const real t694 = t692 + t693;
-    const real t695 = t691 - t694;
-    const real t696 = t104 * t695;
-    const real t697 = t664 * t332;
-    const real t698 = t696 - t697;
-    const real t699 = t672 * t418;
-    const real t700 = t161 * d_H[12];
-    const real t701 = H[12] * t423;
-    const real t702 = t700 + t701;
-    const real t703 = d_H[15] - t702;
-    const real t704 = t659 * t429;
-    const real t705 = t164 * t683;
-    const real t706 = t704 + t705;
-    const real t707 = t703 - t706;
-    const real t708 = t664 * t418;
-    const real t709 = t149 * t695;
-    const real t710 = t708 + t709;
-    const real t711 = t707 - t710;
-    const real t712 = t169 * t711;
-    const real t713 = t671 * t469;
-    const real t714 = t712 - t713;
-    const real t715 = t149 * t714;
-    const real t716 = t699 + t715;
-    const real t717 = t698 - t716;
-    const real t718 = t87 * t717;
-    const real t719 = t687 + t718;
-    const real t720 = t686 - t719;
-    const real t721 = t672 * t429;
-    const real t722 = t164 * t714;
-    const real t723 = t721 + t722;
-    const real t724 = t720 - t723;
-    const real t725 = t56 * t724;
-    const real t726 = t679 + t725;
-    const real t727 = t657 - t726;
-    const real t728 = t674 * t297;
-    const real t729 = t99 * t717;
-    const real t730 = t728 + t729;
-    const real t731 = t727 - t730;
-    const real t732 = t672 * t423;
-    const real t733 = t161 * t714;
-    const real t734 = t732 + t733;
-    const real t735 = t731 - t734;
-    d_W[3] = t735;
-    const real t736 = t11 * d_H[16];
-    const real t737 = H[16] * t31;
-    const real t738 = t736 - t737;
-    const real t739 = H[16] * t56;
-    const real t740 = H[17] - t739;
-    const real t741 = t59 * t740;
-    const real t742 = H[16] * t99;
-    const real t743 = H[18] - t742;
-    const real t744 = t87 * t740;
-    const real t745 = t743 - t744;
-    const real t746 = t104 * t745;
-    const real t747 = H[16] * t161;
-    const real t748 = H[19] - t747;
-    const real t749 = t164 * t740;
-    const real t750 = t748 - t749;
-    const real t751 = t149 * t745;
-    const real t752 = t750 - t751;
-    const real t753 = t169 * t752;
-    const real t754 = t149 * t753;
-    const real t755 = t746 - t754;
-    const real t756 = t87 * t755;
-    const real t757 = t741 - t756;
-    const real t758 = t164 * t753;
-    const real t759 = t757 - t758;
-    const real t760 = t759 * t208;
-    const real t761 = t56 * d_H[16];
-    const real t762 = H[16] * t208;
-    const real t763 = t761 + t762;
-    const real t764 = d_H[17] - t763;
-    const real t765 = t59 * t764;
-    const real t766 = t740 * t237;
-    const real t767 = t765 - t766;
-    const real t768 = t755 * t292;
-    const real t769 = t99 * d_H[16];
-    const real t770 = H[16] * t297;
-    const real t771 = t769 + t770;
-    const real t772 = d_H[18] - t771;
-    const real t773 = t740 * t292;
-    const real t774 = t87 * t764;
-    const real t775 = t773 + t774;
-    const real t776 = t772 - t775;
-    const real t777 = t104 * t776;
-    const real t778 = t745 * t332;
-    const real t779 = t777 - t778;
-    const real t780 = t753 * t418;
-    const real t781 = t161 * d_H[16];
-    const real t782 = H[16] * t423;
-    const real t783 = t781 + t782;
-    const real t784 = d_H[19] - t783;
-    const real t785 = t740 * t429;
-    const real t786 = t164 * t764;
-    const real t787 = t785 + t786;
-    const real t788 = t784 - t787;
-    const real t789 = t745 * t418;
-    const real t790 = t149 * t776;
-    const real t791 = t789 + t790;
-    const real t792 = t788 - t791;
-    const real t793 = t169 * t792;
-    const real t794 = t752 * t469;
-    const real t795 = t793 - t794;
-    const real t796 = t149 * t795;
-    const real t797 = t780 + t796;
-    const real t798 = t779 - t797;
-    const real t799 = t87 * t798;
-    const real t800 = t768 + t799;
-    const real t801 = t767 - t800;
-    const real t802 = t753 * t429;
-    const real t803 = t164 * t795;
-    const real t804 = t802 + t803;
-    const real t805 = t801 - t804;
-    const real t806 = t56 * t805;
-    const real t807 = t760 + t806;
-    const real t808 = t738 - t807;
-    const real t809 = t755 * t297;
-    const real t810 = t99 * t798;
-    const real t811 = t809 + t810;
-    const real t812 = t808 - t811;
-    const real t813 = t753 * t423;
-    const real t814 = t161 * t795;
-    const real t815 = t813 + t814;
-    const real t816 = t812 - t815;
-    d_W[4] = t816;
-    const real t817 = t11 * d_H[20];
-    const real t818 = H[20] * t31;
-    const real t819 = t817 - t818;
-    const real t820 = H[20] * t56;
-    const real t821 = H[21] - t820;
-    const real t822 = t59 * t821;
-    const real t823 = H[20] * t99;
-    const real t824 = H[22] - t823;
-    const real t825 = t87 * t821;
-    const real t826 = t824 - t825;
-    const real t827 = t104 * t826;
-    const real t828 = H[20] * t161;
-    const real t829 = H[23] - t828;
-    const real t830 = t164 * t821;
-    const real t831 = t829 - t830;
-    const real t832 = t149 * t826;
-    const real t833 = t831 - t832;
-    const real t834 = t169 * t833;
-    const real t835 = t149 * t834;
-    const real t836 = t827 - t835;
-    const real t837 = t87 * t836;
-    const real t838 = t822 - t837;
-    const real t839 = t164 * t834;
-    const real t840 = t838 - t839;
-    const real t841 = t840 * t208;
-    const real t842 = t56 * d_H[20];
-    const real t843 = H[20] * t208;
-    const real t844 = t842 + t843;
-    const real t845 = d_H[21] - t844;
-    const real t846 = t59 * t845;
-    const real t847 = t821 * t237;
-    const real t848 = t846 - t847;
-    const real t849 = t836 * t292;
-    const real t850 = t99 * d_H[20];
-    const real t851 = H[20] * t297;
-    const real t852 = t850 + t851;
-    const real t853 = d_H[22] - t852;
-    const real t854 = t821 * t292;
-    const real t855 = t87 * t845;
-    const real t856 = t854 + t855;
-    const real t857 = t853 - t856;
-    const real t858 = t104 * t857;
-    const real t859 = t826 * t332;
-    const real t860 = t858 - t859;
-    const real t861 = t834 * t418;
-    const real t862 = t161 * d_H[20];
-    const real t863 = H[20] * t423;
-    const real t864 = t862 + t863;
-    const real t865 = d_H[23] - t864;
-    const real t866 = t821 * t429;
-    const real t867 = t164 * t845;
-    const real t868 = t866 + t867;
-    const real t869 = t865 - t868;
-    const real t870 = t826 * t418;
-    const real t871 = t149 * t857;
-    const real t872 = t870 + t871;
-    const real t873 = t869 - t872;
-    const real t874 = t169 * t873;
-    const real t875 = t833 * t469;
-    const real t876 = t874 - t875;
-    const real t877 = t149 * t876;
-    const real t878 = t861 + t877;
-    const real t879 = t860 - t878;
-    const real t880 = t87 * t879;
-    const real t881 = t849 + t880;
-    const real t882 = t848 - t881;
-    const real t883 = t834 * t429;
-    const real t884 = t164 * t876;
-    const real t885 = t883 + t884;
-    const real t886 = t882 - t885;
-    const real t887 = t56 * t886;
-    const real t888 = t841 + t887;
-    const real t889 = t819 - t888;
-    const real t890 = t836 * t297;
-    const real t891 = t99 * t879;
-    const real t892 = t890 + t891;
-    const real t893 = t889 - t892;
-    const real t894 = t834 * t423;
-    const real t895 = t161 * t876;
-    const real t896 = t894 + t895;
-    const real t897 = t893 - t896;
-    d_W[5] = t897;
-    d_W[6] = t481;
-    d_W[7] = t562;
-    d_W[8] = t643;
-    d_W[9] = t724;
-    d_W[10] = t805;
-    d_W[11] = t886;
-    d_W[12] = t474;
-    d_W[13] = t555;
-    d_W[14] = t636;
-    d_W[15] = t717;
-    d_W[16] = t798;
-    d_W[17] = t879;
-    d_W[18] = t471;
-    d_W[19] = t552;
-    d_W[20] = t633;
-    d_W[21] = t714;
-    d_W[22] = t795;
-    d_W[23] = t876;
-    const real t898 = sqrt(t10);
-    const real t899 = fabs(H[0]);
-    const real t900 = t898 + t899;
-    const real t901 = t898 * t900;
-    const real t902 = 0.0 < t901;
-    const real t903 = 1.0 / t901;
-    const real t904 = t902 != 0 ? t903 : 0.0;
-    const real t905 = H[0] < 0.0;
-    const real t906 = -t898;
-    const real t907 = t905 != 0 ? t906 : t898;
-    const real t908 = H[0] + t907;
-    const real t909 = H[3] * t908;
-    const real t910 = t125 + t909;
-    const real t911 = t124 + t910;
-    const real t912 = t123 + t911;
-    const real t913 = t122 + t912;
-    const real t914 = t121 + t913;
-    const real t915 = t904 * t914;
-    const real t916 = H[16] * t915;
-    const real t917 = H[19] - t916;
-    const real t918 = H[1] * t908;
-    const real t919 = t49 + t918;
-    const real t920 = t48 + t919;
-    const real t921 = t47 + t920;
-    const real t922 = t46 + t921;
-    const real t923 = t45 + t922;
-    const real t924 = t904 * t923;
-    const real t925 = H[16] * t924;
-    const real t926 = H[17] - t925;
-    const real t927 = H[20] * t924;
-    const real t928 = H[21] - t927;
-    const real t929 = t928 * t928;
-    const real t930 = t926 * t926;
-    const real t931 = H[12] * t924;
-    const real t932 = H[13] - t931;
-    const real t933 = t932 * t932;
-    const real t934 = H[4] * t924;
-    const real t935 = H[5] - t934;
-    const real t936 = t935 * t935;
-    const real t937 = H[8] * t924;
-    const real t938 = H[9] - t937;
-    const real t939 = t938 * t938;
-    const real t940 = t936 + t939;
-    const real t941 = t933 + t940;
-    const real t942 = t930 + t941;
-    const real t943 = t929 + t942;
-    const real t944 = sqrt(t943);
-    const real t945 = fabs(t935);
-    const real t946 = t944 + t945;
-    const real t947 = t944 * t946;
-    const real t948 = 0.0 < t947;
-    const real t949 = 1.0 / t947;
-    const real t950 = t948 != 0 ? t949 : 0.0;
-    const real t951 = H[20] * t915;
-    const real t952 = H[23] - t951;
-    const real t953 = t928 * t952;
-    const real t954 = t917 * t926;
-    const real t955 = H[12] * t915;
-    const real t956 = H[15] - t955;
-    const real t957 = t932 * t956;
-    const real t958 = H[4] * t915;
-    const real t959 = H[7] - t958;
-    const real t960 = t935 < 0.0;
-    const real t961 = -t944;
-    const real t962 = t960 != 0 ? t961 : t944;
-    const real t963 = t935 + t962;
-    const real t964 = t959 * t963;
-    const real t965 = H[8] * t915;
-    const real t966 = H[11] - t965;
-    const real t967 = t938 * t966;
-    const real t968 = t964 + t967;
-    const real t969 = t957 + t968;
-    const real t970 = t954 + t969;
-    const real t971 = t953 + t970;
-    const real t972 = t950 * t971;
-    const real t973 = t926 * t972;
-    const real t974 = t917 - t973;
-    const real t975 = H[2] * t908;
-    const real t976 = t78 + t975;
-    const real t977 = t77 + t976;
-    const real t978 = t76 + t977;
-    const real t979 = t75 + t978;
-    const real t980 = t74 + t979;
-    const real t981 = t904 * t980;
-    const real t982 = H[16] * t981;
-    const real t983 = H[18] - t982;
-    const real t984 = H[20] * t981;
-    const real t985 = H[22] - t984;
-    const real t986 = t928 * t985;
-    const real t987 = t926 * t983;
-    const real t988 = H[12] * t981;
-    const real t989 = H[14] - t988;
-    const real t990 = t932 * t989;
-    const real t991 = H[4] * t981;
-    const real t992 = H[6] - t991;
-    const real t993 = t963 * t992;
-    const real t994 = H[8] * t981;
-    const real t995 = H[10] - t994;
-    const real t996 = t938 * t995;
-    const real t997 = t993 + t996;
-    const real t998 = t990 + t997;
-    const real t999 = t987 + t998;
-    const real t1000 = t986 + t999;
-    const real t1001 = t950 * t1000;
-    const real t1002 = t926 * t1001;
-    const real t1003 = t983 - t1002;
-    const real t1004 = t928 * t1001;
-    const real t1005 = t985 - t1004;
-    const real t1006 = t1005 * t1005;
-    const real t1007 = t1003 * t1003;
-    const real t1008 = t938 * t1001;
-    const real t1009 = t995 - t1008;
-    const real t1010 = t1009 * t1009;
-    const real t1011 = t932 * t1001;
-    const real t1012 = t989 - t1011;
-    const real t1013 = t1012 * t1012;
-    const real t1014 = t1010 + t1013;
-    const real t1015 = t1007 + t1014;
-    const real t1016 = t1006 + t1015;
-    const real t1017 = sqrt(t1016);
-    const real t1018 = fabs(t1009);
-    const real t1019 = t1017 + t1018;
-    const real t1020 = t1017 * t1019;
-    const real t1021 = 0.0 < t1020;
-    const real t1022 = 1.0 / t1020;
-    const real t1023 = t1021 != 0 ? t1022 : 0.0;
-    const real t1024 = t928 * t972;
-    const real t1025 = t952 - t1024;
-    const real t1026 = t1005 * t1025;
-    const real t1027 = t974 * t1003;
-    const real t1028 = t938 * t972;
-    const real t1029 = t966 - t1028;
-    const real t1030 = t1009 < 0.0;
-    const real t1031 = -t1017;
-    const real t1032 = t1030 != 0 ? t1031 : t1017;
-    const real t1033 = t1009 + t1032;
-    const real t1034 = t1029 * t1033;
-    const real t1035 = t932 * t972;
-    const real t1036 = t956 - t1035;
-    const real t1037 = t1012 * t1036;
-    const real t1038 = t1034 + t1037;
-    const real t1039 = t1027 + t1038;
-    const real t1040 = t1026 + t1039;
-    const real t1041 = t1023 * t1040;
-    const real t1042 = t1003 * t1041;
-    const real t1043 = t974 - t1042;
-    const real t1044 = t1043 * t1043;
-    const real t1045 = t1005 * t1041;
-    const real t1046 = t1025 - t1045;
-    const real t1047 = t1046 * t1046;
-    const real t1048 = t1012 * t1041;
-    const real t1049 = t1036 - t1048;
-    const real t1050 = t1049 * t1049;
-    const real t1051 = t1044 + t1050;
-    const real t1052 = t1047 + t1051;
-    const real t1053 = sqrt(t1052);
-    const real t1054 = fabs(t1049);
-    const real t1055 = t1053 + t1054;
-    const real t1056 = t1053 * t1055;
-    const real t1057 = 0.0 < t1056;
-    const real t1058 = 1.0 / t1056;
-    const real t1059 = t1057 != 0 ? t1058 : 0.0;
-    const real t1060 = t1044 * t1059;
-    const real t1061 = 1.0 - t1060;
-    const real t1062 = t1003 * t1061;
-    const real t1063 = t1049 < 0.0;
-    const real t1064 = -t1053;
-    const real t1065 = t1063 != 0 ? t1064 : t1053;
-    const real t1066 = t1049 + t1065;
-    const real t1067 = t1059 * t1066;
-    const real t1068 = t1043 * t1067;
-    const real t1069 = t1012 * t1068;
-    const real t1070 = t1062 - t1069;
-    const real t1071 = t1043 * t1059;
-    const real t1072 = t1046 * t1071;
-    const real t1073 = t1005 * t1072;
-    const real t1074 = t1070 - t1073;
-    const real t1075 = t1023 * t1074;
-    const real t1076 = t1003 * t1075;
-    const real t1077 = t1061 - t1076;
-    const real t1078 = t926 * t1077;
-    const real t1079 = t1033 * t1075;
-    const real t1080 = t938 * t1079;
-    const real t1081 = t1012 * t1075;
-    const real t1082 = t1068 + t1081;
-    const real t1083 = t932 * t1082;
-    const real t1084 = t1080 + t1083;
-    const real t1085 = t1078 - t1084;
-    const real t1086 = t1005 * t1075;
-    const real t1087 = t1072 + t1086;
-    const real t1088 = t928 * t1087;
-    const real t1089 = t1085 - t1088;
-    const real t1090 = t950 * t1089;
-    const real t1091 = t926 * t1090;
-    const real t1092 = t1077 - t1091;
-    const real t1093 = H[16] * t1092;
-    const real t1094 = t932 * t1090;
-    const real t1095 = t1082 + t1094;
-    const real t1096 = H[12] * t1095;
-    const real t1097 = t963 * t1090;
-    const real t1098 = H[4] * t1097;
-    const real t1099 = t938 * t1090;
-    const real t1100 = t1079 + t1099;
-    const real t1101 = H[8] * t1100;
-    const real t1102 = t1098 + t1101;
-    const real t1103 = t1096 + t1102;
-    const real t1104 = t1093 - t1103;
-    const real t1105 = t928 * t1090;
-    const real t1106 = t1087 + t1105;
-    const real t1107 = H[20] * t1106;
-    const real t1108 = t1104 - t1107;
-    const real t1109 = t904 * t1108;
-    const real t1110 = t898 * 2.0;
-    const real t1111 = t29 / t1110;
-    const real t1112 = -t1111;
-    const real t1113 = t905 != 0 ? t1112 : t1111;
-    const real t1114 = d_H[0] + t1113;
-    const real t1115 = t1109 * t1114;
-    const real t1116 = t900 * t1111;
-    const real t1117 = H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0]);
-    const real t1118 = d_H[0] * t1117;
-    const real t1119 = t1111 + t1118;
-    const real t1120 = t898 * t1119;
-    const real t1121 = t1116 + t1120;
-    const real t1122 = t903 * t1121;
-    const real t1123 = t1122 / t901;
-    const real t1124 = -t1123;
-    const real t1125 = t902 != 0 ? t1124 : 0.0;
-    const real t1126 = t1108 * t1125;
-    const real t1127 = t1092 * d_H[16];
-    const real t1128 = t915 * d_H[16];
-    const real t1129 = t914 * t1125;
-    const real t1130 = t908 * d_H[3];
-    const real t1131 = H[3] * t1114;
-    const real t1132 = t1130 + t1131;
-    const real t1133 = t364 + t1132;
-    const real t1134 = t368 + t1133;
-    const real t1135 = t372 + t1134;
-    const real t1136 = t376 + t1135;
-    const real t1137 = t380 + t1136;
-    const real t1138 = t904 * t1137;
-    const real t1139 = t1129 + t1138;
-    const real t1140 = H[16] * t1139;
-    const real t1141 = t1128 + t1140;
-    const real t1142 = d_H[19] - t1141;
-    const real t1143 = t924 * d_H[16];
-    const real t1144 = t923 * t1125;
-    const real t1145 = t908 * d_H[1];
-    const real t1146 = H[1] * t1114;
-    const real t1147 = t1145 + t1146;
-    const real t1148 = t188 + t1147;
-    const real t1149 = t192 + t1148;
-    const real t1150 = t196 + t1149;
-    const real t1151 = t200 + t1150;
-    const real t1152 = t204 + t1151;
-    const real t1153 = t904 * t1152;
-    const real t1154 = t1144 + t1153;
-    const real t1155 = H[16] * t1154;
-    const real t1156 = t1143 + t1155;
-    const real t1157 = d_H[17] - t1156;
-    const real t1158 = t972 * t1157;
-    const real t1159 = t924 * d_H[8];
-    const real t1160 = H[8] * t1154;
-    const real t1161 = t1159 + t1160;
-    const real t1162 = d_H[9] - t1161;
-    const real t1163 = t938 * t1162;
-    const real t1164 = t1163 + t1163;
-    const real t1165 = t924 * d_H[4];
-    const real t1166 = H[4] * t1154;
-    const real t1167 = t1165 + t1166;
-    const real t1168 = d_H[5] - t1167;
-    const real t1169 = t935 * t1168;
-    const real t1170 = t1169 + t1169;
-    const real t1171 = t1164 + t1170;
-    const real t1172 = t924 * d_H[12];
-    const real t1173 = H[12] * t1154;
-    const real t1174 = t1172 + t1173;
-    const real t1175 = d_H[13] - t1174;
-    const real t1176 = t932 * t1175;
-    const real t1177 = t1176 + t1176;
-    const real t1178 = t1171 + t1177;
-    const real t1179 = t926 * t1157;
-    const real t1180 = t1179 + t1179;
-    const real t1181 = t1178 + t1180;
-    const real t1182 = t924 * d_H[20];
-    const real t1183 = H[20] * t1154;
-    const real t1184 = t1182 + t1183;
-    const real t1185 = d_H[21] - t1184;
-    const real t1186 = t928 * t1185;
-    const real t1187 = t1186 + t1186;
-    const real t1188 = t1181 + t1187;
-    const real t1189 = t944 * 2.0;
-    const real t1190 = t1188 / t1189;
-    const real t1191 = t946 * t1190;
-    const real t1192 = t935 > 0 ? 1 : (t935 < 0 ? -1 : t935);
-    const real t1193 = t1168 * t1192;
-    const real t1194 = t1190 + t1193;
-    const real t1195 = t944 * t1194;
-    const real t1196 = t1191 + t1195;
-    const real t1197 = t949 * t1196;
-    const real t1198 = t1197 / t947;
-    const real t1199 = -t1198;
-    const real t1200 = t948 != 0 ? t1199 : 0.0;
-    const real t1201 = t971 * t1200;
-    const real t1202 = t966 * t1162;
-    const real t1203 = t915 * d_H[8];
-    const real t1204 = H[8] * t1139;
-    const real t1205 = t1203 + t1204;
-    const real t1206 = d_H[11] - t1205;
-    const real t1207 = t938 * t1206;
-    const real t1208 = t1202 + t1207;
-    const real t1209 = t915 * d_H[4];
-    const real t1210 = H[4] * t1139;
-    const real t1211 = t1209 + t1210;
-    const real t1212 = d_H[7] - t1211;
-    const real t1213 = t963 * t1212;
-    const real t1214 = -t1190;
-    const real t1215 = t960 != 0 ? t1214 : t1190;
-    const real t1216 = t1168 + t1215;
-    const real t1217 = t959 * t1216;
-    const real t1218 = t1213 + t1217;
-    const real t1219 = t1208 + t1218;
-    const real t1220 = t956 * t1175;
-    const real t1221 = t915 * d_H[12];
-    const real t1222 = H[12] * t1139;
-    const real t1223 = t1221 + t1222;
-    const real t1224 = d_H[15] - t1223;
-    const real t1225 = t932 * t1224;
-    const real t1226 = t1220 + t1225;
-    const real t1227 = t1219 + t1226;
-    const real t1228 = t926 * t1142;
-    const real t1229 = t917 * t1157;
-    const real t1230 = t1228 + t1229;
-    const real t1231 = t1227 + t1230;
-    const real t1232 = t952 * t1185;
-    const real t1233 = t915 * d_H[20];
-    const real t1234 = H[20] * t1139;
-    const real t1235 = t1233 + t1234;
-    const real t1236 = d_H[23] - t1235;
-    const real t1237 = t928 * t1236;
-    const real t1238 = t1232 + t1237;
-    const real t1239 = t1231 + t1238;
-    const real t1240 = t950 * t1239;
-    const real t1241 = t1201 + t1240;
-    const real t1242 = t926 * t1241;
-    const real t1243 = t1158 + t1242;
-    const real t1244 = t1142 - t1243;
-    const real t1245 = t981 * d_H[16];
-    const real t1246 = t980 * t1125;
-    const real t1247 = t908 * d_H[2];
-    const real t1248 = H[2] * t1114;
-    const real t1249 = t1247 + t1248;
-    const real t1250 = t269 + t1249;
-    const real t1251 = t273 + t1250;
-    const real t1252 = t277 + t1251;
-    const real t1253 = t281 + t1252;
-    const real t1254 = t285 + t1253;
-    const real t1255 = t904 * t1254;
-    const real t1256 = t1246 + t1255;
-    const real t1257 = H[16] * t1256;
-    const real t1258 = t1245 + t1257;
-    const real t1259 = d_H[18] - t1258;
-    const real t1260 = t1001 * t1157;
-    const real t1261 = t1000 * t1200;
-    const real t1262 = t995 * t1162;
-    const real t1263 = t981 * d_H[8];
-    const real t1264 = H[8] * t1256;
-    const real t1265 = t1263 + t1264;
-    const real t1266 = d_H[10] - t1265;
-    const real t1267 = t938 * t1266;
-    const real t1268 = t1262 + t1267;
-    const real t1269 = t992 * t1216;
-    const real t1270 = t981 * d_H[4];
-    const real t1271 = H[4] * t1256;
-    const real t1272 = t1270 + t1271;
-    const real t1273 = d_H[6] - t1272;
-    const real t1274 = t963 * t1273;
-    const real t1275 = t1269 + t1274;
-    const real t1276 = t1268 + t1275;
-    const real t1277 = t989 * t1175;
-    const real t1278 = t981 * d_H[12];
-    const real t1279 = H[12] * t1256;
-    const real t1280 = t1278 + t1279;
-    const real t1281 = d_H[14] - t1280;
-    const real t1282 = t932 * t1281;
-    const real t1283 = t1277 + t1282;
-    const real t1284 = t1276 + t1283;
-    const real t1285 = t983 * t1157;
-    const real t1286 = t926 * t1259;
-    const real t1287 = t1285 + t1286;
-    const real t1288 = t1284 + t1287;
-    const real t1289 = t985 * t1185;
-    const real t1290 = t981 * d_H[20];
-    const real t1291 = H[20] * t1256;
-    const real t1292 = t1290 + t1291;
-    const real t1293 = d_H[22] - t1292;
-    const real t1294 = t928 * t1293;
-    const real t1295 = t1289 + t1294;
-    const real t1296 = t1288 + t1295;
-    const real t1297 = t950 * t1296;
-    const real t1298 = t1261 + t1297;
-    const real t1299 = t926 * t1298;
-    const real t1300 = t1260 + t1299;
-    const real t1301 = t1259 - t1300;
-    const real t1302 = t1041 * t1301;
-    const real t1303 = t1001 * t1175;
-    const real t1304 = t932 * t1298;
-    const real t1305 = t1303 + t1304;
-    const real t1306 = t1281 - t1305;
-    const real t1307 = t1012 * t1306;
-    const real t1308 = t1307 + t1307;
-    const real t1309 = t1001 * t1162;
-    const real t1310 = t938 * t1298;
-    const real t1311 = t1309 + t1310;
-    const real t1312 = t1266 - t1311;
-    const real t1313 = t1009 * t1312;
-    const real t1314 = t1313 + t1313;
-    const real t1315 = t1308 + t1314;
-    const real t1316 = t1003 * t1301;
-    const real t1317 = t1316 + t1316;
-    const real t1318 = t1315 + t1317;
-    const real t1319 = t1001 * t1185;
-    const real t1320 = t928 * t1298;
-    const real t1321 = t1319 + t1320;
-    const real t1322 = t1293 - t1321;
-    const real t1323 = t1005 * t1322;
-    const real t1324 = t1323 + t1323;
-    const real t1325 = t1318 + t1324;
-    const real t1326 = t1017 * 2.0;
-    const real t1327 = t1325 / t1326;
-    const real t1328 = t1019 * t1327;
-    const real t1329 = t1009 > 0 ? 1 : (t1009 < 0 ? -1 : t1009);
-    const real t1330 = t1312 * t1329;
-    const real t1331 = t1327 + t1330;
-    const real t1332 = t1017 * t1331;
-    const real t1333 = t1328 + t1332;
-    const real t1334 = t1022 * t1333;
-    const real t1335 = t1334 / t1020;
-    const real t1336 = -t1335;
-    const real t1337 = t1021 != 0 ? t1336 : 0.0;
-    const real t1338 = t1040 * t1337;
-    const real t1339 = t1036 * t1306;
-    const real t1340 = t972 * t1175;
-    const real t1341 = t932 * t1241;
-    const real t1342 = t1340 + t1341;
-    const real t1343 = t1224 - t1342;
-    const real t1344 = t1012 * t1343;
-    const real t1345 = t1339 + t1344;
-    const real t1346 = t972 * t1162;
-    const real t1347 = t938 * t1241;
-    const real t1348 = t1346 + t1347;
-    const real t1349 = t1206 - t1348;
-    const real t1350 = t1033 * t1349;
-    const real t1351 = -t1327;
-    const real t1352 = t1030 != 0 ? t1351 : t1327;
-    const real t1353 = t1312 + t1352;
-    const real t1354 = t1029 * t1353;
-    const real t1355 = t1350 + t1354;
-    const real t1356 = t1345 + t1355;
-    const real t1357 = t1003 * t1244;
-    const real t1358 = t974 * t1301;
-    const real t1359 = t1357 + t1358;
-    const real t1360 = t1356 + t1359;
-    const real t1361 = t1025 * t1322;
-    const real t1362 = t972 * t1185;
-    const real t1363 = t928 * t1241;
-    const real t1364 = t1362 + t1363;
-    const real t1365 = t1236 - t1364;
-    const real t1366 = t1005 * t1365;
-    const real t1367 = t1361 + t1366;
-    const real t1368 = t1360 + t1367;
-    const real t1369 = t1023 * t1368;
-    const real t1370 = t1338 + t1369;
-    const real t1371 = t1003 * t1370;
-    const real t1372 = t1302 + t1371;
-    const real t1373 = t1244 - t1372;
-    const real t1374 = t1043 * t1373;
-    const real t1375 = t1374 + t1374;
-    const real t1376 = t1059 * t1375;
-    const real t1377 = t1041 * t1306;
-    const real t1378 = t1012 * t1370;
-    const real t1379 = t1377 + t1378;
-    const real t1380 = t1343 - t1379;
-    const real t1381 = t1049 * t1380;
-    const real t1382 = t1381 + t1381;
-    const real t1383 = t1382 + t1375;
-    const real t1384 = t1041 * t1322;
-    const real t1385 = t1005 * t1370;
-    const real t1386 = t1384 + t1385;
-    const real t1387 = t1365 - t1386;
-    const real t1388 = t1046 * t1387;
-    const real t1389 = t1388 + t1388;
-    const real t1390 = t1383 + t1389;
-    const real t1391 = t1053 * 2.0;
-    const real t1392 = t1390 / t1391;
-    const real t1393 = t1055 * t1392;
-    const real t1394 = t1049 > 0 ? 1 : (t1049 < 0 ? -1 : t1049);
-    const real t1395 = t1380 * t1394;
-    const real t1396 = t1395 + t1392;
-    const real t1397 = t1053 * t1396;
-    const real t1398 = t1393 + t1397;
-    const real t1399 = t1058 * t1398;
-    const real t1400 = t1399 / t1056;
-    const real t1401 = -t1400;
-    const real t1402 = t1057 != 0 ? t1401 : 0.0;
-    const real t1403 = t1044 * t1402;
-    const real t1404 = t1376 + t1403;
-    const real t1405 = t1075 * t1301;
-    const real t1406 = t1074 * t1337;
-    const real t1407 = t1061 * t1301;
-    const real t1408 = t1003 * t1404;
-    const real t1409 = t1407 - t1408;
-    const real t1410 = t1068 * t1306;
-    const real t1411 = t1067 * t1373;
-    const real t1412 = t1066 * t1402;
-    const real t1413 = -t1392;
-    const real t1414 = t1063 != 0 ? t1413 : t1392;
-    const real t1415 = t1380 + t1414;
-    const real t1416 = t1059 * t1415;
-    const real t1417 = t1412 + t1416;
-    const real t1418 = t1043 * t1417;
-    const real t1419 = t1411 + t1418;
-    const real t1420 = t1012 * t1419;
-    const real t1421 = t1410 + t1420;
-    const real t1422 = t1409 - t1421;
-    const real t1423 = t1072 * t1322;
-    const real t1424 = t1071 * t1387;
-    const real t1425 = t1059 * t1373;
-    const real t1426 = t1043 * t1402;
-    const real t1427 = t1425 + t1426;
-    const real t1428 = t1046 * t1427;
-    const real t1429 = t1424 + t1428;
-    const real t1430 = t1005 * t1429;
-    const real t1431 = t1423 + t1430;
-    const real t1432 = t1422 - t1431;
-    const real t1433 = t1023 * t1432;
-    const real t1434 = t1406 + t1433;
-    const real t1435 = t1003 * t1434;
-    const real t1436 = t1405 + t1435;
-    const real t1437 = t1404 + t1436;
-    const real t1438 = t1090 * t1157;
-    const real t1439 = t1089 * t1200;
-    const real t1440 = t1077 * t1157;
-    const real t1441 = t926 * t1437;
-    const real t1442 = t1440 - t1441;
-    const real t1443 = t1082 * t1175;
-    const real t1444 = t1075 * t1306;
-    const real t1445 = t1012 * t1434;
-    const real t1446 = t1444 + t1445;
-    const real t1447 = t1419 + t1446;
-    const real t1448 = t932 * t1447;
-    const real t1449 = t1443 + t1448;
-    const real t1450 = t1079 * t1162;
-    const real t1451 = t1075 * t1353;
-    const real t1452 = t1033 * t1434;
-    const real t1453 = t1451 + t1452;
-    const real t1454 = t938 * t1453;
-    const real t1455 = t1450 + t1454;
-    const real t1456 = t1449 + t1455;
-    const real t1457 = t1442 - t1456;
-    const real t1458 = t1087 * t1185;
-    const real t1459 = t1075 * t1322;
-    const real t1460 = t1005 * t1434;
-    const real t1461 = t1459 + t1460;
-    const real t1462 = t1429 + t1461;
-    const real t1463 = t928 * t1462;
-    const real t1464 = t1458 + t1463;
-    const real t1465 = t1457 - t1464;
-    const real t1466 = t950 * t1465;
-    const real t1467 = t1439 + t1466;
-    const real t1468 = t926 * t1467;
-    const real t1469 = t1438 + t1468;
-    const real t1470 = t1437 + t1469;
-    const real t1471 = H[16] * t1470;
-    const real t1472 = t1127 - t1471;
-    const real t1473 = t1100 * d_H[8];
-    const real t1474 = t1090 * t1162;
-    const real t1475 = t938 * t1467;
-    const real t1476 = t1474 + t1475;
-    const real t1477 = t1453 + t1476;
-    const real t1478 = H[8] * t1477;
-    const real t1479 = t1473 + t1478;
-    const real t1480 = t1097 * d_H[4];
-    const real t1481 = t1090 * t1216;
-    const real t1482 = t963 * t1467;
-    const real t1483 = t1481 + t1482;
-    const real t1484 = H[4] * t1483;
-    const real t1485 = t1480 + t1484;
-    const real t1486 = t1479 + t1485;
-    const real t1487 = t1095 * d_H[12];
-    const real t1488 = t1090 * t1175;
-    const real t1489 = t932 * t1467;
-    const real t1490 = t1488 + t1489;
-    const real t1491 = t1447 + t1490;
-    const real t1492 = H[12] * t1491;
-    const real t1493 = t1487 + t1492;
-    const real t1494 = t1486 + t1493;
-    const real t1495 = t1472 - t1494;
-    const real t1496 = t1106 * d_H[20];
-    const real t1497 = t1090 * t1185;
-    const real t1498 = t928 * t1467;
-    const real t1499 = t1497 + t1498;
-    const real t1500 = t1462 + t1499;
-    const real t1501 = H[20] * t1500;
-    const real t1502 = t1496 + t1501;
-    const real t1503 = t1495 - t1502;
-    const real t1504 = t904 * t1503;
-    const real t1505 = t1126 + t1504;
-    const real t1506 = t908 * t1505;
-    const real t1507 = t1115 + t1506;
-    const real t1508 = -t1507;
-    d_W[24] = t1508;
-    const real t1509 = t1109 * d_H[4];
-    const real t1510 = H[4] * t1505;
-    const real t1511 = t1509 + t1510;
-    const real t1512 = t1483 + t1511;
-    const real t1513 = -t1512;
-    d_W[25] = t1513;
-    const real t1514 = t1109 * d_H[8];
-    const real t1515 = H[8] * t1505;
-    const real t1516 = t1514 + t1515;
-    const real t1517 = t1477 + t1516;
-    const real t1518 = -t1517;
-    d_W[26] = t1518;
-    const real t1519 = t1109 * d_H[12];
-    const real t1520 = H[12] * t1505;
-    const real t1521 = t1519 + t1520;
-    const real t1522 = t1491 + t1521;
-    const real t1523 = -t1522;
-    d_W[27] = t1523;
-    const real t1524 = t1109 * d_H[16];
-    const real t1525 = H[16] * t1505;
-    const real t1526 = t1524 + t1525;
-    const real t1527 = t1470 + t1526;
-    const real t1528 = -t1527;
-    d_W[28] = t1528;
-    const real t1529 = t1109 * d_H[20];
-    const real t1530 = H[20] * t1505;
-    const real t1531 = t1529 + t1530;
-    const real t1532 = t1500 + t1531;
-    const real t1533 = -t1532;
-    d_W[29] = t1533;
-    const real t1534 = t1047 * t1059;
-    const real t1535 = 1.0 - t1534;
-    const real t1536 = t1005 * t1535;
-    const real t1537 = t1046 * t1067;
-    const real t1538 = t1012 * t1537;
-    const real t1539 = t1003 * t1072;
-    const real t1540 = t1538 + t1539;
-    const real t1541 = t1536 - t1540;
-    const real t1542 = t1023 * t1541;
-    const real t1543 = t1005 * t1542;
-    const real t1544 = t1535 - t1543;
-    const real t1545 = t928 * t1544;
-    const real t1546 = t1003 * t1542;
-    const real t1547 = t1072 + t1546;
-    const real t1548 = t926 * t1547;
-    const real t1549 = t1033 * t1542;
-    const real t1550 = t938 * t1549;
-    const real t1551 = t1012 * t1542;
-    const real t1552 = t1537 + t1551;
-    const real t1553 = t932 * t1552;
-    const real t1554 = t1550 + t1553;
-    const real t1555 = t1548 + t1554;
-    const real t1556 = t1545 - t1555;
-    const real t1557 = t950 * t1556;
-    const real t1558 = t928 * t1557;
-    const real t1559 = t1544 - t1558;
-    const real t1560 = H[20] * t1559;
-    const real t1561 = t926 * t1557;
-    const real t1562 = t1547 + t1561;
-    const real t1563 = H[16] * t1562;
-    const real t1564 = t932 * t1557;
-    const real t1565 = t1552 + t1564;
-    const real t1566 = H[12] * t1565;
-    const real t1567 = t963 * t1557;
-    const real t1568 = H[4] * t1567;
-    const real t1569 = t938 * t1557;
-    const real t1570 = t1549 + t1569;
-    const real t1571 = H[8] * t1570;
-    const real t1572 = t1568 + t1571;
-    const real t1573 = t1566 + t1572;
-    const real t1574 = t1563 + t1573;
-    const real t1575 = t1560 - t1574;
-    const real t1576 = t904 * t1575;
-    const real t1577 = t1576 * t1114;
-    const real t1578 = t1575 * t1125;
-    const real t1579 = t1559 * d_H[20];
-    const real t1580 = t1059 * t1389;
-    const real t1581 = t1047 * t1402;
-    const real t1582 = t1580 + t1581;
-    const real t1583 = t1542 * t1322;
-    const real t1584 = t1541 * t1337;
-    const real t1585 = t1535 * t1322;
-    const real t1586 = t1005 * t1582;
-    const real t1587 = t1585 - t1586;
-    const real t1588 = t1072 * t1301;
-    const real t1589 = t1003 * t1429;
-    const real t1590 = t1588 + t1589;
-    const real t1591 = t1537 * t1306;
-    const real t1592 = t1067 * t1387;
-    const real t1593 = t1046 * t1417;
-    const real t1594 = t1592 + t1593;
-    const real t1595 = t1012 * t1594;
-    const real t1596 = t1591 + t1595;
-    const real t1597 = t1590 + t1596;
-    const real t1598 = t1587 - t1597;
-    const real t1599 = t1023 * t1598;
-    const real t1600 = t1584 + t1599;
-    const real t1601 = t1005 * t1600;
-    const real t1602 = t1583 + t1601;
-    const real t1603 = t1582 + t1602;
-    const real t1604 = t1557 * t1185;
-    const real t1605 = t1556 * t1200;
-    const real t1606 = t1544 * t1185;
-    const real t1607 = t928 * t1603;
-    const real t1608 = t1606 - t1607;
-    const real t1609 = t1552 * t1175;
-    const real t1610 = t1542 * t1306;
-    const real t1611 = t1012 * t1600;
-    const real t1612 = t1610 + t1611;
-    const real t1613 = t1594 + t1612;
-    const real t1614 = t932 * t1613;
-    const real t1615 = t1609 + t1614;
-    const real t1616 = t1549 * t1162;
-    const real t1617 = t1542 * t1353;
-    const real t1618 = t1033 * t1600;
-    const real t1619 = t1617 + t1618;
-    const real t1620 = t938 * t1619;
-    const real t1621 = t1616 + t1620;
-    const real t1622 = t1615 + t1621;
-    const real t1623 = t1547 * t1157;
-    const real t1624 = t1542 * t1301;
-    const real t1625 = t1003 * t1600;
-    const real t1626 = t1624 + t1625;
-    const real t1627 = t1429 + t1626;
-    const real t1628 = t926 * t1627;
-    const real t1629 = t1623 + t1628;
-    const real t1630 = t1622 + t1629;
-    const real t1631 = t1608 - t1630;
-    const real t1632 = t950 * t1631;
-    const real t1633 = t1605 + t1632;
-    const real t1634 = t928 * t1633;
-    const real t1635 = t1604 + t1634;
-    const real t1636 = t1603 + t1635;
-    const real t1637 = H[20] * t1636;
-    const real t1638 = t1579 - t1637;
-    const real t1639 = t1570 * d_H[8];
-    const real t1640 = t1557 * t1162;
-    const real t1641 = t938 * t1633;
-    const real t1642 = t1640 + t1641;
-    const real t1643 = t1619 + t1642;
-    const real t1644 = H[8] * t1643;
-    const real t1645 = t1639 + t1644;
-    const real t1646 = t1567 * d_H[4];
-    const real t1647 = t1557 * t1216;
-    const real t1648 = t963 * t1633;
-    const real t1649 = t1647 + t1648;
-    const real t1650 = H[4] * t1649;
-    const real t1651 = t1646 + t1650;
-    const real t1652 = t1645 + t1651;
-    const real t1653 = t1565 * d_H[12];
-    const real t1654 = t1557 * t1175;
-    const real t1655 = t932 * t1633;
-    const real t1656 = t1654 + t1655;
-    const real t1657 = t1613 + t1656;
-    const real t1658 = H[12] * t1657;
-    const real t1659 = t1653 + t1658;
-    const real t1660 = t1652 + t1659;
-    const real t1661 = t1562 * d_H[16];
-    const real t1662 = t1557 * t1157;
-    const real t1663 = t926 * t1633;
-    const real t1664 = t1662 + t1663;
-    const real t1665 = t1627 + t1664;
-    const real t1666 = H[16] * t1665;
-    const real t1667 = t1661 + t1666;
-    const real t1668 = t1660 + t1667;
-    const real t1669 = t1638 - t1668;
-    const real t1670 = t904 * t1669;
-    const real t1671 = t1578 + t1670;
-    const real t1672 = t908 * t1671;
-    const real t1673 = t1577 + t1672;
-    const real t1674 = -t1673;
-    d_W[30] = t1674;
-    const real t1675 = t1576 * d_H[4];
-    const real t1676 = H[4] * t1671;
-    const real t1677 = t1675 + t1676;
-    const real t1678 = t1649 + t1677;
-    const real t1679 = -t1678;
-    d_W[31] = t1679;
-    const real t1680 = t1576 * d_H[8];
-    const real t1681 = H[8] * t1671;
-    const real t1682 = t1680 + t1681;
-    const real t1683 = t1643 + t1682;
-    const real t1684 = -t1683;
-    d_W[32] = t1684;
-    const real t1685 = t1576 * d_H[12];
-    const real t1686 = H[12] * t1671;
-    const real t1687 = t1685 + t1686;
-    const real t1688 = t1657 + t1687;
-    const real t1689 = -t1688;
-    d_W[33] = t1689;
-    const real t1690 = t1576 * d_H[16];
-    const real t1691 = H[16] * t1671;
-    const real t1692 = t1690 + t1691;
-    const real t1693 = t1665 + t1692;
-    const real t1694 = -t1693;
-    d_W[34] = t1694;
-    const real t1695 = t1576 * d_H[20];
-    const real t1696 = H[20] * t1671;
-    const real t1697 = t1695 + t1696;
-    const real t1698 = t1636 + t1697;
-    const real t1699 = -t1698;
-    d_W[35] = t1699;
-    return 0;
+  real t10 = H[20] * H[20] + (H[16] * H[16] + (H[12] * H[12] + (H[8] * H[8] + (H[0] * H[0] + H[4] *
+    H[4]))));
+  real t11 = 1.0 / t10;
+  real t13 = H[4] * d_H[4];
+  real t15 = H[0] * d_H[0];
+  real t18 = H[8] * d_H[8];
+  real t21 = H[12] * d_H[12];
+  real t24 = H[16] * d_H[16];
+  real t27 = H[20] * d_H[20];
+  real t29 = t13 + t13 + (t15 + t15) + (t18 + t18) + (t21 + t21) + (t24 + t24) + (t27 + t27);
+  real t31 = t11 * t29 / t10;
+  real t45 = H[20] * H[21];
+  real t46 = H[16] * H[17];
+  real t47 = H[12] * H[13];
+  real t48 = H[8] * H[9];
+  real t49 = H[4] * H[5];
+  real t55 = t45 + (t46 + (t47 + (t48 + (t49 + H[0] * H[1]))));
+  real t56 = t55 * t11;
+  real t58 = H[1] * H[1] + H[5] * H[5] + H[9] * H[9] + H[13] * H[13] + H[17] * H[17] + H[21] * H[21]
+    - t55 * t56;
+  real t59 = 1.0 / t58;
+  real t61 = H[1] - H[0] * t56;
+  real t74 = H[20] * H[22];
+  real t75 = H[16] * H[18];
+  real t76 = H[12] * H[14];
+  real t77 = H[8] * H[10];
+  real t78 = H[4] * H[6];
+  real t84 = t74 + (t75 + (t76 + (t77 + (t78 + H[0] * H[2]))));
+  real t86 = H[1] * H[2] + H[5] * H[6] + H[9] * H[10] + H[13] * H[14] + H[17] * H[18] + H[21] *
+    H[22] - t56 * t84;
+  real t87 = t86 * t59;
+  real t99 = t11 * t84;
+  real t103 = H[2] * H[2] + H[6] * H[6] + H[10] * H[10] + H[14] * H[14] + H[18] * H[18] + H[22] *
+    H[22] - t84 * t99 - t86 * t87;
+  real t104 = 1.0 / t103;
+  real t108 = H[2] - H[0] * t99 - t87 * t61;
+  real t121 = H[20] * H[23];
+  real t122 = H[16] * H[19];
+  real t123 = H[12] * H[15];
+  real t124 = H[8] * H[11];
+  real t125 = H[4] * H[7];
+  real t131 = t121 + (t122 + (t123 + (t124 + (t125 + H[0] * H[3]))));
+  real t146 = H[1] * H[3] + H[5] * H[7] + H[9] * H[11] + H[13] * H[15] + H[17] * H[19] + H[21] *
+    H[23] - t56 * t131;
+  real t148 = H[2] * H[3] + H[6] * H[7] + H[10] * H[11] + H[14] * H[15] + H[18] * H[19] + H[22] *
+    H[23] - t99 * t131 - t87 * t146;
+  real t149 = t148 * t104;
+  real t161 = t11 * t131;
+  real t164 = t59 * t146;
+  real t168 = H[3] * H[3] + H[7] * H[7] + H[11] * H[11] + H[15] * H[15] + H[19] * H[19] + H[23] *
+    H[23] - t131 * t161 - t146 * t164 - t148 * t149;
+  real t169 = 1.0 / t168;
+  real t175 = H[3] - H[0] * t161 - t164 * t61 - t149 * t108;
+  real t176 = t169 * t175;
+  real t178 = t104 * t108 - t149 * t176;
+  real t188 = H[5] * d_H[4] + H[4] * d_H[5];
+  real t192 = H[9] * d_H[8] + H[8] * d_H[9];
+  real t196 = H[13] * d_H[12] + H[12] * d_H[13];
+  real t200 = H[17] * d_H[16] + H[16] * d_H[17];
+  real t204 = H[21] * d_H[20] + H[20] * d_H[21];
+  real t205 = H[1] * d_H[0] + H[0] * d_H[1] + t188 + t192 + t196 + t200 + t204;
+  real t208 = t11 * t205 - t55 * t31;
+  real t213 = d_H[1] - (t56 * d_H[0] + H[0] * t208);
+  real t215 = H[21] * d_H[21];
+  real t217 = H[17] * d_H[17];
+  real t219 = H[13] * d_H[13];
+  real t221 = H[9] * d_H[9];
+  real t223 = H[5] * d_H[5];
+  real t225 = H[1] * d_H[1];
+  real t237 = t59 * (t215 + t215 + (t217 + t217 + (t219 + t219 + (t221 + t221 + (t223 + t223 + (t225
+    + t225))))) - (t56 * t205 + t55 * t208)) / t58;
+  real t269 = H[6] * d_H[4] + H[4] * d_H[6];
+  real t273 = H[10] * d_H[8] + H[8] * d_H[10];
+  real t277 = H[14] * d_H[12] + H[12] * d_H[14];
+  real t281 = H[18] * d_H[16] + H[16] * d_H[18];
+  real t285 = H[22] * d_H[20] + H[20] * d_H[22];
+  real t286 = H[2] * d_H[0] + H[0] * d_H[2] + t269 + t273 + t277 + t281 + t285;
+  real t289 = H[22] * d_H[21] + H[21] * d_H[22] + (H[18] * d_H[17] + H[17] * d_H[18] + (H[14] *
+    d_H[13] + H[13] * d_H[14] + (H[10] * d_H[9] + H[9] * d_H[10] + (H[6] * d_H[5] + H[5] * d_H[6] +
+    (H[2] * d_H[1] + H[1] * d_H[2]))))) - (t84 * t208 + t56 * t286);
+  real t292 = t59 * t289 - t86 * t237;
+  real t297 = t11 * t286 - t84 * t31;
+  real t304 = d_H[2] - (t99 * d_H[0] + H[0] * t297) - (t61 * t292 + t87 * t213);
+  real t306 = H[22] * d_H[22];
+  real t308 = H[18] * d_H[18];
+  real t310 = H[14] * d_H[14];
+  real t312 = H[10] * d_H[10];
+  real t314 = H[6] * d_H[6];
+  real t316 = H[2] * d_H[2];
+  real t332 = t104 * (t306 + t306 + (t308 + t308 + (t310 + t310 + (t312 + t312 + (t314 + t314 +
+    (t316 + t316))))) - (t99 * t286 + t84 * t297) - (t87 * t289 + t86 * t292)) / t103;
+  real t364 = H[7] * d_H[4] + H[4] * d_H[7];
+  real t368 = H[11] * d_H[8] + H[8] * d_H[11];
+  real t372 = H[15] * d_H[12] + H[12] * d_H[15];
+  real t376 = H[19] * d_H[16] + H[16] * d_H[19];
+  real t380 = H[23] * d_H[20] + H[20] * d_H[23];
+  real t381 = H[3] * d_H[0] + H[0] * d_H[3] + t364 + t368 + t372 + t376 + t380;
+  real t412 = H[23] * d_H[21] + H[21] * d_H[23] + (H[19] * d_H[17] + H[17] * d_H[19] + (H[15] *
+    d_H[13] + H[13] * d_H[15] + (H[11] * d_H[9] + H[9] * d_H[11] + (H[7] * d_H[5] + H[5] * d_H[7] +
+    (H[3] * d_H[1] + H[1] * d_H[3]))))) - (t131 * t208 + t56 * t381);
+  real t415 = H[23] * d_H[22] + H[22] * d_H[23] + (H[19] * d_H[18] + H[18] * d_H[19] + (H[15] *
+    d_H[14] + H[14] * d_H[15] + (H[11] * d_H[10] + H[10] * d_H[11] + (H[7] * d_H[6] + H[6] * d_H[7]
+    + (H[3] * d_H[2] + H[2] * d_H[3]))))) - (t131 * t297 + t99 * t381) - (t146 * t292 + t87 * t412);
+  real t418 = t104 * t415 - t148 * t332;
+  real t423 = t11 * t381 - t131 * t31;
+  real t429 = t59 * t412 - t146 * t237;
+  real t439 = H[23] * d_H[23];
+  real t441 = H[19] * d_H[19];
+  real t443 = H[15] * d_H[15];
+  real t445 = H[11] * d_H[11];
+  real t447 = H[7] * d_H[7];
+  real t449 = H[3] * d_H[3];
+  real t469 = t169 * (t439 + t439 + (t441 + t441 + (t443 + t443 + (t445 + t445 + (t447 + t447 +
+    (t449 + t449))))) - (t161 * t381 + t131 * t423) - (t164 * t412 + t146 * t429) - (t149 * t415 +
+    t148 * t418)) / t168;
+  real t471 = t169 * (d_H[3] - (t161 * d_H[0] + H[0] * t423) - (t61 * t429 + t164 * t213) - (t108 *
+    t418 + t149 * t304)) - t175 * t469;
+  real t474 = t104 * t304 - t108 * t332 - (t176 * t418 + t149 * t471);
+  real t481 = t59 * t213 - t61 * t237 - (t178 * t292 + t87 * t474) - (t176 * t429 + t164 * t471);
+  d_W[0] = t11 * d_H[0] - H[0] * t31 - ((t59 * t61 - t87 * t178 - t164 * t176) * t208 + t56 * t481)
+    - (t178 * t297 + t99 * t474) - (t176 * t423 + t161 * t471);
+  real t497 = H[5] - H[4] * t56;
+  real t502 = H[6] - H[4] * t99 - t87 * t497;
+  real t509 = H[7] - H[4] * t161 - t164 * t497 - t149 * t502;
+  real t510 = t169 * t509;
+  real t512 = t104 * t502 - t149 * t510;
+  real t521 = d_H[5] - (t56 * d_H[4] + H[4] * t208);
+  real t533 = d_H[6] - (t99 * d_H[4] + H[4] * t297) - (t497 * t292 + t87 * t521);
+  real t552 = t169 * (d_H[7] - (t161 * d_H[4] + H[4] * t423) - (t497 * t429 + t164 * t521) - (t502 *
+    t418 + t149 * t533)) - t509 * t469;
+  real t555 = t104 * t533 - t502 * t332 - (t510 * t418 + t149 * t552);
+  real t562 = t59 * t521 - t497 * t237 - (t512 * t292 + t87 * t555) - (t510 * t429 + t164 * t552);
+  d_W[1] = t11 * d_H[4] - H[4] * t31 - ((t59 * t497 - t87 * t512 - t164 * t510) * t208 + t56 * t562)
+    - (t512 * t297 + t99 * t555) - (t510 * t423 + t161 * t552);
+  real t578 = H[9] - H[8] * t56;
+  real t583 = H[10] - H[8] * t99 - t87 * t578;
+  real t590 = H[11] - H[8] * t161 - t164 * t578 - t149 * t583;
+  real t591 = t169 * t590;
+  real t593 = t104 * t583 - t149 * t591;
+  real t602 = d_H[9] - (t56 * d_H[8] + H[8] * t208);
+  real t614 = d_H[10] - (t99 * d_H[8] + H[8] * t297) - (t578 * t292 + t87 * t602);
+  real t633 = t169 * (d_H[11] - (t161 * d_H[8] + H[8] * t423) - (t578 * t429 + t164 * t602) - (t583
+    * t418 + t149 * t614)) - t590 * t469;
+  real t636 = t104 * t614 - t583 * t332 - (t591 * t418 + t149 * t633);
+  real t643 = t59 * t602 - t578 * t237 - (t593 * t292 + t87 * t636) - (t591 * t429 + t164 * t633);
+  d_W[2] = t11 * d_H[8] - H[8] * t31 - ((t59 * t578 - t87 * t593 - t164 * t591) * t208 + t56 * t643)
+    - (t593 * t297 + t99 * t636) - (t591 * t423 + t161 * t633);
+  real t659 = H[13] - H[12] * t56;
+  real t664 = H[14] - H[12] * t99 - t87 * t659;
+  real t671 = H[15] - H[12] * t161 - t164 * t659 - t149 * t664;
+  real t672 = t169 * t671;
+  real t674 = t104 * t664 - t149 * t672;
+  real t683 = d_H[13] - (t56 * d_H[12] + H[12] * t208);
+  real t695 = d_H[14] - (t99 * d_H[12] + H[12] * t297) - (t659 * t292 + t87 * t683);
+  real t714 = t169 * (d_H[15] - (t161 * d_H[12] + H[12] * t423) - (t659 * t429 + t164 * t683) -
+    (t664 * t418 + t149 * t695)) - t671 * t469;
+  real t717 = t104 * t695 - t664 * t332 - (t672 * t418 + t149 * t714);
+  real t724 = t59 * t683 - t659 * t237 - (t674 * t292 + t87 * t717) - (t672 * t429 + t164 * t714);
+  d_W[3] = t11 * d_H[12] - H[12] * t31 - ((t59 * t659 - t87 * t674 - t164 * t672) * t208 + t56 *
+    t724) - (t674 * t297 + t99 * t717) - (t672 * t423 + t161 * t714);
+  real t740 = H[17] - H[16] * t56;
+  real t745 = H[18] - H[16] * t99 - t87 * t740;
+  real t752 = H[19] - H[16] * t161 - t164 * t740 - t149 * t745;
+  real t753 = t169 * t752;
+  real t755 = t104 * t745 - t149 * t753;
+  real t764 = d_H[17] - (t56 * d_H[16] + H[16] * t208);
+  real t776 = d_H[18] - (t99 * d_H[16] + H[16] * t297) - (t740 * t292 + t87 * t764);
+  real t795 = t169 * (d_H[19] - (t161 * d_H[16] + H[16] * t423) - (t740 * t429 + t164 * t764) -
+    (t745 * t418 + t149 * t776)) - t752 * t469;
+  real t798 = t104 * t776 - t745 * t332 - (t753 * t418 + t149 * t795);
+  real t805 = t59 * t764 - t740 * t237 - (t755 * t292 + t87 * t798) - (t753 * t429 + t164 * t795);
+  d_W[4] = t11 * d_H[16] - H[16] * t31 - ((t59 * t740 - t87 * t755 - t164 * t753) * t208 + t56 *
+    t805) - (t755 * t297 + t99 * t798) - (t753 * t423 + t161 * t795);
+  real t821 = H[21] - H[20] * t56;
+  real t826 = H[22] - H[20] * t99 - t87 * t821;
+  real t833 = H[23] - H[20] * t161 - t164 * t821 - t149 * t826;
+  real t834 = t169 * t833;
+  real t836 = t104 * t826 - t149 * t834;
+  real t845 = d_H[21] - (t56 * d_H[20] + H[20] * t208);
+  real t857 = d_H[22] - (t99 * d_H[20] + H[20] * t297) - (t821 * t292 + t87 * t845);
+  real t876 = t169 * (d_H[23] - (t161 * d_H[20] + H[20] * t423) - (t821 * t429 + t164 * t845) -
+    (t826 * t418 + t149 * t857)) - t833 * t469;
+  real t879 = t104 * t857 - t826 * t332 - (t834 * t418 + t149 * t876);
+  real t886 = t59 * t845 - t821 * t237 - (t836 * t292 + t87 * t879) - (t834 * t429 + t164 * t876);
+  d_W[5] = t11 * d_H[20] - H[20] * t31 - ((t59 * t821 - t87 * t836 - t164 * t834) * t208 + t56 *
+    t886) - (t836 * t297 + t99 * t879) - (t834 * t423 + t161 * t876);
+  d_W[6] = t481;
+  d_W[7] = t562;
+  d_W[8] = t643;
+  d_W[9] = t724;
+  d_W[10] = t805;
+  d_W[11] = t886;
+  d_W[12] = t474;
+  d_W[13] = t555;
+  d_W[14] = t636;
+  d_W[15] = t717;
+  d_W[16] = t798;
+  d_W[17] = t879;
+  d_W[18] = t471;
+  d_W[19] = t552;
+  d_W[20] = t633;
+  d_W[21] = t714;
+  d_W[22] = t795;
+  d_W[23] = t876;
+  real t898 = sqrt(t10);
+  real t900 = t898 + (fabs(H[0]));
+  real t901 = t898 * t900;
+  real t902 = 0.0 < t901;
+  real t903 = 1.0 / t901;
+  real t904 = t902 != 0 ? t903 : 0.0;
+  real t905 = H[0] < 0.0;
+  real t906 = -t898;
+  real t908 = H[0] + (t905 != 0 ? t906 : t898);
+  real t914 = t121 + (t122 + (t123 + (t124 + (t125 + H[3] * t908))));
+  real t915 = t904 * t914;
+  real t917 = H[19] - H[16] * t915;
+  real t923 = t45 + (t46 + (t47 + (t48 + (t49 + H[1] * t908))));
+  real t924 = t904 * t923;
+  real t926 = H[17] - H[16] * t924;
+  real t928 = H[21] - H[20] * t924;
+  real t932 = H[13] - H[12] * t924;
+  real t935 = H[5] - H[4] * t924;
+  real t938 = H[9] - H[8] * t924;
+  real t944 = sqrt(t928 * t928 + (t926 * t926 + (t932 * t932 + (t935 * t935 + t938 * t938))));
+  real t946 = t944 + (fabs(t935));
+  real t947 = t944 * t946;
+  real t948 = 0.0 < t947;
+  real t949 = 1.0 / t947;
+  real t950 = t948 != 0 ? t949 : 0.0;
+  real t952 = H[23] - H[20] * t915;
+  real t956 = H[15] - H[12] * t915;
+  real t959 = H[7] - H[4] * t915;
+  real t960 = t935 < 0.0;
+  real t961 = -t944;
+  real t963 = t935 + (t960 != 0 ? t961 : t944);
+  real t966 = H[11] - H[8] * t915;
+  real t971 = t928 * t952 + (t917 * t926 + (t932 * t956 + (t959 * t963 + t938 * t966)));
+  real t972 = t950 * t971;
+  real t974 = t917 - t926 * t972;
+  real t980 = t74 + (t75 + (t76 + (t77 + (t78 + H[2] * t908))));
+  real t981 = t904 * t980;
+  real t983 = H[18] - H[16] * t981;
+  real t985 = H[22] - H[20] * t981;
+  real t989 = H[14] - H[12] * t981;
+  real t992 = H[6] - H[4] * t981;
+  real t995 = H[10] - H[8] * t981;
+  real t1000 = t928 * t985 + (t926 * t983 + (t932 * t989 + (t963 * t992 + t938 * t995)));
+  real t1001 = t950 * t1000;
+  real t1003 = t983 - t926 * t1001;
+  real t1005 = t985 - t928 * t1001;
+  real t1009 = t995 - t938 * t1001;
+  real t1012 = t989 - t932 * t1001;
+  real t1017 = sqrt(t1005 * t1005 + (t1003 * t1003 + (t1009 * t1009 + t1012 * t1012)));
+  real t1019 = t1017 + (fabs(t1009));
+  real t1020 = t1017 * t1019;
+  real t1021 = 0.0 < t1020;
+  real t1022 = 1.0 / t1020;
+  real t1023 = t1021 != 0 ? t1022 : 0.0;
+  real t1025 = t952 - t928 * t972;
+  real t1029 = t966 - t938 * t972;
+  real t1030 = t1009 < 0.0;
+  real t1031 = -t1017;
+  real t1033 = t1009 + (t1030 != 0 ? t1031 : t1017);
+  real t1036 = t956 - t932 * t972;
+  real t1040 = t1005 * t1025 + (t974 * t1003 + (t1029 * t1033 + t1012 * t1036));
+  real t1041 = t1023 * t1040;
+  real t1043 = t974 - t1003 * t1041;
+  real t1044 = t1043 * t1043;
+  real t1046 = t1025 - t1005 * t1041;
+  real t1047 = t1046 * t1046;
+  real t1049 = t1036 - t1012 * t1041;
+  real t1053 = sqrt(t1047 + (t1044 + t1049 * t1049));
+  real t1055 = t1053 + (fabs(t1049));
+  real t1056 = t1053 * t1055;
+  real t1057 = 0.0 < t1056;
+  real t1058 = 1.0 / t1056;
+  real t1059 = t1057 != 0 ? t1058 : 0.0;
+  real t1061 = 1.0 - t1044 * t1059;
+  real t1063 = t1049 < 0.0;
+  real t1064 = -t1053;
+  real t1066 = t1049 + (t1063 != 0 ? t1064 : t1053);
+  real t1067 = t1059 * t1066;
+  real t1068 = t1043 * t1067;
+  real t1071 = t1043 * t1059;
+  real t1072 = t1046 * t1071;
+  real t1074 = t1003 * t1061 - t1012 * t1068 - t1005 * t1072;
+  real t1075 = t1023 * t1074;
+  real t1077 = t1061 - t1003 * t1075;
+  real t1079 = t1033 * t1075;
+  real t1082 = t1068 + t1012 * t1075;
+  real t1087 = t1072 + t1005 * t1075;
+  real t1089 = t926 * t1077 - (t938 * t1079 + t932 * t1082) - t928 * t1087;
+  real t1090 = t950 * t1089;
+  real t1092 = t1077 - t926 * t1090;
+  real t1095 = t1082 + t932 * t1090;
+  real t1097 = t963 * t1090;
+  real t1100 = t1079 + t938 * t1090;
+  real t1106 = t1087 + t928 * t1090;
+  real t1108 = H[16] * t1092 - (H[12] * t1095 + (H[4] * t1097 + H[8] * t1100)) - H[20] * t1106;
+  real t1109 = t904 * t1108;
+  real t1111 = t29 / (t898 * 2.0);
+  real t1112 = -t1111;
+  real t1114 = d_H[0] + (t905 != 0 ? t1112 : t1111);
+  real t1124 = -(t903 * (t900 * t1111 + t898 * (t1111 + d_H[0] * (H[0] > 0 ? 1 : (H[0] < 0 ? -1 :
+    H[0])))) / t901);
+  real t1125 = t902 != 0 ? t1124 : 0.0;
+  real t1139 = t914 * t1125 + t904 * (t380 + (t376 + (t372 + (t368 + (t364 + (t908 * d_H[3] + H[3] *
+    t1114))))));
+  real t1142 = d_H[19] - (t915 * d_H[16] + H[16] * t1139);
+  real t1154 = t923 * t1125 + t904 * (t204 + (t200 + (t196 + (t192 + (t188 + (t908 * d_H[1] + H[1] *
+    t1114))))));
+  real t1157 = d_H[17] - (t924 * d_H[16] + H[16] * t1154);
+  real t1162 = d_H[9] - (t924 * d_H[8] + H[8] * t1154);
+  real t1163 = t938 * t1162;
+  real t1168 = d_H[5] - (t924 * d_H[4] + H[4] * t1154);
+  real t1169 = t935 * t1168;
+  real t1175 = d_H[13] - (t924 * d_H[12] + H[12] * t1154);
+  real t1176 = t932 * t1175;
+  real t1179 = t926 * t1157;
+  real t1185 = d_H[21] - (t924 * d_H[20] + H[20] * t1154);
+  real t1186 = t928 * t1185;
+  real t1190 = (t1163 + t1163 + (t1169 + t1169) + (t1176 + t1176) + (t1179 + t1179) + (t1186 +
+    t1186)) / (t944 * 2.0);
+  real t1199 = -(t949 * (t946 * t1190 + t944 * (t1190 + t1168 * (t935 > 0 ? 1 : (t935 < 0 ? -1 :
+    t935)))) / t947);
+  real t1200 = t948 != 0 ? t1199 : 0.0;
+  real t1206 = d_H[11] - (t915 * d_H[8] + H[8] * t1139);
+  real t1214 = -t1190;
+  real t1216 = t1168 + (t960 != 0 ? t1214 : t1190);
+  real t1224 = d_H[15] - (t915 * d_H[12] + H[12] * t1139);
+  real t1236 = d_H[23] - (t915 * d_H[20] + H[20] * t1139);
+  real t1241 = t971 * t1200 + t950 * (t966 * t1162 + t938 * t1206 + (t963 * (d_H[7] - (t915 * d_H[4]
+    + H[4] * t1139)) + t959 * t1216) + (t956 * t1175 + t932 * t1224) + (t926 * t1142 + t917 * t1157)
+    + (t952 * t1185 + t928 * t1236));
+  real t1244 = t1142 - (t972 * t1157 + t926 * t1241);
+  real t1256 = t980 * t1125 + t904 * (t285 + (t281 + (t277 + (t273 + (t269 + (t908 * d_H[2] + H[2] *
+    t1114))))));
+  real t1259 = d_H[18] - (t981 * d_H[16] + H[16] * t1256);
+  real t1266 = d_H[10] - (t981 * d_H[8] + H[8] * t1256);
+  real t1281 = d_H[14] - (t981 * d_H[12] + H[12] * t1256);
+  real t1293 = d_H[22] - (t981 * d_H[20] + H[20] * t1256);
+  real t1298 = t1000 * t1200 + t950 * (t995 * t1162 + t938 * t1266 + (t992 * t1216 + t963 * (d_H[6]
+    - (t981 * d_H[4] + H[4] * t1256))) + (t989 * t1175 + t932 * t1281) + (t983 * t1157 + t926 *
+    t1259) + (t985 * t1185 + t928 * t1293));
+  real t1301 = t1259 - (t1001 * t1157 + t926 * t1298);
+  real t1306 = t1281 - (t1001 * t1175 + t932 * t1298);
+  real t1307 = t1012 * t1306;
+  real t1312 = t1266 - (t1001 * t1162 + t938 * t1298);
+  real t1313 = t1009 * t1312;
+  real t1316 = t1003 * t1301;
+  real t1322 = t1293 - (t1001 * t1185 + t928 * t1298);
+  real t1323 = t1005 * t1322;
+  real t1327 = (t1307 + t1307 + (t1313 + t1313) + (t1316 + t1316) + (t1323 + t1323)) / (t1017 *
+    2.0);
+  real t1336 = -(t1022 * (t1019 * t1327 + t1017 * (t1327 + t1312 * (t1009 > 0 ? 1 : (t1009 < 0 ? -1
+    : t1009)))) / t1020);
+  real t1337 = t1021 != 0 ? t1336 : 0.0;
+  real t1343 = t1224 - (t972 * t1175 + t932 * t1241);
+  real t1351 = -t1327;
+  real t1353 = t1312 + (t1030 != 0 ? t1351 : t1327);
+  real t1365 = t1236 - (t972 * t1185 + t928 * t1241);
+  real t1370 = t1040 * t1337 + t1023 * (t1036 * t1306 + t1012 * t1343 + (t1033 * (t1206 - (t972 *
+    t1162 + t938 * t1241)) + t1029 * t1353) + (t1003 * t1244 + t974 * t1301) + (t1025 * t1322 +
+    t1005 * t1365));
+  real t1373 = t1244 - (t1041 * t1301 + t1003 * t1370);
+  real t1374 = t1043 * t1373;
+  real t1375 = t1374 + t1374;
+  real t1380 = t1343 - (t1041 * t1306 + t1012 * t1370);
+  real t1381 = t1049 * t1380;
+  real t1387 = t1365 - (t1041 * t1322 + t1005 * t1370);
+  real t1388 = t1046 * t1387;
+  real t1389 = t1388 + t1388;
+  real t1392 = (t1381 + t1381 + t1375 + t1389) / (t1053 * 2.0);
+  real t1401 = -(t1058 * (t1055 * t1392 + t1053 * (t1380 * (t1049 > 0 ? 1 : (t1049 < 0 ? -1 :
+    t1049)) + t1392)) / t1056);
+  real t1402 = t1057 != 0 ? t1401 : 0.0;
+  real t1404 = t1059 * t1375 + t1044 * t1402;
+  real t1413 = -t1392;
+  real t1417 = t1066 * t1402 + t1059 * (t1380 + (t1063 != 0 ? t1413 : t1392));
+  real t1419 = t1067 * t1373 + t1043 * t1417;
+  real t1429 = t1071 * t1387 + t1046 * (t1059 * t1373 + t1043 * t1402);
+  real t1434 = t1074 * t1337 + t1023 * (t1061 * t1301 - t1003 * t1404 - (t1068 * t1306 + t1012 *
+    t1419) - (t1072 * t1322 + t1005 * t1429));
+  real t1437 = t1404 + (t1075 * t1301 + t1003 * t1434);
+  real t1447 = t1419 + (t1075 * t1306 + t1012 * t1434);
+  real t1453 = t1075 * t1353 + t1033 * t1434;
+  real t1462 = t1429 + (t1075 * t1322 + t1005 * t1434);
+  real t1467 = t1089 * t1200 + t950 * (t1077 * t1157 - t926 * t1437 - (t1082 * t1175 + t932 * t1447
+    + (t1079 * t1162 + t938 * t1453)) - (t1087 * t1185 + t928 * t1462));
+  real t1470 = t1437 + (t1090 * t1157 + t926 * t1467);
+  real t1477 = t1453 + (t1090 * t1162 + t938 * t1467);
+  real t1483 = t1090 * t1216 + t963 * t1467;
+  real t1491 = t1447 + (t1090 * t1175 + t932 * t1467);
+  real t1500 = t1462 + (t1090 * t1185 + t928 * t1467);
+  real t1505 = t1108 * t1125 + t904 * (t1092 * d_H[16] - H[16] * t1470 - (t1100 * d_H[8] + H[8] *
+    t1477 + (t1097 * d_H[4] + H[4] * t1483) + (t1095 * d_H[12] + H[12] * t1491)) - (t1106 * d_H[20]
+    + H[20] * t1500));
+  d_W[24] = -(t1109 * t1114 + t908 * t1505);
+  d_W[25] = -(t1483 + (t1109 * d_H[4] + H[4] * t1505));
+  d_W[26] = -(t1477 + (t1109 * d_H[8] + H[8] * t1505));
+  d_W[27] = -(t1491 + (t1109 * d_H[12] + H[12] * t1505));
+  d_W[28] = -(t1470 + (t1109 * d_H[16] + H[16] * t1505));
+  d_W[29] = -(t1500 + (t1109 * d_H[20] + H[20] * t1505));
+  real t1535 = 1.0 - t1047 * t1059;
+  real t1537 = t1046 * t1067;
+  real t1541 = t1005 * t1535 - (t1012 * t1537 + t1003 * t1072);
+  real t1542 = t1023 * t1541;
+  real t1544 = t1535 - t1005 * t1542;
+  real t1547 = t1072 + t1003 * t1542;
+  real t1549 = t1033 * t1542;
+  real t1552 = t1537 + t1012 * t1542;
+  real t1556 = t928 * t1544 - (t926 * t1547 + (t938 * t1549 + t932 * t1552));
+  real t1557 = t950 * t1556;
+  real t1559 = t1544 - t928 * t1557;
+  real t1562 = t1547 + t926 * t1557;
+  real t1565 = t1552 + t932 * t1557;
+  real t1567 = t963 * t1557;
+  real t1570 = t1549 + t938 * t1557;
+  real t1575 = H[20] * t1559 - (H[16] * t1562 + (H[12] * t1565 + (H[4] * t1567 + H[8] * t1570)));
+  real t1576 = t904 * t1575;
+  real t1582 = t1059 * t1389 + t1047 * t1402;
+  real t1594 = t1067 * t1387 + t1046 * t1417;
+  real t1600 = t1541 * t1337 + t1023 * (t1535 * t1322 - t1005 * t1582 - (t1072 * t1301 + t1003 *
+    t1429 + (t1537 * t1306 + t1012 * t1594)));
+  real t1603 = t1582 + (t1542 * t1322 + t1005 * t1600);
+  real t1613 = t1594 + (t1542 * t1306 + t1012 * t1600);
+  real t1619 = t1542 * t1353 + t1033 * t1600;
+  real t1627 = t1429 + (t1542 * t1301 + t1003 * t1600);
+  real t1633 = t1556 * t1200 + t950 * (t1544 * t1185 - t928 * t1603 - (t1552 * t1175 + t932 * t1613
+    + (t1549 * t1162 + t938 * t1619) + (t1547 * t1157 + t926 * t1627)));
+  real t1636 = t1603 + (t1557 * t1185 + t928 * t1633);
+  real t1643 = t1619 + (t1557 * t1162 + t938 * t1633);
+  real t1649 = t1557 * t1216 + t963 * t1633;
+  real t1657 = t1613 + (t1557 * t1175 + t932 * t1633);
+  real t1665 = t1627 + (t1557 * t1157 + t926 * t1633);
+  real t1671 = t1575 * t1125 + t904 * (t1559 * d_H[20] - H[20] * t1636 - (t1570 * d_H[8] + H[8] *
+    t1643 + (t1567 * d_H[4] + H[4] * t1649) + (t1565 * d_H[12] + H[12] * t1657) + (t1562 * d_H[16] +
+    H[16] * t1665)));
+  d_W[30] = -(t1576 * t1114 + t908 * t1671);
+  d_W[31] = -(t1649 + (t1576 * d_H[4] + H[4] * t1671));
+  d_W[32] = -(t1643 + (t1576 * d_H[8] + H[8] * t1671));
+  d_W[33] = -(t1657 + (t1576 * d_H[12] + H[12] * t1671));
+  d_W[34] = -(t1665 + (t1576 * d_H[16] + H[16] * t1671));
+  d_W[35] = -(t1636 + (t1576 * d_H[20] + H[20] * t1671));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_complement_slope_inputs[] = {
-    {"H", 24, "", 0, 0},
-    {"d_H", 24, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_complement_slope, (in[0], in[1], out[0]))
 
 /* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -12600,45 +3434,14 @@ static const mstmm_port mstmm_sweep_generic4_complement_slope_outputs[] = {
  * in  d_z[4] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic4_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+int mstmm_sweep_generic4_add_known_part_slope(in_t y, in_t z, in_t d_y, in_t d_z, out_t d_l)
 {
-    const real t0 = z[3] * d_y[3];
-    const real t1 = y[3] * d_z[3];
-    const real t2 = t0 + t1;
-    const real t3 = z[2] * d_y[2];
-    const real t4 = y[2] * d_z[2];
-    const real t5 = t3 + t4;
-    const real t6 = z[1] * d_y[1];
-    const real t7 = y[1] * d_z[1];
-    const real t8 = t6 + t7;
-    const real t9 = z[0] * d_y[0];
-    const real t10 = y[0] * d_z[0];
-    const real t11 = t9 + t10;
-    const real t12 = t8 + t11;
-    const real t13 = t5 + t12;
-    const real t14 = t2 + t13;
-    const real t15 = -t14;
-    d_l[0] += t15;
-    return 0;
+  d_l[0] += -(z[3] * d_y[3] + y[3] * d_z[3] + (z[2] * d_y[2] + y[2] * d_z[2] + (z[1] * d_y[1] + y[1]
+    * d_z[1] + (z[0] * d_y[0] + y[0] * d_z[0]))));
+  return 0;
 }
 
-static int mstmm_sweep_generic4_add_known_part_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_add_known_part_slope_inputs[] = {
-    {"y", 4, "", 0, 0},
-    {"z", 4, "", 0, 0},
-    {"d_y", 4, "", 0, 0},
-    {"d_z", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_add_known_part_slope_outputs[] = {
-    {"d_l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_add_known_part_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -12649,437 +3452,209 @@ static const mstmm_port mstmm_sweep_generic4_add_known_part_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[4] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic4_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+int mstmm_sweep_generic4_add_multiplier_effort_slope(in_t y, in_t x, in_t d_y, in_t d_x,
+    out_t d_y_0)
 {
-    const real t0 = x[0] * d_y[0];
-    const real t1 = y[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_y_0[0] += t2;
-    const real t3 = y[1] * d_x[0];
-    const real t4 = x[0] * d_y[1];
-    const real t5 = t3 + t4;
-    d_y_0[1] += t5;
-    const real t6 = y[2] * d_x[0];
-    const real t7 = x[0] * d_y[2];
-    const real t8 = t6 + t7;
-    d_y_0[2] += t8;
-    const real t9 = y[3] * d_x[0];
-    const real t10 = x[0] * d_y[3];
-    const real t11 = t9 + t10;
-    d_y_0[3] += t11;
-    return 0;
+  d_y_0[0] += x[0] * d_y[0] + y[0] * d_x[0];
+  d_y_0[1] += y[1] * d_x[0] + x[0] * d_y[1];
+  d_y_0[2] += y[2] * d_x[0] + x[0] * d_y[2];
+  d_y_0[3] += y[3] * d_x[0] + x[0] * d_y[3];
+  return 0;
 }
 
-static int mstmm_sweep_generic4_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic4_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_slope_inputs[] = {
-    {"y", 4, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_y", 4, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic4_add_multiplier_effort_slope_outputs[] = {
-    {"d_y_0", 4, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic4_add_multiplier_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic4_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic4_forward,
-        .call = mstmm_sweep_generic4_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_forward_inputs,
-        .outputs = mstmm_sweep_generic4_forward_outputs,
-        .ir_hash = "cc41e1c59a046592b3e7df4e8d6c78dc0c762877710b9a3dcf2e783e3095a0d7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic4_condense,
-        .call = mstmm_sweep_generic4_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic4_condense_inputs,
-        .outputs = mstmm_sweep_generic4_condense_outputs,
-        .ir_hash = "ec8a46e24756d0c724b9b681c70c98eab52d97ed8e813723e256f37b1a69ed34",
-        .n_guards = 12,
-        .guards = mstmm_sweep_generic4_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic4_recover,
-        .call = mstmm_sweep_generic4_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_recover_inputs,
-        .outputs = mstmm_sweep_generic4_recover_outputs,
-        .ir_hash = "811443bac131a944d439792f80dc362aacc6cf2fcba9a35696d15553969ff71f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic4_effort,
-        .call = mstmm_sweep_generic4_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_effort_inputs,
-        .outputs = mstmm_sweep_generic4_effort_outputs,
-        .ir_hash = "c73980464a98ffcc019d5db0035a2b805adc4ea208dbd72af8373a97a524ce18",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic4_project,
-        .call = mstmm_sweep_generic4_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_project_inputs,
-        .outputs = mstmm_sweep_generic4_project_outputs,
-        .ir_hash = "1c99162a137363764b4ab6c111c45dec5eb6ba47731bb813958fee177ad920f6",
-        .n_guards = 4,
-        .guards = mstmm_sweep_generic4_project_guards,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic4_factor,
-        .call = mstmm_sweep_generic4_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_factor_inputs,
-        .outputs = mstmm_sweep_generic4_factor_outputs,
-        .ir_hash = "565f2506ff9664282161146c2231e6fab4e18663a4251790a90f34504f77b160",
-        .n_guards = 8,
-        .guards = mstmm_sweep_generic4_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic4_column_load,
-        .call = mstmm_sweep_generic4_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_column_load_inputs,
-        .outputs = mstmm_sweep_generic4_column_load_outputs,
-        .ir_hash = "3747c9da81d336d97961cf7d4d80a5eb0512ca380c3f81c933cacae96569e181",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic4_column_acceleration,
-        .call = mstmm_sweep_generic4_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic4_column_acceleration_outputs,
-        .ir_hash = "eaf15a0d25582206e9368be4fcdd5530180293fa16706c213ec48dafb2ff7658",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic4_qr_eliminate,
-        .call = mstmm_sweep_generic4_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic4_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic4_qr_eliminate_outputs,
-        .ir_hash = "4391442b2a4276818b1569c0eaf5f1c73a79eaed2b596fc2ea657e746b202c90",
-        .n_guards = 8,
-        .guards = mstmm_sweep_generic4_qr_eliminate_guards,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_carrier,
-        .call = mstmm_sweep_generic4_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_carrier_outputs,
-        .ir_hash = "6221f1959af2f3075fe95648cdc25c4ee1b586fff064d4dcb8c91a47210e95a6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_column,
-        .call = mstmm_sweep_generic4_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_column_outputs,
-        .ir_hash = "4f04ea6e9bd4a37cffbacfafae8d6162fc6e82ec033f9e5782080c6e8e245d8f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_coordinate_change",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_coordinate_change,
-        .call = mstmm_sweep_generic4_tangent_coordinate_change_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_coordinate_change_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_coordinate_change_outputs,
-        .ir_hash = "e50230bef119a8f5105494fcc17894830da1d46034b62c9a335874bc1e3b59b0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_steady",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_steady,
-        .call = mstmm_sweep_generic4_tangent_steady_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_tangent_steady_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_steady_outputs,
-        .ir_hash = "c78d3ae3c154b3ca014eba3a1bf953327fad40f60a4752a52c8fb365853356d9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rotational",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_rotational,
-        .call = mstmm_sweep_generic4_tangent_rotational_call,
-        .n_inputs = 9,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_tangent_rotational_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_rotational_outputs,
-        .ir_hash = "e0def501d8f1db85e52b0bc61abc35de0e7200d84de65b5e9ef1cb1fefac56f4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rows",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_rows,
-        .call = mstmm_sweep_generic4_tangent_rows_call,
-        .n_inputs = 4,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic4_tangent_rows_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_rows_outputs,
-        .ir_hash = "7fe0d87f543132efd6863ae5691c5f9eebd230b437478a20f1f795d7666c521c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_reduce",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_reduce,
-        .call = mstmm_sweep_generic4_tangent_reduce_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_tangent_reduce_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_reduce_outputs,
-        .ir_hash = "922d3c7db1efcfa0028e49714bf7c581c65b522a63a735942b780aa826650db6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_load,
-        .call = mstmm_sweep_generic4_tangent_load_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_load_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_load_outputs,
-        .ir_hash = "c693945947e8b986ea0709a5afe9f8068dce07b3bea5581154e6102c45205897",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_solution,
-        .call = mstmm_sweep_generic4_tangent_solution_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_solution_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_solution_outputs,
-        .ir_hash = "17f87f0d0b562be1566d72dc5e3c824fc55f10bab3c6672f00ba7d703d9d85ce",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_load_with_increments,
-        .call = mstmm_sweep_generic4_tangent_load_with_increments_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_load_with_increments_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_load_with_increments_outputs,
-        .ir_hash = "d8103a48a916f288b72554d991be651e39a2b099580f99f61065bcfb9c35b3f4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic4_tangent_solution_with_increments,
-        .call = mstmm_sweep_generic4_tangent_solution_with_increments_call,
-        .n_inputs = 10,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic4_tangent_solution_with_increments_inputs,
-        .outputs = mstmm_sweep_generic4_tangent_solution_with_increments_outputs,
-        .ir_hash = "1297eb9b7f2c249b1fd185136568630b4cd407ce5be342dd9410e731408ea82e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic4_complement,
-        .call = mstmm_sweep_generic4_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_complement_inputs,
-        .outputs = mstmm_sweep_generic4_complement_outputs,
-        .ir_hash = "18756b563fdfe920c11b467926c35ffaf49f472a4d96003d6faa1e491f862b4c",
-        .n_guards = 4,
-        .guards = mstmm_sweep_generic4_complement_guards,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_generic4_divide,
-        .call = mstmm_sweep_generic4_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_divide_inputs,
-        .outputs = mstmm_sweep_generic4_divide_outputs,
-        .ir_hash = "d412bc57141346b00ef731b566f58b4ed764b35781ac07dc44e2d809144e3db6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_generic4_couple,
-        .call = mstmm_sweep_generic4_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_couple_inputs,
-        .outputs = mstmm_sweep_generic4_couple_outputs,
-        .ir_hash = "61c61110bf81c1ae2d76025b43b6ffced2a1b7aebc7d262da84f2f8cccc1299a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_generic4_add_known_part,
-        .call = mstmm_sweep_generic4_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_add_known_part_inputs,
-        .outputs = mstmm_sweep_generic4_add_known_part_outputs,
-        .ir_hash = "79f457836cfbf2a3bb17b16001a54a1c2f1329a6795ed0254057b8ae31a449f8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_generic4_add_multiplier_effort,
-        .call = mstmm_sweep_generic4_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_generic4_add_multiplier_effort_outputs,
-        .ir_hash = "ae01e743425c1d0db12cd25d232e15516dcbaefdf9d9ea82cf477c15d2b28381",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_load",
-        .function = (void (*)(void))mstmm_sweep_generic4_required_load,
-        .call = mstmm_sweep_generic4_required_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_required_load_inputs,
-        .outputs = mstmm_sweep_generic4_required_load_outputs,
-        .ir_hash = "18ce0792463fc5a9105f626d4830f801736029518de30ddbd9cdcbb812069b7d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_generic4_ground_column_load,
-        .call = mstmm_sweep_generic4_ground_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_ground_column_load_inputs,
-        .outputs = mstmm_sweep_generic4_ground_column_load_outputs,
-        .ir_hash = "86c1b21009c414880d7bb4097eaeb4466d9b68d60ac2184b1dbdc40ff1fcd9a0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_forward_slope,
-        .call = mstmm_sweep_generic4_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic4_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic4_forward_slope_outputs,
-        .ir_hash = "60ab7cd53ba6fc78bda9d63456b533bcdbcc1c3f9b2bfb88db51e761213b4ac1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_effort_slope,
-        .call = mstmm_sweep_generic4_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic4_effort_slope_outputs,
-        .ir_hash = "8ef138b5e5ffe8291b439bd59a67bf6fbc0829f031f23e332c198b12306fe36c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_complement_slope,
-        .call = mstmm_sweep_generic4_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic4_complement_slope_outputs,
-        .ir_hash = "3100eef7b95d8f53057d435a9f7e094ffafda08c4b0a25e510fc7c2761f9a546",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_add_known_part_slope,
-        .call = mstmm_sweep_generic4_add_known_part_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_add_known_part_slope_inputs,
-        .outputs = mstmm_sweep_generic4_add_known_part_slope_outputs,
-        .ir_hash = "83dd93563cd44500c04804cea887ce433cc40aeaefbce59832df836b47ff8036",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic4_add_multiplier_effort_slope,
-        .call = mstmm_sweep_generic4_add_multiplier_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic4_add_multiplier_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic4_add_multiplier_effort_slope_outputs,
-        .ir_hash = "6c357a1a78f20728c9d1470251324705795e5e5b2bfe446cd750ddea3b9b22c1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic4_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 24, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 4, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "2c528edf2613d2afc00ca0d5b878ffcbfa139d1e7d83c90c04d135095dca76c8", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic4_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"J", 4, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 4, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 24, "", 0, 0}, {"g", 4, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "ca65a6ba487351291cf68baaab07e518f7930d06ea7697c2127ddbf539181de8", 12, (const
+    mstmm_guard[]){{1, "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 4 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic4_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"G", 24, "", 0, 0}, {"g", 4, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 4, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "f26076dba495b9e0497f9a54e9d0adbb5504ca6d358ca16a0a2d7639becee027", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic4_effort), 2, 1, (const mstmm_port[]){{"H", 24, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 4, "N, N*m", 0, 0}},
+    "c6dd614f9891db2b71dc374b9ed1021edf2ed69e244f50a1c57e1919b2361c85", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic4_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 4, "", 0, 0}},
+    "974ced1150ddd6a23704aa2a8d96c1e690cb249e9ef9362776278f512f8b99d7", 4, (const mstmm_guard[]){{1,
+    "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"}}},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic4_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"J", 4, "kg*m2 or kg", 0, 0}, {"W", 16, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 16, "", 0,
+    0}, {"G", 24, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "304bd5894b62b032e744c1f9cc794be3ea580d774dbfec8370f2ea23c3a10922", 8, (const mstmm_guard[]){{1,
+    "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 4 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic4_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"G", 24, "", 0,
+    0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 4, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 4,
+    "N, N*m", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "6660f913388023d22036ddf2f8e77afed59b0c8678504f7f607161603b2aa8c5", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic4_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"F", 16, "", 0,
+    0}, {"G", 24, "", 0, 0}, {"y", 4, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 4, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "fc27f3f0fe7842a26faa49a547995036f8245f3cff97dbb3b793062256e79046", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic4_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 24, "", 0, 0}, {"J", 4, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 4, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 24, "", 0, 0}, {"g", 4, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "167d1ad8a8bbdd8d12124b8697c7d8252336ebf205c62a0950a7470c2f582a84", 8, (const mstmm_guard[]){{1,
+    "speed 1 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 4 moves no inertia: its acceleration is undetermined"}, {1,
+    "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"}}},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 24, "", 0, 0}, {"s", 4, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "f74bcf9e4cf1a4143863b6b4fbda7afeedb5d52b4948bbbf36f6c9a6c5c7ff42", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 24, "", 0, 0}, {"s", 4, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 24, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    4, "", 0, 0}, {"J", 4, "kg*m2 or kg", 0, 0}, {"laws", 4, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 4, "", 0, 0}},
+    "d5b6d113430e7059dbfca402b368be340d4fea3ebf2a9e5547afcf195258d756", 0, NULL},
+  {"tangent_coordinate_change", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_coordinate_change), 2,
+    2, (const mstmm_port[]){{"H", 24, "", 0, 0}, {"d_q", 4, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "aec18eef55cd2de52584b81c0d24a7e4c240db75f24e84ef27ba077a2b8ff0f1", 0, NULL},
+  {"tangent_steady", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_steady), 11, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 24, "", 0, 0}, {"v", 3, "", 0,
+    0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 4, "", 0, 0},
+    {"d_s", 4, "", 0, 0}, {"J", 4, "kg*m2 or kg", 0, 0}, {"laws", 4, "", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 4, "", 0, 0}},
+    "069cb186f454830a0be1313c195757df5deca2d92e9974902fe0d6379c277e54", 0, NULL},
+  {"tangent_rotational", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_rotational), 9, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"H", 24, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 4, "", 0, 0}, {"d_s", 4, "", 0, 0}, {"J", 4,
+    "kg*m2 or kg", 0, 0}, {"laws", 4, "", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6,
+    "", 0, 0}, {"row", 4, "", 0, 0}},
+    "c82c04ed2f3c391c98b8cdb9943c005b5e86e94d054d16f7b103689aecbec3b5", 0, NULL},
+  {"tangent_rows", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_rows), 4, 4, (const
+    mstmm_port[]){{"H", 24, "", 0, 0}, {"B", 36, "", 0, 0}, {"W", 16, "", 0, 0}, {"S", 54, "", 0,
+    0}}, (const mstmm_port[]){{"K", 24, "", 0, 0}, {"right", 36, "", 0, 0}, {"D", 16, "", 0, 0},
+    {"one", 16, "", 0, 0}}, "2a497b0307fe8ca5d49dfb54c64fb88ed2dac43eeb0968e56e485ea515aed4bd", 0,
+    NULL},
+  {"tangent_reduce", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_reduce), 4, 3, (const
+    mstmm_port[]){{"inverse", 16, "", 0, 0}, {"right", 36, "", 0, 0}, {"K", 24, "", 0, 0}, {"G", 24,
+    "", 0, 0}}, (const mstmm_port[]){{"gain", 36, "", 0, 0}, {"V", 24, "", 0, 0}, {"S", 54, "", 1,
+    0}}, "5188d1416eb80503f20fdb6071b391983a57ad4faf1e43f66ee9e0706121d22e", 0, NULL},
+  {"tangent_load", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_load), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"V", 24, "", 0,
+    0}, {"inverse", 16, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 4, "", 0, 0}}, (const
+    mstmm_port[]){{"y", 4, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "9aa5d735ff9de5aec24f9060c4448065ffc75ac23678f5a0b9d386162a0566a4", 0, NULL},
+  {"tangent_solution", MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_solution), 9, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 36, "", 0, 0}, {"gain", 36,
+    "", 0, 0}, {"y", 4, "", 0, 0}}, (const mstmm_port[]){{"x", 4, "", 0, 0}, {"z", 9, "", 0, 0}},
+    "e88185dfa52e98ce5e4d9af8a2ea29279ee9394f4969799549eb54281edba19d", 0, NULL},
+  {"tangent_load_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_load_with_increments), 8, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 24, "", 0, 0}, {"V", 24, "", 0,
+    0}, {"inverse", 16, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 4, "", 0, 0}, {"e_b", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 4, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "6b229d2af4ef38276e1680037d5a27b763190c50546ada40700ca6830f84446c", 0, NULL},
+  {"tangent_solution_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic4_tangent_solution_with_increments), 10, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 36, "", 0, 0}, {"gain", 36,
+    "", 0, 0}, {"y", 4, "", 0, 0}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"x", 4, "", 0, 0},
+    {"z", 9, "", 0, 0}}, "6db608b75b3b543c908100c083a2630361aba20eea2f9079275e8347d7154d9d", 0,
+    NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic4_complement), 1, 1, (const mstmm_port[]){{"H",
+    24, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "01ad998e5f84a55aef54ff85468761641e0b7d58999ca4933e3514fb23effe72", 4, (const mstmm_guard[]){{1,
+    "pivot 1 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 4 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 4 vanishes: a motion of the hinge is undetermined"}}},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_generic4_divide), 2, 1, (const mstmm_port[]){{"F", 16, "",
+    0, 0}, {"y", 4, "", 0, 0}}, (const mstmm_port[]){{"z", 4, "", 0, 0}},
+    "c50f52c8d86c9762c5968428b023bb44b3bb82a669094955b0fa0f06fa117485", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_generic4_couple), 2, 1, (const mstmm_port[]){{"y", 4, "",
+    0, 0}, {"z", 4, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "d5b6e57286fcf3f98ae5123b9a4f2ee6bb52f2a6690bdc13d5c45b564bd81e30", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_generic4_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 4, "", 0, 0}, {"z", 4, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "fa42b63150a0faab26cc77b7d8fa31192d028e9c9d415b7eed9b857e1e5b8e31", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_generic4_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 4, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    4, "", 1, 0}}, "0d46e5c054197b78433d893d4de01d8a11414dbec8280b581d446a4127c25688", 0, NULL},
+  {"required_load", MSTMM_FUNCTIONS(mstmm_sweep_generic4_required_load), 3, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"H", 24, "", 0, 0}, {"udot", 4, "", 0, 0}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "a73b37ff0286e8b69331423767c97f4f4b3f1f8c7ee27040e2e76e6fe89f72bb", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic4_ground_column_load), 3, 1, (const
+    mstmm_port[]){{"H", 24, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 4, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"y", 4, "N, N*m", 0, 0}},
+    "6da14374bc762e31a16fa5291e66c694504bd6aacb421d898c5314efba060c67", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic4_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 24, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 4, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 24, "", 0,
+    0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 4, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "e2569bcbbd51f7a99944bfee6e54a1b594d6e0ebae30510bfc0ef1771c59dbe0",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic4_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 24, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 24, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 4, "N, N*m", 0, 0}},
+    "72fb3993826aede955d4524f17bdf8a6577f882b9507945329e26a6cb56bfafe", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic4_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 24, "", 0, 0}, {"d_H", 24, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "",
+    0, 0}}, "f281624565db33aafe0ce59379eac54d17b48b9b3ca16f12fab90eb66e11b4d2", 0, NULL},
+  {"add_known_part_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic4_add_known_part_slope), 4, 1, (const
+    mstmm_port[]){{"y", 4, "", 0, 0}, {"z", 4, "", 0, 0}, {"d_y", 4, "", 0, 0}, {"d_z", 4, "", 0,
+    0}}, (const mstmm_port[]){{"d_l", 1, "", 1, 0}},
+    "afbe7fbb8da75c71788b88f72e747b124c649092ff46847f0ca5cacd03750b44", 0, NULL},
+  {"add_multiplier_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic4_add_multiplier_effort_slope),
+    4, 1, (const mstmm_port[]){{"y", 4, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_y", 4, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_y_0", 4, "", 1, 0}},
+    "731b1ffa5bbdd9fdd8f51c554bbd714a040193dee91d78ea3d526f97e9e94156", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic4 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic4",
-    .hash = "8e6d24944ff653e5a3c9cd0589974a151dbb84ec8ef0d21b58def6293678d4ef",
+    .hash = "d348d091e637c438a4a48cb323189fcb262b6af9b81fcb033d7f27c1b601799c",
     .nq = 0,
     .nu = 0,
     .np = 0,

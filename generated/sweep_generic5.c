@@ -10,105 +10,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic5;
-int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic5_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic5_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic5_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic5_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic5_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic5_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic5_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x);
-int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row);
-int mstmm_sweep_generic5_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
-int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one);
-int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S);
-int mstmm_sweep_generic5_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic5_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic5_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z);
-int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic5_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_generic5_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_generic5_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic5_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y);
-int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic5_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-int mstmm_sweep_generic5_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic5_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -127,8 +28,6 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 #endif
 
 /* bias motion outboard of a hinge with 5 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -143,303 +42,70 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic5_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic5_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = H[15] * s[0];
-    const real t87 = H[16] * s[1];
-    const real t88 = t86 + t87;
-    const real t89 = H[17] * s[2];
-    const real t90 = t88 + t89;
-    const real t91 = H[18] * s[3];
-    const real t92 = t90 + t91;
-    const real t93 = H[19] * s[4];
-    const real t94 = t92 + t93;
-    const real t95 = c[3] + t94;
-    const real t96 = w[2] * t73;
-    const real t97 = w[1] * t79;
-    const real t98 = t96 - t97;
-    const real t99 = t95 + t98;
-    const real t100 = t85 + t99;
-    motion[3] = t100;
-    const real t101 = motion_I[3] * t9;
-    const real t102 = motion_I[4] * t24;
-    const real t103 = t101 + t102;
-    const real t104 = motion_I[5] * t39;
-    const real t105 = t103 + t104;
-    const real t106 = H[20] * s[0];
-    const real t107 = H[21] * s[1];
-    const real t108 = t106 + t107;
-    const real t109 = H[22] * s[2];
-    const real t110 = t108 + t109;
-    const real t111 = H[23] * s[3];
-    const real t112 = t110 + t111;
-    const real t113 = H[24] * s[4];
-    const real t114 = t112 + t113;
-    const real t115 = c[4] + t114;
-    const real t116 = w[0] * t79;
-    const real t117 = w[2] * t67;
-    const real t118 = t116 - t117;
-    const real t119 = t115 + t118;
-    const real t120 = t105 + t119;
-    motion[4] = t120;
-    const real t121 = motion_I[3] * t14;
-    const real t122 = motion_I[4] * t29;
-    const real t123 = t121 + t122;
-    const real t124 = motion_I[5] * t44;
-    const real t125 = t123 + t124;
-    const real t126 = H[25] * s[0];
-    const real t127 = H[26] * s[1];
-    const real t128 = t126 + t127;
-    const real t129 = H[27] * s[2];
-    const real t130 = t128 + t129;
-    const real t131 = H[28] * s[3];
-    const real t132 = t130 + t131;
-    const real t133 = H[29] * s[4];
-    const real t134 = t132 + t133;
-    const real t135 = c[5] + t134;
-    const real t136 = w[1] * t67;
-    const real t137 = w[0] * t73;
-    const real t138 = t136 - t137;
-    const real t139 = t135 + t138;
-    const real t140 = t125 + t139;
-    motion[5] = t140;
-    const real t141 = motion_I[0] * motion_I[1];
-    const real t142 = t141 - motion_I[5];
-    const real t143 = t56 * t142;
-    const real t144 = motion_I[1] * motion_I[1];
-    const real t145 = motion_I[2] * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t50 * t146;
-    const real t148 = t143 - t147;
-    const real t149 = motion_I[0] * motion_I[2];
-    const real t150 = motion_I[4] + t149;
-    const real t151 = t62 * t150;
-    const real t152 = t148 + t151;
-    const real t153 = motion_I[6] + t152;
-    const real t154 = t4 * t153;
-    const real t155 = motion_I[5] + t141;
-    const real t156 = t50 * t155;
-    const real t157 = motion_I[0] * motion_I[0];
-    const real t158 = t145 + t157;
-    const real t159 = t56 * t158;
-    const real t160 = t156 - t159;
-    const real t161 = motion_I[1] * motion_I[2];
-    const real t162 = t161 - motion_I[3];
-    const real t163 = t62 * t162;
-    const real t164 = t160 + t163;
-    const real t165 = motion_I[7] + t164;
-    const real t166 = t19 * t165;
-    const real t167 = t154 + t166;
-    const real t168 = t149 - motion_I[4];
-    const real t169 = t50 * t168;
-    const real t170 = motion_I[3] + t161;
-    const real t171 = t56 * t170;
-    const real t172 = t169 + t171;
-    const real t173 = t144 + t157;
-    const real t174 = t62 * t173;
-    const real t175 = t172 - t174;
-    const real t176 = motion_I[8] + t175;
-    const real t177 = t34 * t176;
-    const real t178 = t167 + t177;
-    const real t179 = H[0] * s[0];
-    const real t180 = H[1] * s[1];
-    const real t181 = t179 + t180;
-    const real t182 = H[2] * s[2];
-    const real t183 = t181 + t182;
-    const real t184 = H[3] * s[3];
-    const real t185 = t183 + t184;
-    const real t186 = H[4] * s[4];
-    const real t187 = t185 + t186;
-    const real t188 = c[0] + t187;
-    const real t189 = v[2] * t73;
-    const real t190 = 2.0 * t189;
-    const real t191 = v[1] * t79;
-    const real t192 = 2.0 * t191;
-    const real t193 = t190 - t192;
-    const real t194 = t188 + t193;
-    const real t195 = t178 + t194;
-    motion[6] = t195;
-    const real t196 = t9 * t153;
-    const real t197 = t24 * t165;
-    const real t198 = t196 + t197;
-    const real t199 = t39 * t176;
-    const real t200 = t198 + t199;
-    const real t201 = H[5] * s[0];
-    const real t202 = H[6] * s[1];
-    const real t203 = t201 + t202;
-    const real t204 = H[7] * s[2];
-    const real t205 = t203 + t204;
-    const real t206 = H[8] * s[3];
-    const real t207 = t205 + t206;
-    const real t208 = H[9] * s[4];
-    const real t209 = t207 + t208;
-    const real t210 = c[1] + t209;
-    const real t211 = v[0] * t79;
-    const real t212 = 2.0 * t211;
-    const real t213 = v[2] * t67;
-    const real t214 = 2.0 * t213;
-    const real t215 = t212 - t214;
-    const real t216 = t210 + t215;
-    const real t217 = t200 + t216;
-    motion[7] = t217;
-    const real t218 = t14 * t153;
-    const real t219 = t29 * t165;
-    const real t220 = t218 + t219;
-    const real t221 = t44 * t176;
-    const real t222 = t220 + t221;
-    const real t223 = H[10] * s[0];
-    const real t224 = H[11] * s[1];
-    const real t225 = t223 + t224;
-    const real t226 = H[12] * s[2];
-    const real t227 = t225 + t226;
-    const real t228 = H[13] * s[3];
-    const real t229 = t227 + t228;
-    const real t230 = H[14] * s[4];
-    const real t231 = t229 + t230;
-    const real t232 = c[2] + t231;
-    const real t233 = v[1] * t67;
-    const real t234 = 2.0 * t233;
-    const real t235 = v[0] * t73;
-    const real t236 = 2.0 * t235;
-    const real t237 = t234 - t236;
-    const real t238 = t232 + t237;
-    const real t239 = t222 + t238;
-    motion[8] = t239;
-    return 0;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + (H[15] * s[0] +
+    H[16] * s[1] + H[17] * s[2] + H[18] * s[3] + H[19] * s[4]) + (w[2] * t73 - w[1] * t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + (H[20] * s[0] +
+    H[21] * s[1] + H[22] * s[2] + H[23] * s[3] + H[24] * s[4]) + (w[0] * t79 - w[2] * t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + (H[25] * s[0] +
+    H[26] * s[1] + H[27] * s[2] + H[28] * s[3] + H[29] * s[4]) + (w[1] * t67 - w[0] * t73));
+  real t141 = motion_I[0] * motion_I[1];
+  real t144 = motion_I[1] * motion_I[1];
+  real t145 = motion_I[2] * motion_I[2];
+  real t149 = motion_I[0] * motion_I[2];
+  real t153 = motion_I[6] + (t56 * (t141 - motion_I[5]) - t50 * (t144 + t145) + t62 * (motion_I[4] +
+    t149));
+  real t157 = motion_I[0] * motion_I[0];
+  real t161 = motion_I[1] * motion_I[2];
+  real t165 = motion_I[7] + (t50 * (motion_I[5] + t141) - t56 * (t145 + t157) + t62 * (t161 -
+    motion_I[3]));
+  real t176 = motion_I[8] + (t50 * (t149 - motion_I[4]) + t56 * (motion_I[3] + t161) - t62 * (t144 +
+    t157));
+  motion[6] = t4 * t153 + t19 * t165 + t34 * t176 + (c[0] + (H[0] * s[0] + H[1] * s[1] + H[2] * s[2]
+    + H[3] * s[3] + H[4] * s[4]) + (2.0 * (v[2] * t73) - 2.0 * (v[1] * t79)));
+  motion[7] = t9 * t153 + t24 * t165 + t39 * t176 + (c[1] + (H[5] * s[0] + H[6] * s[1] + H[7] * s[2]
+    + H[8] * s[3] + H[9] * s[4]) + (2.0 * (v[0] * t79) - 2.0 * (v[2] * t67)));
+  motion[8] = t14 * t153 + t29 * t165 + t44 * t176 + (c[2] + (H[10] * s[0] + H[11] * s[1] + H[12] *
+    s[2] + H[13] * s[3] + H[14] * s[4]) + (2.0 * (v[1] * t67) - 2.0 * (v[0] * t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 5, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with 5 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the free coordinates
@@ -453,1821 +119,347 @@ static const mstmm_port mstmm_sweep_generic5_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic5_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[5] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[5] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[10] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[15] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[20] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[25] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[5] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[5] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[10] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[15] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[20] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[25] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[10] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[5] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[10] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[15] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[20] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[25] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[15] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[5] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[10] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[15] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[20] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[25] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[20] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[5] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[10] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[15] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[20] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[25] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[25] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t79 = H[1] * S[0];
-    const real t80 = H[6] * S[1];
-    const real t81 = t79 + t80;
-    const real t82 = H[11] * S[2];
-    const real t83 = t81 + t82;
-    const real t84 = H[16] * S[3];
-    const real t85 = t83 + t84;
-    const real t86 = H[21] * S[4];
-    const real t87 = t85 + t86;
-    const real t88 = H[26] * S[5];
-    const real t89 = t87 + t88;
-    const real t90 = H[1] * t89;
-    const real t91 = H[1] * S[1];
-    const real t92 = H[6] * S[6];
-    const real t93 = t91 + t92;
-    const real t94 = H[11] * S[7];
-    const real t95 = t93 + t94;
-    const real t96 = H[16] * S[8];
-    const real t97 = t95 + t96;
-    const real t98 = H[21] * S[9];
-    const real t99 = t97 + t98;
-    const real t100 = H[26] * S[10];
-    const real t101 = t99 + t100;
-    const real t102 = H[6] * t101;
-    const real t103 = t90 + t102;
-    const real t104 = H[1] * S[2];
-    const real t105 = H[6] * S[7];
-    const real t106 = t104 + t105;
-    const real t107 = H[11] * S[11];
-    const real t108 = t106 + t107;
-    const real t109 = H[16] * S[12];
-    const real t110 = t108 + t109;
-    const real t111 = H[21] * S[13];
-    const real t112 = t110 + t111;
-    const real t113 = H[26] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = H[11] * t114;
-    const real t116 = t103 + t115;
-    const real t117 = H[1] * S[3];
-    const real t118 = H[6] * S[8];
-    const real t119 = t117 + t118;
-    const real t120 = H[11] * S[12];
-    const real t121 = t119 + t120;
-    const real t122 = H[16] * S[15];
-    const real t123 = t121 + t122;
-    const real t124 = H[21] * S[16];
-    const real t125 = t123 + t124;
-    const real t126 = H[26] * S[17];
-    const real t127 = t125 + t126;
-    const real t128 = H[16] * t127;
-    const real t129 = t116 + t128;
-    const real t130 = H[1] * S[4];
-    const real t131 = H[6] * S[9];
-    const real t132 = t130 + t131;
-    const real t133 = H[11] * S[13];
-    const real t134 = t132 + t133;
-    const real t135 = H[16] * S[16];
-    const real t136 = t134 + t135;
-    const real t137 = H[21] * S[18];
-    const real t138 = t136 + t137;
-    const real t139 = H[26] * S[19];
-    const real t140 = t138 + t139;
-    const real t141 = H[21] * t140;
-    const real t142 = t129 + t141;
-    const real t143 = H[1] * S[5];
-    const real t144 = H[6] * S[10];
-    const real t145 = t143 + t144;
-    const real t146 = H[11] * S[14];
-    const real t147 = t145 + t146;
-    const real t148 = H[16] * S[17];
-    const real t149 = t147 + t148;
-    const real t150 = H[21] * S[19];
-    const real t151 = t149 + t150;
-    const real t152 = H[26] * S[20];
-    const real t153 = t151 + t152;
-    const real t154 = H[26] * t153;
-    const real t155 = t142 + t154;
-    const real t156 = J[1] + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * t89;
-    const real t159 = H[5] * t101;
-    const real t160 = t158 + t159;
-    const real t161 = H[10] * t114;
-    const real t162 = t160 + t161;
-    const real t163 = H[15] * t127;
-    const real t164 = t162 + t163;
-    const real t165 = H[20] * t140;
-    const real t166 = t164 + t165;
-    const real t167 = H[25] * t153;
-    const real t168 = t166 + t167;
-    const real t169 = 1.0 / t77;
-    const real t170 = t168 * t169;
-    const real t171 = t168 * t170;
-    const real t172 = t156 - t171;
-    const real t173 = t157 < t172;
-    if (!(t173 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t174 = H[2] * S[0];
-    const real t175 = H[7] * S[1];
-    const real t176 = t174 + t175;
-    const real t177 = H[12] * S[2];
-    const real t178 = t176 + t177;
-    const real t179 = H[17] * S[3];
-    const real t180 = t178 + t179;
-    const real t181 = H[22] * S[4];
-    const real t182 = t180 + t181;
-    const real t183 = H[27] * S[5];
-    const real t184 = t182 + t183;
-    const real t185 = H[2] * t184;
-    const real t186 = H[2] * S[1];
-    const real t187 = H[7] * S[6];
-    const real t188 = t186 + t187;
-    const real t189 = H[12] * S[7];
-    const real t190 = t188 + t189;
-    const real t191 = H[17] * S[8];
-    const real t192 = t190 + t191;
-    const real t193 = H[22] * S[9];
-    const real t194 = t192 + t193;
-    const real t195 = H[27] * S[10];
-    const real t196 = t194 + t195;
-    const real t197 = H[7] * t196;
-    const real t198 = t185 + t197;
-    const real t199 = H[2] * S[2];
-    const real t200 = H[7] * S[7];
-    const real t201 = t199 + t200;
-    const real t202 = H[12] * S[11];
-    const real t203 = t201 + t202;
-    const real t204 = H[17] * S[12];
-    const real t205 = t203 + t204;
-    const real t206 = H[22] * S[13];
-    const real t207 = t205 + t206;
-    const real t208 = H[27] * S[14];
-    const real t209 = t207 + t208;
-    const real t210 = H[12] * t209;
-    const real t211 = t198 + t210;
-    const real t212 = H[2] * S[3];
-    const real t213 = H[7] * S[8];
-    const real t214 = t212 + t213;
-    const real t215 = H[12] * S[12];
-    const real t216 = t214 + t215;
-    const real t217 = H[17] * S[15];
-    const real t218 = t216 + t217;
-    const real t219 = H[22] * S[16];
-    const real t220 = t218 + t219;
-    const real t221 = H[27] * S[17];
-    const real t222 = t220 + t221;
-    const real t223 = H[17] * t222;
-    const real t224 = t211 + t223;
-    const real t225 = H[2] * S[4];
-    const real t226 = H[7] * S[9];
-    const real t227 = t225 + t226;
-    const real t228 = H[12] * S[13];
-    const real t229 = t227 + t228;
-    const real t230 = H[17] * S[16];
-    const real t231 = t229 + t230;
-    const real t232 = H[22] * S[18];
-    const real t233 = t231 + t232;
-    const real t234 = H[27] * S[19];
-    const real t235 = t233 + t234;
-    const real t236 = H[22] * t235;
-    const real t237 = t224 + t236;
-    const real t238 = H[2] * S[5];
-    const real t239 = H[7] * S[10];
-    const real t240 = t238 + t239;
-    const real t241 = H[12] * S[14];
-    const real t242 = t240 + t241;
-    const real t243 = H[17] * S[17];
-    const real t244 = t242 + t243;
-    const real t245 = H[22] * S[19];
-    const real t246 = t244 + t245;
-    const real t247 = H[27] * S[20];
-    const real t248 = t246 + t247;
-    const real t249 = H[27] * t248;
-    const real t250 = t237 + t249;
-    const real t251 = J[2] + t250;
-    const real t252 = t251 * ((real)1 / (real)10000000000000);
-    const real t253 = H[0] * t184;
-    const real t254 = H[5] * t196;
-    const real t255 = t253 + t254;
-    const real t256 = H[10] * t209;
-    const real t257 = t255 + t256;
-    const real t258 = H[15] * t222;
-    const real t259 = t257 + t258;
-    const real t260 = H[20] * t235;
-    const real t261 = t259 + t260;
-    const real t262 = H[25] * t248;
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t169;
-    const real t265 = t263 * t264;
-    const real t266 = t251 - t265;
-    const real t267 = H[1] * t184;
-    const real t268 = H[6] * t196;
-    const real t269 = t267 + t268;
-    const real t270 = H[11] * t209;
-    const real t271 = t269 + t270;
-    const real t272 = H[16] * t222;
-    const real t273 = t271 + t272;
-    const real t274 = H[21] * t235;
-    const real t275 = t273 + t274;
-    const real t276 = H[26] * t248;
-    const real t277 = t275 + t276;
-    const real t278 = t263 * t170;
-    const real t279 = t277 - t278;
-    const real t280 = 1.0 / t172;
-    const real t281 = t280 * t279;
-    const real t282 = t279 * t281;
-    const real t283 = t266 - t282;
-    const real t284 = t252 < t283;
-    if (!(t284 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t285 = H[3] * S[0];
-    const real t286 = H[8] * S[1];
-    const real t287 = t285 + t286;
-    const real t288 = H[13] * S[2];
-    const real t289 = t287 + t288;
-    const real t290 = H[18] * S[3];
-    const real t291 = t289 + t290;
-    const real t292 = H[23] * S[4];
-    const real t293 = t291 + t292;
-    const real t294 = H[28] * S[5];
-    const real t295 = t293 + t294;
-    const real t296 = H[3] * t295;
-    const real t297 = H[3] * S[1];
-    const real t298 = H[8] * S[6];
-    const real t299 = t297 + t298;
-    const real t300 = H[13] * S[7];
-    const real t301 = t299 + t300;
-    const real t302 = H[18] * S[8];
-    const real t303 = t301 + t302;
-    const real t304 = H[23] * S[9];
-    const real t305 = t303 + t304;
-    const real t306 = H[28] * S[10];
-    const real t307 = t305 + t306;
-    const real t308 = H[8] * t307;
-    const real t309 = t296 + t308;
-    const real t310 = H[3] * S[2];
-    const real t311 = H[8] * S[7];
-    const real t312 = t310 + t311;
-    const real t313 = H[13] * S[11];
-    const real t314 = t312 + t313;
-    const real t315 = H[18] * S[12];
-    const real t316 = t314 + t315;
-    const real t317 = H[23] * S[13];
-    const real t318 = t316 + t317;
-    const real t319 = H[28] * S[14];
-    const real t320 = t318 + t319;
-    const real t321 = H[13] * t320;
-    const real t322 = t309 + t321;
-    const real t323 = H[3] * S[3];
-    const real t324 = H[8] * S[8];
-    const real t325 = t323 + t324;
-    const real t326 = H[13] * S[12];
-    const real t327 = t325 + t326;
-    const real t328 = H[18] * S[15];
-    const real t329 = t327 + t328;
-    const real t330 = H[23] * S[16];
-    const real t331 = t329 + t330;
-    const real t332 = H[28] * S[17];
-    const real t333 = t331 + t332;
-    const real t334 = H[18] * t333;
-    const real t335 = t322 + t334;
-    const real t336 = H[3] * S[4];
-    const real t337 = H[8] * S[9];
-    const real t338 = t336 + t337;
-    const real t339 = H[13] * S[13];
-    const real t340 = t338 + t339;
-    const real t341 = H[18] * S[16];
-    const real t342 = t340 + t341;
-    const real t343 = H[23] * S[18];
-    const real t344 = t342 + t343;
-    const real t345 = H[28] * S[19];
-    const real t346 = t344 + t345;
-    const real t347 = H[23] * t346;
-    const real t348 = t335 + t347;
-    const real t349 = H[3] * S[5];
-    const real t350 = H[8] * S[10];
-    const real t351 = t349 + t350;
-    const real t352 = H[13] * S[14];
-    const real t353 = t351 + t352;
-    const real t354 = H[18] * S[17];
-    const real t355 = t353 + t354;
-    const real t356 = H[23] * S[19];
-    const real t357 = t355 + t356;
-    const real t358 = H[28] * S[20];
-    const real t359 = t357 + t358;
-    const real t360 = H[28] * t359;
-    const real t361 = t348 + t360;
-    const real t362 = J[3] + t361;
-    const real t363 = t362 * ((real)1 / (real)10000000000000);
-    const real t364 = H[0] * t295;
-    const real t365 = H[5] * t307;
-    const real t366 = t364 + t365;
-    const real t367 = H[10] * t320;
-    const real t368 = t366 + t367;
-    const real t369 = H[15] * t333;
-    const real t370 = t368 + t369;
-    const real t371 = H[20] * t346;
-    const real t372 = t370 + t371;
-    const real t373 = H[25] * t359;
-    const real t374 = t372 + t373;
-    const real t375 = t374 * t169;
-    const real t376 = t374 * t375;
-    const real t377 = t362 - t376;
-    const real t378 = H[1] * t295;
-    const real t379 = H[6] * t307;
-    const real t380 = t378 + t379;
-    const real t381 = H[11] * t320;
-    const real t382 = t380 + t381;
-    const real t383 = H[16] * t333;
-    const real t384 = t382 + t383;
-    const real t385 = H[21] * t346;
-    const real t386 = t384 + t385;
-    const real t387 = H[26] * t359;
-    const real t388 = t386 + t387;
-    const real t389 = t374 * t170;
-    const real t390 = t388 - t389;
-    const real t391 = t280 * t390;
-    const real t392 = t390 * t391;
-    const real t393 = t377 - t392;
-    const real t394 = H[2] * t295;
-    const real t395 = H[7] * t307;
-    const real t396 = t394 + t395;
-    const real t397 = H[12] * t320;
-    const real t398 = t396 + t397;
-    const real t399 = H[17] * t333;
-    const real t400 = t398 + t399;
-    const real t401 = H[22] * t346;
-    const real t402 = t400 + t401;
-    const real t403 = H[27] * t359;
-    const real t404 = t402 + t403;
-    const real t405 = t374 * t264;
-    const real t406 = t404 - t405;
-    const real t407 = t281 * t390;
-    const real t408 = t406 - t407;
-    const real t409 = 1.0 / t283;
-    const real t410 = t409 * t408;
-    const real t411 = t408 * t410;
-    const real t412 = t393 - t411;
-    const real t413 = t363 < t412;
-    if (!(t413 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t414 = H[4] * S[0];
-    const real t415 = H[9] * S[1];
-    const real t416 = t414 + t415;
-    const real t417 = H[14] * S[2];
-    const real t418 = t416 + t417;
-    const real t419 = H[19] * S[3];
-    const real t420 = t418 + t419;
-    const real t421 = H[24] * S[4];
-    const real t422 = t420 + t421;
-    const real t423 = H[29] * S[5];
-    const real t424 = t422 + t423;
-    const real t425 = H[4] * t424;
-    const real t426 = H[4] * S[1];
-    const real t427 = H[9] * S[6];
-    const real t428 = t426 + t427;
-    const real t429 = H[14] * S[7];
-    const real t430 = t428 + t429;
-    const real t431 = H[19] * S[8];
-    const real t432 = t430 + t431;
-    const real t433 = H[24] * S[9];
-    const real t434 = t432 + t433;
-    const real t435 = H[29] * S[10];
-    const real t436 = t434 + t435;
-    const real t437 = H[9] * t436;
-    const real t438 = t425 + t437;
-    const real t439 = H[4] * S[2];
-    const real t440 = H[9] * S[7];
-    const real t441 = t439 + t440;
-    const real t442 = H[14] * S[11];
-    const real t443 = t441 + t442;
-    const real t444 = H[19] * S[12];
-    const real t445 = t443 + t444;
-    const real t446 = H[24] * S[13];
-    const real t447 = t445 + t446;
-    const real t448 = H[29] * S[14];
-    const real t449 = t447 + t448;
-    const real t450 = H[14] * t449;
-    const real t451 = t438 + t450;
-    const real t452 = H[4] * S[3];
-    const real t453 = H[9] * S[8];
-    const real t454 = t452 + t453;
-    const real t455 = H[14] * S[12];
-    const real t456 = t454 + t455;
-    const real t457 = H[19] * S[15];
-    const real t458 = t456 + t457;
-    const real t459 = H[24] * S[16];
-    const real t460 = t458 + t459;
-    const real t461 = H[29] * S[17];
-    const real t462 = t460 + t461;
-    const real t463 = H[19] * t462;
-    const real t464 = t451 + t463;
-    const real t465 = H[4] * S[4];
-    const real t466 = H[9] * S[9];
-    const real t467 = t465 + t466;
-    const real t468 = H[14] * S[13];
-    const real t469 = t467 + t468;
-    const real t470 = H[19] * S[16];
-    const real t471 = t469 + t470;
-    const real t472 = H[24] * S[18];
-    const real t473 = t471 + t472;
-    const real t474 = H[29] * S[19];
-    const real t475 = t473 + t474;
-    const real t476 = H[24] * t475;
-    const real t477 = t464 + t476;
-    const real t478 = H[4] * S[5];
-    const real t479 = H[9] * S[10];
-    const real t480 = t478 + t479;
-    const real t481 = H[14] * S[14];
-    const real t482 = t480 + t481;
-    const real t483 = H[19] * S[17];
-    const real t484 = t482 + t483;
-    const real t485 = H[24] * S[19];
-    const real t486 = t484 + t485;
-    const real t487 = H[29] * S[20];
-    const real t488 = t486 + t487;
-    const real t489 = H[29] * t488;
-    const real t490 = t477 + t489;
-    const real t491 = J[4] + t490;
-    const real t492 = t491 * ((real)1 / (real)10000000000000);
-    const real t493 = H[0] * t424;
-    const real t494 = H[5] * t436;
-    const real t495 = t493 + t494;
-    const real t496 = H[10] * t449;
-    const real t497 = t495 + t496;
-    const real t498 = H[15] * t462;
-    const real t499 = t497 + t498;
-    const real t500 = H[20] * t475;
-    const real t501 = t499 + t500;
-    const real t502 = H[25] * t488;
-    const real t503 = t501 + t502;
-    const real t504 = t503 * t169;
-    const real t505 = t503 * t504;
-    const real t506 = t491 - t505;
-    const real t507 = H[1] * t424;
-    const real t508 = H[6] * t436;
-    const real t509 = t507 + t508;
-    const real t510 = H[11] * t449;
-    const real t511 = t509 + t510;
-    const real t512 = H[16] * t462;
-    const real t513 = t511 + t512;
-    const real t514 = H[21] * t475;
-    const real t515 = t513 + t514;
-    const real t516 = H[26] * t488;
-    const real t517 = t515 + t516;
-    const real t518 = t503 * t170;
-    const real t519 = t517 - t518;
-    const real t520 = t280 * t519;
-    const real t521 = t519 * t520;
-    const real t522 = t506 - t521;
-    const real t523 = H[2] * t424;
-    const real t524 = H[7] * t436;
-    const real t525 = t523 + t524;
-    const real t526 = H[12] * t449;
-    const real t527 = t525 + t526;
-    const real t528 = H[17] * t462;
-    const real t529 = t527 + t528;
-    const real t530 = H[22] * t475;
-    const real t531 = t529 + t530;
-    const real t532 = H[27] * t488;
-    const real t533 = t531 + t532;
-    const real t534 = t503 * t264;
-    const real t535 = t533 - t534;
-    const real t536 = t281 * t519;
-    const real t537 = t535 - t536;
-    const real t538 = t409 * t537;
-    const real t539 = t537 * t538;
-    const real t540 = t522 - t539;
-    const real t541 = H[3] * t424;
-    const real t542 = H[8] * t436;
-    const real t543 = t541 + t542;
-    const real t544 = H[13] * t449;
-    const real t545 = t543 + t544;
-    const real t546 = H[18] * t462;
-    const real t547 = t545 + t546;
-    const real t548 = H[23] * t475;
-    const real t549 = t547 + t548;
-    const real t550 = H[28] * t488;
-    const real t551 = t549 + t550;
-    const real t552 = t503 * t375;
-    const real t553 = t551 - t552;
-    const real t554 = t391 * t519;
-    const real t555 = t553 - t554;
-    const real t556 = t410 * t537;
-    const real t557 = t555 - t556;
-    const real t558 = 1.0 / t412;
-    const real t559 = t558 * t557;
-    const real t560 = t557 * t559;
-    const real t561 = t540 - t560;
-    const real t562 = t492 < t561;
-    if (!(t562 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
-    if (!(t284 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
-    if (!(t413 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
-    if (!(t562 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t563 = H[10] * H[10];
-    const real t564 = H[0] * H[0];
-    const real t565 = H[5] * H[5];
-    const real t566 = t564 + t565;
-    const real t567 = t563 + t566;
-    const real t568 = 0.0 < floor_[0];
-    const real t569 = S[0] + S[6];
-    const real t570 = S[11] + t569;
-    const real t571 = ((real)1 / (real)300000000000000) * t570;
-    const real t572 = t568 != 0 ? floor_[0] : t571;
-    const real t573 = t567 * t572;
-    const real t574 = H[25] * H[25];
-    const real t575 = H[15] * H[15];
-    const real t576 = H[20] * H[20];
-    const real t577 = t575 + t576;
-    const real t578 = t574 + t577;
-    const real t579 = 0.0 < floor_[1];
-    const real t580 = S[15] + S[18];
-    const real t581 = S[20] + t580;
-    const real t582 = ((real)1 / (real)300000000000000) * t581;
-    const real t583 = t579 != 0 ? floor_[1] : t582;
-    const real t584 = t578 * t583;
-    const real t585 = t573 + t584;
-    const real t586 = t585 < t77;
-    if (!(t586 != 0)) return 1; /* speed 1 of 5 moves no inertia: its acceleration is undetermined */
-    const real t587 = H[11] * H[11];
-    const real t588 = H[1] * H[1];
-    const real t589 = H[6] * H[6];
-    const real t590 = t588 + t589;
-    const real t591 = t587 + t590;
-    const real t592 = t572 * t591;
-    const real t593 = H[26] * H[26];
-    const real t594 = H[16] * H[16];
-    const real t595 = H[21] * H[21];
-    const real t596 = t594 + t595;
-    const real t597 = t593 + t596;
-    const real t598 = t583 * t597;
-    const real t599 = t592 + t598;
-    const real t600 = t599 < t156;
-    if (!(t600 != 0)) return 1; /* speed 2 of 5 moves no inertia: its acceleration is undetermined */
-    const real t601 = H[12] * H[12];
-    const real t602 = H[2] * H[2];
-    const real t603 = H[7] * H[7];
-    const real t604 = t602 + t603;
-    const real t605 = t601 + t604;
-    const real t606 = t572 * t605;
-    const real t607 = H[27] * H[27];
-    const real t608 = H[17] * H[17];
-    const real t609 = H[22] * H[22];
-    const real t610 = t608 + t609;
-    const real t611 = t607 + t610;
-    const real t612 = t583 * t611;
-    const real t613 = t606 + t612;
-    const real t614 = t613 < t251;
-    if (!(t614 != 0)) return 1; /* speed 3 of 5 moves no inertia: its acceleration is undetermined */
-    const real t615 = H[13] * H[13];
-    const real t616 = H[3] * H[3];
-    const real t617 = H[8] * H[8];
-    const real t618 = t616 + t617;
-    const real t619 = t615 + t618;
-    const real t620 = t572 * t619;
-    const real t621 = H[28] * H[28];
-    const real t622 = H[18] * H[18];
-    const real t623 = H[23] * H[23];
-    const real t624 = t622 + t623;
-    const real t625 = t621 + t624;
-    const real t626 = t583 * t625;
-    const real t627 = t620 + t626;
-    const real t628 = t627 < t362;
-    if (!(t628 != 0)) return 1; /* speed 4 of 5 moves no inertia: its acceleration is undetermined */
-    const real t629 = H[14] * H[14];
-    const real t630 = H[4] * H[4];
-    const real t631 = H[9] * H[9];
-    const real t632 = t630 + t631;
-    const real t633 = t629 + t632;
-    const real t634 = t572 * t633;
-    const real t635 = H[29] * H[29];
-    const real t636 = H[19] * H[19];
-    const real t637 = H[24] * H[24];
-    const real t638 = t636 + t637;
-    const real t639 = t635 + t638;
-    const real t640 = t583 * t639;
-    const real t641 = t634 + t640;
-    const real t642 = t641 < t491;
-    if (!(t642 != 0)) return 1; /* speed 5 of 5 moves no inertia: its acceleration is undetermined */
-    const real t643 = t10 * t169;
-    const real t644 = t10 * t170;
-    const real t645 = t89 - t644;
-    const real t646 = t280 * t645;
-    const real t647 = t10 * t264;
-    const real t648 = t184 - t647;
-    const real t649 = t281 * t645;
-    const real t650 = t648 - t649;
-    const real t651 = t409 * t650;
-    const real t652 = t10 * t375;
-    const real t653 = t295 - t652;
-    const real t654 = t391 * t645;
-    const real t655 = t653 - t654;
-    const real t656 = t410 * t650;
-    const real t657 = t655 - t656;
-    const real t658 = t558 * t657;
-    const real t659 = 1.0 / t561;
-    const real t660 = t10 * t504;
-    const real t661 = t424 - t660;
-    const real t662 = t520 * t645;
-    const real t663 = t661 - t662;
-    const real t664 = t538 * t650;
-    const real t665 = t663 - t664;
-    const real t666 = t559 * t657;
-    const real t667 = t665 - t666;
-    const real t668 = t659 * t667;
-    const real t669 = t559 * t668;
-    const real t670 = t658 - t669;
-    const real t671 = t410 * t670;
-    const real t672 = t651 - t671;
-    const real t673 = t538 * t668;
-    const real t674 = t672 - t673;
-    const real t675 = t281 * t674;
-    const real t676 = t646 - t675;
-    const real t677 = t391 * t670;
-    const real t678 = t676 - t677;
-    const real t679 = t520 * t668;
-    const real t680 = t678 - t679;
-    const real t681 = t170 * t680;
-    const real t682 = t643 - t681;
-    const real t683 = t264 * t674;
-    const real t684 = t682 - t683;
-    const real t685 = t375 * t670;
-    const real t686 = t684 - t685;
-    const real t687 = t504 * t668;
-    const real t688 = t686 - t687;
-    G[0] = t688;
-    const real t689 = t22 * t169;
-    const real t690 = t22 * t170;
-    const real t691 = t101 - t690;
-    const real t692 = t280 * t691;
-    const real t693 = t22 * t264;
-    const real t694 = t196 - t693;
-    const real t695 = t281 * t691;
-    const real t696 = t694 - t695;
-    const real t697 = t409 * t696;
-    const real t698 = t22 * t375;
-    const real t699 = t307 - t698;
-    const real t700 = t391 * t691;
-    const real t701 = t699 - t700;
-    const real t702 = t410 * t696;
-    const real t703 = t701 - t702;
-    const real t704 = t558 * t703;
-    const real t705 = t22 * t504;
-    const real t706 = t436 - t705;
-    const real t707 = t520 * t691;
-    const real t708 = t706 - t707;
-    const real t709 = t538 * t696;
-    const real t710 = t708 - t709;
-    const real t711 = t559 * t703;
-    const real t712 = t710 - t711;
-    const real t713 = t659 * t712;
-    const real t714 = t559 * t713;
-    const real t715 = t704 - t714;
-    const real t716 = t410 * t715;
-    const real t717 = t697 - t716;
-    const real t718 = t538 * t713;
-    const real t719 = t717 - t718;
-    const real t720 = t281 * t719;
-    const real t721 = t692 - t720;
-    const real t722 = t391 * t715;
-    const real t723 = t721 - t722;
-    const real t724 = t520 * t713;
-    const real t725 = t723 - t724;
-    const real t726 = t170 * t725;
-    const real t727 = t689 - t726;
-    const real t728 = t264 * t719;
-    const real t729 = t727 - t728;
-    const real t730 = t375 * t715;
-    const real t731 = t729 - t730;
-    const real t732 = t504 * t713;
-    const real t733 = t731 - t732;
-    G[1] = t733;
-    const real t734 = t35 * t169;
-    const real t735 = t35 * t170;
-    const real t736 = t114 - t735;
-    const real t737 = t280 * t736;
-    const real t738 = t35 * t264;
-    const real t739 = t209 - t738;
-    const real t740 = t281 * t736;
-    const real t741 = t739 - t740;
-    const real t742 = t409 * t741;
-    const real t743 = t35 * t375;
-    const real t744 = t320 - t743;
-    const real t745 = t391 * t736;
-    const real t746 = t744 - t745;
-    const real t747 = t410 * t741;
-    const real t748 = t746 - t747;
-    const real t749 = t558 * t748;
-    const real t750 = t35 * t504;
-    const real t751 = t449 - t750;
-    const real t752 = t520 * t736;
-    const real t753 = t751 - t752;
-    const real t754 = t538 * t741;
-    const real t755 = t753 - t754;
-    const real t756 = t559 * t748;
-    const real t757 = t755 - t756;
-    const real t758 = t659 * t757;
-    const real t759 = t559 * t758;
-    const real t760 = t749 - t759;
-    const real t761 = t410 * t760;
-    const real t762 = t742 - t761;
-    const real t763 = t538 * t758;
-    const real t764 = t762 - t763;
-    const real t765 = t281 * t764;
-    const real t766 = t737 - t765;
-    const real t767 = t391 * t760;
-    const real t768 = t766 - t767;
-    const real t769 = t520 * t758;
-    const real t770 = t768 - t769;
-    const real t771 = t170 * t770;
-    const real t772 = t734 - t771;
-    const real t773 = t264 * t764;
-    const real t774 = t772 - t773;
-    const real t775 = t375 * t760;
-    const real t776 = t774 - t775;
-    const real t777 = t504 * t758;
-    const real t778 = t776 - t777;
-    G[2] = t778;
-    const real t779 = t48 * t169;
-    const real t780 = t48 * t170;
-    const real t781 = t127 - t780;
-    const real t782 = t280 * t781;
-    const real t783 = t48 * t264;
-    const real t784 = t222 - t783;
-    const real t785 = t281 * t781;
-    const real t786 = t784 - t785;
-    const real t787 = t409 * t786;
-    const real t788 = t48 * t375;
-    const real t789 = t333 - t788;
-    const real t790 = t391 * t781;
-    const real t791 = t789 - t790;
-    const real t792 = t410 * t786;
-    const real t793 = t791 - t792;
-    const real t794 = t558 * t793;
-    const real t795 = t48 * t504;
-    const real t796 = t462 - t795;
-    const real t797 = t520 * t781;
-    const real t798 = t796 - t797;
-    const real t799 = t538 * t786;
-    const real t800 = t798 - t799;
-    const real t801 = t559 * t793;
-    const real t802 = t800 - t801;
-    const real t803 = t659 * t802;
-    const real t804 = t559 * t803;
-    const real t805 = t794 - t804;
-    const real t806 = t410 * t805;
-    const real t807 = t787 - t806;
-    const real t808 = t538 * t803;
-    const real t809 = t807 - t808;
-    const real t810 = t281 * t809;
-    const real t811 = t782 - t810;
-    const real t812 = t391 * t805;
-    const real t813 = t811 - t812;
-    const real t814 = t520 * t803;
-    const real t815 = t813 - t814;
-    const real t816 = t170 * t815;
-    const real t817 = t779 - t816;
-    const real t818 = t264 * t809;
-    const real t819 = t817 - t818;
-    const real t820 = t375 * t805;
-    const real t821 = t819 - t820;
-    const real t822 = t504 * t803;
-    const real t823 = t821 - t822;
-    G[3] = t823;
-    const real t824 = t61 * t169;
-    const real t825 = t61 * t170;
-    const real t826 = t140 - t825;
-    const real t827 = t280 * t826;
-    const real t828 = t61 * t264;
-    const real t829 = t235 - t828;
-    const real t830 = t281 * t826;
-    const real t831 = t829 - t830;
-    const real t832 = t409 * t831;
-    const real t833 = t61 * t375;
-    const real t834 = t346 - t833;
-    const real t835 = t391 * t826;
-    const real t836 = t834 - t835;
-    const real t837 = t410 * t831;
-    const real t838 = t836 - t837;
-    const real t839 = t558 * t838;
-    const real t840 = t61 * t504;
-    const real t841 = t475 - t840;
-    const real t842 = t520 * t826;
-    const real t843 = t841 - t842;
-    const real t844 = t538 * t831;
-    const real t845 = t843 - t844;
-    const real t846 = t559 * t838;
-    const real t847 = t845 - t846;
-    const real t848 = t659 * t847;
-    const real t849 = t559 * t848;
-    const real t850 = t839 - t849;
-    const real t851 = t410 * t850;
-    const real t852 = t832 - t851;
-    const real t853 = t538 * t848;
-    const real t854 = t852 - t853;
-    const real t855 = t281 * t854;
-    const real t856 = t827 - t855;
-    const real t857 = t391 * t850;
-    const real t858 = t856 - t857;
-    const real t859 = t520 * t848;
-    const real t860 = t858 - t859;
-    const real t861 = t170 * t860;
-    const real t862 = t824 - t861;
-    const real t863 = t264 * t854;
-    const real t864 = t862 - t863;
-    const real t865 = t375 * t850;
-    const real t866 = t864 - t865;
-    const real t867 = t504 * t848;
-    const real t868 = t866 - t867;
-    G[4] = t868;
-    const real t869 = t74 * t169;
-    const real t870 = t74 * t170;
-    const real t871 = t153 - t870;
-    const real t872 = t280 * t871;
-    const real t873 = t74 * t264;
-    const real t874 = t248 - t873;
-    const real t875 = t281 * t871;
-    const real t876 = t874 - t875;
-    const real t877 = t409 * t876;
-    const real t878 = t74 * t375;
-    const real t879 = t359 - t878;
-    const real t880 = t391 * t871;
-    const real t881 = t879 - t880;
-    const real t882 = t410 * t876;
-    const real t883 = t881 - t882;
-    const real t884 = t558 * t883;
-    const real t885 = t74 * t504;
-    const real t886 = t488 - t885;
-    const real t887 = t520 * t871;
-    const real t888 = t886 - t887;
-    const real t889 = t538 * t876;
-    const real t890 = t888 - t889;
-    const real t891 = t559 * t883;
-    const real t892 = t890 - t891;
-    const real t893 = t659 * t892;
-    const real t894 = t559 * t893;
-    const real t895 = t884 - t894;
-    const real t896 = t410 * t895;
-    const real t897 = t877 - t896;
-    const real t898 = t538 * t893;
-    const real t899 = t897 - t898;
-    const real t900 = t281 * t899;
-    const real t901 = t872 - t900;
-    const real t902 = t391 * t895;
-    const real t903 = t901 - t902;
-    const real t904 = t520 * t893;
-    const real t905 = t903 - t904;
-    const real t906 = t170 * t905;
-    const real t907 = t869 - t906;
-    const real t908 = t264 * t899;
-    const real t909 = t907 - t908;
-    const real t910 = t375 * t895;
-    const real t911 = t909 - t910;
-    const real t912 = t504 * t893;
-    const real t913 = t911 - t912;
-    G[5] = t913;
-    G[6] = t680;
-    G[7] = t725;
-    G[8] = t770;
-    G[9] = t815;
-    G[10] = t860;
-    G[11] = t905;
-    G[12] = t674;
-    G[13] = t719;
-    G[14] = t764;
-    G[15] = t809;
-    G[16] = t854;
-    G[17] = t899;
-    G[18] = t670;
-    G[19] = t715;
-    G[20] = t760;
-    G[21] = t805;
-    G[22] = t850;
-    G[23] = t895;
-    G[24] = t668;
-    G[25] = t713;
-    G[26] = t758;
-    G[27] = t803;
-    G[28] = t848;
-    G[29] = t893;
-    const real t914 = H[0] * e[0];
-    const real t915 = H[5] * e[1];
-    const real t916 = t914 + t915;
-    const real t917 = H[10] * e[2];
-    const real t918 = t916 + t917;
-    const real t919 = H[15] * e[3];
-    const real t920 = t918 + t919;
-    const real t921 = H[20] * e[4];
-    const real t922 = t920 + t921;
-    const real t923 = H[25] * e[5];
-    const real t924 = t922 + t923;
-    const real t925 = tau[0] - t924;
-    const real t926 = t169 * t925;
-    const real t927 = H[1] * e[0];
-    const real t928 = H[6] * e[1];
-    const real t929 = t927 + t928;
-    const real t930 = H[11] * e[2];
-    const real t931 = t929 + t930;
-    const real t932 = H[16] * e[3];
-    const real t933 = t931 + t932;
-    const real t934 = H[21] * e[4];
-    const real t935 = t933 + t934;
-    const real t936 = H[26] * e[5];
-    const real t937 = t935 + t936;
-    const real t938 = tau[1] - t937;
-    const real t939 = t170 * t925;
-    const real t940 = t938 - t939;
-    const real t941 = t280 * t940;
-    const real t942 = H[2] * e[0];
-    const real t943 = H[7] * e[1];
-    const real t944 = t942 + t943;
-    const real t945 = H[12] * e[2];
-    const real t946 = t944 + t945;
-    const real t947 = H[17] * e[3];
-    const real t948 = t946 + t947;
-    const real t949 = H[22] * e[4];
-    const real t950 = t948 + t949;
-    const real t951 = H[27] * e[5];
-    const real t952 = t950 + t951;
-    const real t953 = tau[2] - t952;
-    const real t954 = t264 * t925;
-    const real t955 = t953 - t954;
-    const real t956 = t281 * t940;
-    const real t957 = t955 - t956;
-    const real t958 = t409 * t957;
-    const real t959 = H[3] * e[0];
-    const real t960 = H[8] * e[1];
-    const real t961 = t959 + t960;
-    const real t962 = H[13] * e[2];
-    const real t963 = t961 + t962;
-    const real t964 = H[18] * e[3];
-    const real t965 = t963 + t964;
-    const real t966 = H[23] * e[4];
-    const real t967 = t965 + t966;
-    const real t968 = H[28] * e[5];
-    const real t969 = t967 + t968;
-    const real t970 = tau[3] - t969;
-    const real t971 = t375 * t925;
-    const real t972 = t970 - t971;
-    const real t973 = t391 * t940;
-    const real t974 = t972 - t973;
-    const real t975 = t410 * t957;
-    const real t976 = t974 - t975;
-    const real t977 = t558 * t976;
-    const real t978 = H[4] * e[0];
-    const real t979 = H[9] * e[1];
-    const real t980 = t978 + t979;
-    const real t981 = H[14] * e[2];
-    const real t982 = t980 + t981;
-    const real t983 = H[19] * e[3];
-    const real t984 = t982 + t983;
-    const real t985 = H[24] * e[4];
-    const real t986 = t984 + t985;
-    const real t987 = H[29] * e[5];
-    const real t988 = t986 + t987;
-    const real t989 = tau[4] - t988;
-    const real t990 = t504 * t925;
-    const real t991 = t989 - t990;
-    const real t992 = t520 * t940;
-    const real t993 = t991 - t992;
-    const real t994 = t538 * t957;
-    const real t995 = t993 - t994;
-    const real t996 = t559 * t976;
-    const real t997 = t995 - t996;
-    const real t998 = t659 * t997;
-    const real t999 = t559 * t998;
-    const real t1000 = t977 - t999;
-    const real t1001 = t410 * t1000;
-    const real t1002 = t958 - t1001;
-    const real t1003 = t538 * t998;
-    const real t1004 = t1002 - t1003;
-    const real t1005 = t281 * t1004;
-    const real t1006 = t941 - t1005;
-    const real t1007 = t391 * t1000;
-    const real t1008 = t1006 - t1007;
-    const real t1009 = t520 * t998;
-    const real t1010 = t1008 - t1009;
-    const real t1011 = t170 * t1010;
-    const real t1012 = t926 - t1011;
-    const real t1013 = t264 * t1004;
-    const real t1014 = t1012 - t1013;
-    const real t1015 = t375 * t1000;
-    const real t1016 = t1014 - t1015;
-    const real t1017 = t504 * t998;
-    const real t1018 = t1016 - t1017;
-    g[0] = t1018;
-    g[1] = t1010;
-    g[2] = t1004;
-    g[3] = t1000;
-    g[4] = t998;
-    const real t1019 = t10 * t688;
-    const real t1020 = t89 * t680;
-    const real t1021 = t1019 + t1020;
-    const real t1022 = t184 * t674;
-    const real t1023 = t1021 + t1022;
-    const real t1024 = t295 * t670;
-    const real t1025 = t1023 + t1024;
-    const real t1026 = t424 * t668;
-    const real t1027 = t1025 + t1026;
-    const real t1028 = S[0] - t1027;
-    const real t1029 = Rc[0] * t1028;
-    const real t1030 = t10 * t733;
-    const real t1031 = t89 * t725;
-    const real t1032 = t1030 + t1031;
-    const real t1033 = t184 * t719;
-    const real t1034 = t1032 + t1033;
-    const real t1035 = t295 * t715;
-    const real t1036 = t1034 + t1035;
-    const real t1037 = t424 * t713;
-    const real t1038 = t1036 + t1037;
-    const real t1039 = S[1] - t1038;
-    const real t1040 = Rc[1] * t1039;
-    const real t1041 = t1029 + t1040;
-    const real t1042 = t10 * t778;
-    const real t1043 = t89 * t770;
-    const real t1044 = t1042 + t1043;
-    const real t1045 = t184 * t764;
-    const real t1046 = t1044 + t1045;
-    const real t1047 = t295 * t760;
-    const real t1048 = t1046 + t1047;
-    const real t1049 = t424 * t758;
-    const real t1050 = t1048 + t1049;
-    const real t1051 = S[2] - t1050;
-    const real t1052 = Rc[2] * t1051;
-    const real t1053 = t1041 + t1052;
-    const real t1054 = Rc[0] * t1053;
-    const real t1055 = Rc[0] * t1039;
-    const real t1056 = t22 * t733;
-    const real t1057 = t101 * t725;
-    const real t1058 = t1056 + t1057;
-    const real t1059 = t196 * t719;
-    const real t1060 = t1058 + t1059;
-    const real t1061 = t307 * t715;
-    const real t1062 = t1060 + t1061;
-    const real t1063 = t436 * t713;
-    const real t1064 = t1062 + t1063;
-    const real t1065 = S[6] - t1064;
-    const real t1066 = Rc[1] * t1065;
-    const real t1067 = t1055 + t1066;
-    const real t1068 = t22 * t778;
-    const real t1069 = t101 * t770;
-    const real t1070 = t1068 + t1069;
-    const real t1071 = t196 * t764;
-    const real t1072 = t1070 + t1071;
-    const real t1073 = t307 * t760;
-    const real t1074 = t1072 + t1073;
-    const real t1075 = t436 * t758;
-    const real t1076 = t1074 + t1075;
-    const real t1077 = S[7] - t1076;
-    const real t1078 = Rc[2] * t1077;
-    const real t1079 = t1067 + t1078;
-    const real t1080 = Rc[1] * t1079;
-    const real t1081 = t1054 + t1080;
-    const real t1082 = Rc[0] * t1051;
-    const real t1083 = Rc[1] * t1077;
-    const real t1084 = t1082 + t1083;
-    const real t1085 = t35 * t778;
-    const real t1086 = t114 * t770;
-    const real t1087 = t1085 + t1086;
-    const real t1088 = t209 * t764;
-    const real t1089 = t1087 + t1088;
-    const real t1090 = t320 * t760;
-    const real t1091 = t1089 + t1090;
-    const real t1092 = t449 * t758;
-    const real t1093 = t1091 + t1092;
-    const real t1094 = S[11] - t1093;
-    const real t1095 = Rc[2] * t1094;
-    const real t1096 = t1084 + t1095;
-    const real t1097 = Rc[2] * t1096;
-    const real t1098 = t1081 + t1097;
-    S_I[0] += t1098;
-    const real t1099 = Rc[3] * t1053;
-    const real t1100 = Rc[4] * t1079;
-    const real t1101 = t1099 + t1100;
-    const real t1102 = Rc[5] * t1096;
-    const real t1103 = t1101 + t1102;
-    S_I[1] += t1103;
-    const real t1104 = Rc[6] * t1053;
-    const real t1105 = Rc[7] * t1079;
-    const real t1106 = t1104 + t1105;
-    const real t1107 = Rc[8] * t1096;
-    const real t1108 = t1106 + t1107;
-    S_I[2] += t1108;
-    const real t1109 = t10 * t823;
-    const real t1110 = t89 * t815;
-    const real t1111 = t1109 + t1110;
-    const real t1112 = t184 * t809;
-    const real t1113 = t1111 + t1112;
-    const real t1114 = t295 * t805;
-    const real t1115 = t1113 + t1114;
-    const real t1116 = t424 * t803;
-    const real t1117 = t1115 + t1116;
-    const real t1118 = S[3] - t1117;
-    const real t1119 = Rc[0] * t1118;
-    const real t1120 = t22 * t823;
-    const real t1121 = t101 * t815;
-    const real t1122 = t1120 + t1121;
-    const real t1123 = t196 * t809;
-    const real t1124 = t1122 + t1123;
-    const real t1125 = t307 * t805;
-    const real t1126 = t1124 + t1125;
-    const real t1127 = t436 * t803;
-    const real t1128 = t1126 + t1127;
-    const real t1129 = S[8] - t1128;
-    const real t1130 = Rc[1] * t1129;
-    const real t1131 = t1119 + t1130;
-    const real t1132 = t35 * t823;
-    const real t1133 = t114 * t815;
-    const real t1134 = t1132 + t1133;
-    const real t1135 = t209 * t809;
-    const real t1136 = t1134 + t1135;
-    const real t1137 = t320 * t805;
-    const real t1138 = t1136 + t1137;
-    const real t1139 = t449 * t803;
-    const real t1140 = t1138 + t1139;
-    const real t1141 = S[12] - t1140;
-    const real t1142 = Rc[2] * t1141;
-    const real t1143 = t1131 + t1142;
-    const real t1144 = Rc[0] * t1143;
-    const real t1145 = t10 * t868;
-    const real t1146 = t89 * t860;
-    const real t1147 = t1145 + t1146;
-    const real t1148 = t184 * t854;
-    const real t1149 = t1147 + t1148;
-    const real t1150 = t295 * t850;
-    const real t1151 = t1149 + t1150;
-    const real t1152 = t424 * t848;
-    const real t1153 = t1151 + t1152;
-    const real t1154 = S[4] - t1153;
-    const real t1155 = Rc[0] * t1154;
-    const real t1156 = t22 * t868;
-    const real t1157 = t101 * t860;
-    const real t1158 = t1156 + t1157;
-    const real t1159 = t196 * t854;
-    const real t1160 = t1158 + t1159;
-    const real t1161 = t307 * t850;
-    const real t1162 = t1160 + t1161;
-    const real t1163 = t436 * t848;
-    const real t1164 = t1162 + t1163;
-    const real t1165 = S[9] - t1164;
-    const real t1166 = Rc[1] * t1165;
-    const real t1167 = t1155 + t1166;
-    const real t1168 = t35 * t868;
-    const real t1169 = t114 * t860;
-    const real t1170 = t1168 + t1169;
-    const real t1171 = t209 * t854;
-    const real t1172 = t1170 + t1171;
-    const real t1173 = t320 * t850;
-    const real t1174 = t1172 + t1173;
-    const real t1175 = t449 * t848;
-    const real t1176 = t1174 + t1175;
-    const real t1177 = S[13] - t1176;
-    const real t1178 = Rc[2] * t1177;
-    const real t1179 = t1167 + t1178;
-    const real t1180 = Rc[1] * t1179;
-    const real t1181 = t1144 + t1180;
-    const real t1182 = t10 * t913;
-    const real t1183 = t89 * t905;
-    const real t1184 = t1182 + t1183;
-    const real t1185 = t184 * t899;
-    const real t1186 = t1184 + t1185;
-    const real t1187 = t295 * t895;
-    const real t1188 = t1186 + t1187;
-    const real t1189 = t424 * t893;
-    const real t1190 = t1188 + t1189;
-    const real t1191 = S[5] - t1190;
-    const real t1192 = Rc[0] * t1191;
-    const real t1193 = t22 * t913;
-    const real t1194 = t101 * t905;
-    const real t1195 = t1193 + t1194;
-    const real t1196 = t196 * t899;
-    const real t1197 = t1195 + t1196;
-    const real t1198 = t307 * t895;
-    const real t1199 = t1197 + t1198;
-    const real t1200 = t436 * t893;
-    const real t1201 = t1199 + t1200;
-    const real t1202 = S[10] - t1201;
-    const real t1203 = Rc[1] * t1202;
-    const real t1204 = t1192 + t1203;
-    const real t1205 = t35 * t913;
-    const real t1206 = t114 * t905;
-    const real t1207 = t1205 + t1206;
-    const real t1208 = t209 * t899;
-    const real t1209 = t1207 + t1208;
-    const real t1210 = t320 * t895;
-    const real t1211 = t1209 + t1210;
-    const real t1212 = t449 * t893;
-    const real t1213 = t1211 + t1212;
-    const real t1214 = S[14] - t1213;
-    const real t1215 = Rc[2] * t1214;
-    const real t1216 = t1204 + t1215;
-    const real t1217 = Rc[2] * t1216;
-    const real t1218 = t1181 + t1217;
-    const real t1219 = r[1] * t1108;
-    const real t1220 = r[2] * t1103;
-    const real t1221 = t1219 - t1220;
-    const real t1222 = t1218 + t1221;
-    S_I[3] += t1222;
-    const real t1223 = Rc[3] * t1143;
-    const real t1224 = Rc[4] * t1179;
-    const real t1225 = t1223 + t1224;
-    const real t1226 = Rc[5] * t1216;
-    const real t1227 = t1225 + t1226;
-    const real t1228 = r[2] * t1098;
-    const real t1229 = r[0] * t1108;
-    const real t1230 = t1228 - t1229;
-    const real t1231 = t1227 + t1230;
-    S_I[4] += t1231;
-    const real t1232 = Rc[6] * t1143;
-    const real t1233 = Rc[7] * t1179;
-    const real t1234 = t1232 + t1233;
-    const real t1235 = Rc[8] * t1216;
-    const real t1236 = t1234 + t1235;
-    const real t1237 = r[0] * t1103;
-    const real t1238 = r[1] * t1098;
-    const real t1239 = t1237 - t1238;
-    const real t1240 = t1236 + t1239;
-    S_I[5] += t1240;
-    const real t1241 = Rc[3] * t1028;
-    const real t1242 = Rc[4] * t1039;
-    const real t1243 = t1241 + t1242;
-    const real t1244 = Rc[5] * t1051;
-    const real t1245 = t1243 + t1244;
-    const real t1246 = Rc[3] * t1245;
-    const real t1247 = Rc[3] * t1039;
-    const real t1248 = Rc[4] * t1065;
-    const real t1249 = t1247 + t1248;
-    const real t1250 = Rc[5] * t1077;
-    const real t1251 = t1249 + t1250;
-    const real t1252 = Rc[4] * t1251;
-    const real t1253 = t1246 + t1252;
-    const real t1254 = Rc[3] * t1051;
-    const real t1255 = Rc[4] * t1077;
-    const real t1256 = t1254 + t1255;
-    const real t1257 = Rc[5] * t1094;
-    const real t1258 = t1256 + t1257;
-    const real t1259 = Rc[5] * t1258;
-    const real t1260 = t1253 + t1259;
-    S_I[6] += t1260;
-    const real t1261 = Rc[6] * t1245;
-    const real t1262 = Rc[7] * t1251;
-    const real t1263 = t1261 + t1262;
-    const real t1264 = Rc[8] * t1258;
-    const real t1265 = t1263 + t1264;
-    S_I[7] += t1265;
-    const real t1266 = Rc[3] * t1118;
-    const real t1267 = Rc[4] * t1129;
-    const real t1268 = t1266 + t1267;
-    const real t1269 = Rc[5] * t1141;
-    const real t1270 = t1268 + t1269;
-    const real t1271 = Rc[0] * t1270;
-    const real t1272 = Rc[3] * t1154;
-    const real t1273 = Rc[4] * t1165;
-    const real t1274 = t1272 + t1273;
-    const real t1275 = Rc[5] * t1177;
-    const real t1276 = t1274 + t1275;
-    const real t1277 = Rc[1] * t1276;
-    const real t1278 = t1271 + t1277;
-    const real t1279 = Rc[3] * t1191;
-    const real t1280 = Rc[4] * t1202;
-    const real t1281 = t1279 + t1280;
-    const real t1282 = Rc[5] * t1214;
-    const real t1283 = t1281 + t1282;
-    const real t1284 = Rc[2] * t1283;
-    const real t1285 = t1278 + t1284;
-    const real t1286 = r[1] * t1265;
-    const real t1287 = r[2] * t1260;
-    const real t1288 = t1286 - t1287;
-    const real t1289 = t1285 + t1288;
-    S_I[8] += t1289;
-    const real t1290 = Rc[3] * t1270;
-    const real t1291 = Rc[4] * t1276;
-    const real t1292 = t1290 + t1291;
-    const real t1293 = Rc[5] * t1283;
-    const real t1294 = t1292 + t1293;
-    const real t1295 = r[0] * t1265;
-    const real t1296 = t1220 - t1295;
-    const real t1297 = t1294 + t1296;
-    S_I[9] += t1297;
-    const real t1298 = Rc[6] * t1270;
-    const real t1299 = Rc[7] * t1276;
-    const real t1300 = t1298 + t1299;
-    const real t1301 = Rc[8] * t1283;
-    const real t1302 = t1300 + t1301;
-    const real t1303 = r[0] * t1260;
-    const real t1304 = r[1] * t1103;
-    const real t1305 = t1303 - t1304;
-    const real t1306 = t1302 + t1305;
-    S_I[10] += t1306;
-    const real t1307 = Rc[6] * t1028;
-    const real t1308 = Rc[7] * t1039;
-    const real t1309 = t1307 + t1308;
-    const real t1310 = Rc[8] * t1051;
-    const real t1311 = t1309 + t1310;
-    const real t1312 = Rc[6] * t1311;
-    const real t1313 = Rc[6] * t1039;
-    const real t1314 = Rc[7] * t1065;
-    const real t1315 = t1313 + t1314;
-    const real t1316 = Rc[8] * t1077;
-    const real t1317 = t1315 + t1316;
-    const real t1318 = Rc[7] * t1317;
-    const real t1319 = t1312 + t1318;
-    const real t1320 = Rc[6] * t1051;
-    const real t1321 = Rc[7] * t1077;
-    const real t1322 = t1320 + t1321;
-    const real t1323 = Rc[8] * t1094;
-    const real t1324 = t1322 + t1323;
-    const real t1325 = Rc[8] * t1324;
-    const real t1326 = t1319 + t1325;
-    S_I[11] += t1326;
-    const real t1327 = Rc[6] * t1118;
-    const real t1328 = Rc[7] * t1129;
-    const real t1329 = t1327 + t1328;
-    const real t1330 = Rc[8] * t1141;
-    const real t1331 = t1329 + t1330;
-    const real t1332 = Rc[0] * t1331;
-    const real t1333 = Rc[6] * t1154;
-    const real t1334 = Rc[7] * t1165;
-    const real t1335 = t1333 + t1334;
-    const real t1336 = Rc[8] * t1177;
-    const real t1337 = t1335 + t1336;
-    const real t1338 = Rc[1] * t1337;
-    const real t1339 = t1332 + t1338;
-    const real t1340 = Rc[6] * t1191;
-    const real t1341 = Rc[7] * t1202;
-    const real t1342 = t1340 + t1341;
-    const real t1343 = Rc[8] * t1214;
-    const real t1344 = t1342 + t1343;
-    const real t1345 = Rc[2] * t1344;
-    const real t1346 = t1339 + t1345;
-    const real t1347 = r[1] * t1326;
-    const real t1348 = r[2] * t1265;
-    const real t1349 = t1347 - t1348;
-    const real t1350 = t1346 + t1349;
-    S_I[12] += t1350;
-    const real t1351 = Rc[3] * t1331;
-    const real t1352 = Rc[4] * t1337;
-    const real t1353 = t1351 + t1352;
-    const real t1354 = Rc[5] * t1344;
-    const real t1355 = t1353 + t1354;
-    const real t1356 = r[2] * t1108;
-    const real t1357 = r[0] * t1326;
-    const real t1358 = t1356 - t1357;
-    const real t1359 = t1355 + t1358;
-    S_I[13] += t1359;
-    const real t1360 = Rc[6] * t1331;
-    const real t1361 = Rc[7] * t1337;
-    const real t1362 = t1360 + t1361;
-    const real t1363 = Rc[8] * t1344;
-    const real t1364 = t1362 + t1363;
-    const real t1365 = t1295 - t1219;
-    const real t1366 = t1364 + t1365;
-    S_I[14] += t1366;
-    const real t1367 = t48 * t823;
-    const real t1368 = t127 * t815;
-    const real t1369 = t1367 + t1368;
-    const real t1370 = t222 * t809;
-    const real t1371 = t1369 + t1370;
-    const real t1372 = t333 * t805;
-    const real t1373 = t1371 + t1372;
-    const real t1374 = t462 * t803;
-    const real t1375 = t1373 + t1374;
-    const real t1376 = S[15] - t1375;
-    const real t1377 = Rc[0] * t1376;
-    const real t1378 = t48 * t868;
-    const real t1379 = t127 * t860;
-    const real t1380 = t1378 + t1379;
-    const real t1381 = t222 * t854;
-    const real t1382 = t1380 + t1381;
-    const real t1383 = t333 * t850;
-    const real t1384 = t1382 + t1383;
-    const real t1385 = t462 * t848;
-    const real t1386 = t1384 + t1385;
-    const real t1387 = S[16] - t1386;
-    const real t1388 = Rc[1] * t1387;
-    const real t1389 = t1377 + t1388;
-    const real t1390 = t48 * t913;
-    const real t1391 = t127 * t905;
-    const real t1392 = t1390 + t1391;
-    const real t1393 = t222 * t899;
-    const real t1394 = t1392 + t1393;
-    const real t1395 = t333 * t895;
-    const real t1396 = t1394 + t1395;
-    const real t1397 = t462 * t893;
-    const real t1398 = t1396 + t1397;
-    const real t1399 = S[17] - t1398;
-    const real t1400 = Rc[2] * t1399;
-    const real t1401 = t1389 + t1400;
-    const real t1402 = Rc[0] * t1401;
-    const real t1403 = Rc[0] * t1387;
-    const real t1404 = t61 * t868;
-    const real t1405 = t140 * t860;
-    const real t1406 = t1404 + t1405;
-    const real t1407 = t235 * t854;
-    const real t1408 = t1406 + t1407;
-    const real t1409 = t346 * t850;
-    const real t1410 = t1408 + t1409;
-    const real t1411 = t475 * t848;
-    const real t1412 = t1410 + t1411;
-    const real t1413 = S[18] - t1412;
-    const real t1414 = Rc[1] * t1413;
-    const real t1415 = t1403 + t1414;
-    const real t1416 = t61 * t913;
-    const real t1417 = t140 * t905;
-    const real t1418 = t1416 + t1417;
-    const real t1419 = t235 * t899;
-    const real t1420 = t1418 + t1419;
-    const real t1421 = t346 * t895;
-    const real t1422 = t1420 + t1421;
-    const real t1423 = t475 * t893;
-    const real t1424 = t1422 + t1423;
-    const real t1425 = S[19] - t1424;
-    const real t1426 = Rc[2] * t1425;
-    const real t1427 = t1415 + t1426;
-    const real t1428 = Rc[1] * t1427;
-    const real t1429 = t1402 + t1428;
-    const real t1430 = Rc[0] * t1399;
-    const real t1431 = Rc[1] * t1425;
-    const real t1432 = t1430 + t1431;
-    const real t1433 = t74 * t913;
-    const real t1434 = t153 * t905;
-    const real t1435 = t1433 + t1434;
-    const real t1436 = t248 * t899;
-    const real t1437 = t1435 + t1436;
-    const real t1438 = t359 * t895;
-    const real t1439 = t1437 + t1438;
-    const real t1440 = t488 * t893;
-    const real t1441 = t1439 + t1440;
-    const real t1442 = S[20] - t1441;
-    const real t1443 = Rc[2] * t1442;
-    const real t1444 = t1432 + t1443;
-    const real t1445 = Rc[2] * t1444;
-    const real t1446 = t1429 + t1445;
-    const real t1447 = r[1] * t1350;
-    const real t1448 = r[2] * t1289;
-    const real t1449 = t1447 - t1448;
-    const real t1450 = r[1] * t1346;
-    const real t1451 = r[2] * t1285;
-    const real t1452 = t1450 - t1451;
-    const real t1453 = t1449 + t1452;
-    const real t1454 = t1446 + t1453;
-    S_I[15] += t1454;
-    const real t1455 = Rc[3] * t1401;
-    const real t1456 = Rc[4] * t1427;
-    const real t1457 = t1455 + t1456;
-    const real t1458 = Rc[5] * t1444;
-    const real t1459 = t1457 + t1458;
-    const real t1460 = r[1] * t1359;
-    const real t1461 = r[2] * t1297;
-    const real t1462 = t1460 - t1461;
-    const real t1463 = r[2] * t1218;
-    const real t1464 = r[0] * t1346;
-    const real t1465 = t1463 - t1464;
-    const real t1466 = t1462 + t1465;
-    const real t1467 = t1459 + t1466;
-    S_I[16] += t1467;
-    const real t1468 = Rc[6] * t1401;
-    const real t1469 = Rc[7] * t1427;
-    const real t1470 = t1468 + t1469;
-    const real t1471 = Rc[8] * t1444;
-    const real t1472 = t1470 + t1471;
-    const real t1473 = r[1] * t1366;
-    const real t1474 = r[2] * t1306;
-    const real t1475 = t1473 - t1474;
-    const real t1476 = r[0] * t1285;
-    const real t1477 = r[1] * t1218;
-    const real t1478 = t1476 - t1477;
-    const real t1479 = t1475 + t1478;
-    const real t1480 = t1472 + t1479;
-    S_I[17] += t1480;
-    const real t1481 = Rc[3] * t1376;
-    const real t1482 = Rc[4] * t1387;
-    const real t1483 = t1481 + t1482;
-    const real t1484 = Rc[5] * t1399;
-    const real t1485 = t1483 + t1484;
-    const real t1486 = Rc[3] * t1485;
-    const real t1487 = Rc[3] * t1387;
-    const real t1488 = Rc[4] * t1413;
-    const real t1489 = t1487 + t1488;
-    const real t1490 = Rc[5] * t1425;
-    const real t1491 = t1489 + t1490;
-    const real t1492 = Rc[4] * t1491;
-    const real t1493 = t1486 + t1492;
-    const real t1494 = Rc[3] * t1399;
-    const real t1495 = Rc[4] * t1425;
-    const real t1496 = t1494 + t1495;
-    const real t1497 = Rc[5] * t1442;
-    const real t1498 = t1496 + t1497;
-    const real t1499 = Rc[5] * t1498;
-    const real t1500 = t1493 + t1499;
-    const real t1501 = r[2] * t1231;
-    const real t1502 = r[0] * t1359;
-    const real t1503 = t1501 - t1502;
-    const real t1504 = r[2] * t1227;
-    const real t1505 = r[0] * t1355;
-    const real t1506 = t1504 - t1505;
-    const real t1507 = t1503 + t1506;
-    const real t1508 = t1500 + t1507;
-    S_I[18] += t1508;
-    const real t1509 = Rc[6] * t1485;
-    const real t1510 = Rc[7] * t1491;
-    const real t1511 = t1509 + t1510;
-    const real t1512 = Rc[8] * t1498;
-    const real t1513 = t1511 + t1512;
-    const real t1514 = r[2] * t1240;
-    const real t1515 = r[0] * t1366;
-    const real t1516 = t1514 - t1515;
-    const real t1517 = r[0] * t1294;
-    const real t1518 = r[1] * t1227;
-    const real t1519 = t1517 - t1518;
-    const real t1520 = t1516 + t1519;
-    const real t1521 = t1513 + t1520;
-    S_I[19] += t1521;
-    const real t1522 = Rc[6] * t1376;
-    const real t1523 = Rc[7] * t1387;
-    const real t1524 = t1522 + t1523;
-    const real t1525 = Rc[8] * t1399;
-    const real t1526 = t1524 + t1525;
-    const real t1527 = Rc[6] * t1526;
-    const real t1528 = Rc[6] * t1387;
-    const real t1529 = Rc[7] * t1413;
-    const real t1530 = t1528 + t1529;
-    const real t1531 = Rc[8] * t1425;
-    const real t1532 = t1530 + t1531;
-    const real t1533 = Rc[7] * t1532;
-    const real t1534 = t1527 + t1533;
-    const real t1535 = Rc[6] * t1399;
-    const real t1536 = Rc[7] * t1425;
-    const real t1537 = t1535 + t1536;
-    const real t1538 = Rc[8] * t1442;
-    const real t1539 = t1537 + t1538;
-    const real t1540 = Rc[8] * t1539;
-    const real t1541 = t1534 + t1540;
-    const real t1542 = r[0] * t1306;
-    const real t1543 = r[1] * t1240;
-    const real t1544 = t1542 - t1543;
-    const real t1545 = r[0] * t1302;
-    const real t1546 = r[1] * t1236;
-    const real t1547 = t1545 - t1546;
-    const real t1548 = t1544 + t1547;
-    const real t1549 = t1541 + t1548;
-    S_I[20] += t1549;
-    const real t1550 = t10 * t1018;
-    const real t1551 = t89 * t1010;
-    const real t1552 = t1550 + t1551;
-    const real t1553 = t184 * t1004;
-    const real t1554 = t1552 + t1553;
-    const real t1555 = t295 * t1000;
-    const real t1556 = t1554 + t1555;
-    const real t1557 = t424 * t998;
-    const real t1558 = t1556 + t1557;
-    const real t1559 = e[0] + t1558;
-    const real t1560 = Rc[0] * t1559;
-    const real t1561 = t22 * t1018;
-    const real t1562 = t101 * t1010;
-    const real t1563 = t1561 + t1562;
-    const real t1564 = t196 * t1004;
-    const real t1565 = t1563 + t1564;
-    const real t1566 = t307 * t1000;
-    const real t1567 = t1565 + t1566;
-    const real t1568 = t436 * t998;
-    const real t1569 = t1567 + t1568;
-    const real t1570 = e[1] + t1569;
-    const real t1571 = Rc[1] * t1570;
-    const real t1572 = t1560 + t1571;
-    const real t1573 = t35 * t1018;
-    const real t1574 = t114 * t1010;
-    const real t1575 = t1573 + t1574;
-    const real t1576 = t209 * t1004;
-    const real t1577 = t1575 + t1576;
-    const real t1578 = t320 * t1000;
-    const real t1579 = t1577 + t1578;
-    const real t1580 = t449 * t998;
-    const real t1581 = t1579 + t1580;
-    const real t1582 = e[2] + t1581;
-    const real t1583 = Rc[2] * t1582;
-    const real t1584 = t1572 + t1583;
-    e_I[0] += t1584;
-    const real t1585 = Rc[3] * t1559;
-    const real t1586 = Rc[4] * t1570;
-    const real t1587 = t1585 + t1586;
-    const real t1588 = Rc[5] * t1582;
-    const real t1589 = t1587 + t1588;
-    e_I[1] += t1589;
-    const real t1590 = Rc[6] * t1559;
-    const real t1591 = Rc[7] * t1570;
-    const real t1592 = t1590 + t1591;
-    const real t1593 = Rc[8] * t1582;
-    const real t1594 = t1592 + t1593;
-    e_I[2] += t1594;
-    const real t1595 = t48 * t1018;
-    const real t1596 = t127 * t1010;
-    const real t1597 = t1595 + t1596;
-    const real t1598 = t222 * t1004;
-    const real t1599 = t1597 + t1598;
-    const real t1600 = t333 * t1000;
-    const real t1601 = t1599 + t1600;
-    const real t1602 = t462 * t998;
-    const real t1603 = t1601 + t1602;
-    const real t1604 = e[3] + t1603;
-    const real t1605 = Rc[0] * t1604;
-    const real t1606 = t61 * t1018;
-    const real t1607 = t140 * t1010;
-    const real t1608 = t1606 + t1607;
-    const real t1609 = t235 * t1004;
-    const real t1610 = t1608 + t1609;
-    const real t1611 = t346 * t1000;
-    const real t1612 = t1610 + t1611;
-    const real t1613 = t475 * t998;
-    const real t1614 = t1612 + t1613;
-    const real t1615 = e[4] + t1614;
-    const real t1616 = Rc[1] * t1615;
-    const real t1617 = t1605 + t1616;
-    const real t1618 = t74 * t1018;
-    const real t1619 = t153 * t1010;
-    const real t1620 = t1618 + t1619;
-    const real t1621 = t248 * t1004;
-    const real t1622 = t1620 + t1621;
-    const real t1623 = t359 * t1000;
-    const real t1624 = t1622 + t1623;
-    const real t1625 = t488 * t998;
-    const real t1626 = t1624 + t1625;
-    const real t1627 = e[5] + t1626;
-    const real t1628 = Rc[2] * t1627;
-    const real t1629 = t1617 + t1628;
-    const real t1630 = Rc[6] * r[1];
-    const real t1631 = Rc[3] * r[2];
-    const real t1632 = t1630 - t1631;
-    const real t1633 = t1559 * t1632;
-    const real t1634 = Rc[7] * r[1];
-    const real t1635 = Rc[4] * r[2];
-    const real t1636 = t1634 - t1635;
-    const real t1637 = t1570 * t1636;
-    const real t1638 = t1633 + t1637;
-    const real t1639 = Rc[8] * r[1];
-    const real t1640 = Rc[5] * r[2];
-    const real t1641 = t1639 - t1640;
-    const real t1642 = t1582 * t1641;
-    const real t1643 = t1638 + t1642;
-    const real t1644 = t1629 + t1643;
-    e_I[3] += t1644;
-    const real t1645 = Rc[3] * t1604;
-    const real t1646 = Rc[4] * t1615;
-    const real t1647 = t1645 + t1646;
-    const real t1648 = Rc[5] * t1627;
-    const real t1649 = t1647 + t1648;
-    const real t1650 = Rc[0] * r[2];
-    const real t1651 = Rc[6] * r[0];
-    const real t1652 = t1650 - t1651;
-    const real t1653 = t1559 * t1652;
-    const real t1654 = Rc[1] * r[2];
-    const real t1655 = Rc[7] * r[0];
-    const real t1656 = t1654 - t1655;
-    const real t1657 = t1570 * t1656;
-    const real t1658 = t1653 + t1657;
-    const real t1659 = Rc[2] * r[2];
-    const real t1660 = Rc[8] * r[0];
-    const real t1661 = t1659 - t1660;
-    const real t1662 = t1582 * t1661;
-    const real t1663 = t1658 + t1662;
-    const real t1664 = t1649 + t1663;
-    e_I[4] += t1664;
-    const real t1665 = Rc[6] * t1604;
-    const real t1666 = Rc[7] * t1615;
-    const real t1667 = t1665 + t1666;
-    const real t1668 = Rc[8] * t1627;
-    const real t1669 = t1667 + t1668;
-    const real t1670 = Rc[3] * r[0];
-    const real t1671 = Rc[0] * r[1];
-    const real t1672 = t1670 - t1671;
-    const real t1673 = t1559 * t1672;
-    const real t1674 = Rc[4] * r[0];
-    const real t1675 = Rc[1] * r[1];
-    const real t1676 = t1674 - t1675;
-    const real t1677 = t1570 * t1676;
-    const real t1678 = t1673 + t1677;
-    const real t1679 = Rc[5] * r[0];
-    const real t1680 = Rc[2] * r[1];
-    const real t1681 = t1679 - t1680;
-    const real t1682 = t1582 * t1681;
-    const real t1683 = t1678 + t1682;
-    const real t1684 = t1669 + t1683;
-    e_I[5] += t1684;
-    return 0;
+  real t10 = H[0] * S[0] + H[5] * S[1] + H[10] * S[2] + H[15] * S[3] + H[20] * S[4] + H[25] * S[5];
+  real t22 = H[0] * S[1] + H[5] * S[6] + H[10] * S[7] + H[15] * S[8] + H[20] * S[9] + H[25] * S[10];
+  real t35 = H[0] * S[2] + H[5] * S[7] + H[10] * S[11] + H[15] * S[12] + H[20] * S[13] + H[25] *
+    S[14];
+  real t48 = H[0] * S[3] + H[5] * S[8] + H[10] * S[12] + H[15] * S[15] + H[20] * S[16] + H[25] *
+    S[17];
+  real t61 = H[0] * S[4] + H[5] * S[9] + H[10] * S[13] + H[15] * S[16] + H[20] * S[18] + H[25] *
+    S[19];
+  real t74 = H[0] * S[5] + H[5] * S[10] + H[10] * S[14] + H[15] * S[17] + H[20] * S[19] + H[25] *
+    S[20];
+  real t77 = J[0] + (H[0] * t10 + H[5] * t22 + H[10] * t35 + H[15] * t48 + H[20] * t61 + H[25] *
+    t74);
+  real t78 = 0.0 < t77;
+  if (!(t78 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+  real t89 = H[1] * S[0] + H[6] * S[1] + H[11] * S[2] + H[16] * S[3] + H[21] * S[4] + H[26] * S[5];
+  real t101 = H[1] * S[1] + H[6] * S[6] + H[11] * S[7] + H[16] * S[8] + H[21] * S[9] + H[26] *
+    S[10];
+  real t114 = H[1] * S[2] + H[6] * S[7] + H[11] * S[11] + H[16] * S[12] + H[21] * S[13] + H[26] *
+    S[14];
+  real t127 = H[1] * S[3] + H[6] * S[8] + H[11] * S[12] + H[16] * S[15] + H[21] * S[16] + H[26] *
+    S[17];
+  real t140 = H[1] * S[4] + H[6] * S[9] + H[11] * S[13] + H[16] * S[16] + H[21] * S[18] + H[26] *
+    S[19];
+  real t153 = H[1] * S[5] + H[6] * S[10] + H[11] * S[14] + H[16] * S[17] + H[21] * S[19] + H[26] *
+    S[20];
+  real t156 = J[1] + (H[1] * t89 + H[6] * t101 + H[11] * t114 + H[16] * t127 + H[21] * t140 + H[26]
+    * t153);
+  real t168 = H[0] * t89 + H[5] * t101 + H[10] * t114 + H[15] * t127 + H[20] * t140 + H[25] * t153;
+  real t169 = 1.0 / t77;
+  real t170 = t168 * t169;
+  real t172 = t156 - t168 * t170;
+  real t173 = t156 * ((real)1 / (real)10000000000000) < t172;
+  if (!(t173 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+  real t184 = H[2] * S[0] + H[7] * S[1] + H[12] * S[2] + H[17] * S[3] + H[22] * S[4] + H[27] * S[5];
+  real t196 = H[2] * S[1] + H[7] * S[6] + H[12] * S[7] + H[17] * S[8] + H[22] * S[9] + H[27] *
+    S[10];
+  real t209 = H[2] * S[2] + H[7] * S[7] + H[12] * S[11] + H[17] * S[12] + H[22] * S[13] + H[27] *
+    S[14];
+  real t222 = H[2] * S[3] + H[7] * S[8] + H[12] * S[12] + H[17] * S[15] + H[22] * S[16] + H[27] *
+    S[17];
+  real t235 = H[2] * S[4] + H[7] * S[9] + H[12] * S[13] + H[17] * S[16] + H[22] * S[18] + H[27] *
+    S[19];
+  real t248 = H[2] * S[5] + H[7] * S[10] + H[12] * S[14] + H[17] * S[17] + H[22] * S[19] + H[27] *
+    S[20];
+  real t251 = J[2] + (H[2] * t184 + H[7] * t196 + H[12] * t209 + H[17] * t222 + H[22] * t235 + H[27]
+    * t248);
+  real t263 = H[0] * t184 + H[5] * t196 + H[10] * t209 + H[15] * t222 + H[20] * t235 + H[25] * t248;
+  real t264 = t263 * t169;
+  real t279 = H[1] * t184 + H[6] * t196 + H[11] * t209 + H[16] * t222 + H[21] * t235 + H[26] * t248
+    - t263 * t170;
+  real t280 = 1.0 / t172;
+  real t281 = t280 * t279;
+  real t283 = t251 - t263 * t264 - t279 * t281;
+  real t284 = t251 * ((real)1 / (real)10000000000000) < t283;
+  if (!(t284 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+  real t295 = H[3] * S[0] + H[8] * S[1] + H[13] * S[2] + H[18] * S[3] + H[23] * S[4] + H[28] * S[5];
+  real t307 = H[3] * S[1] + H[8] * S[6] + H[13] * S[7] + H[18] * S[8] + H[23] * S[9] + H[28] *
+    S[10];
+  real t320 = H[3] * S[2] + H[8] * S[7] + H[13] * S[11] + H[18] * S[12] + H[23] * S[13] + H[28] *
+    S[14];
+  real t333 = H[3] * S[3] + H[8] * S[8] + H[13] * S[12] + H[18] * S[15] + H[23] * S[16] + H[28] *
+    S[17];
+  real t346 = H[3] * S[4] + H[8] * S[9] + H[13] * S[13] + H[18] * S[16] + H[23] * S[18] + H[28] *
+    S[19];
+  real t359 = H[3] * S[5] + H[8] * S[10] + H[13] * S[14] + H[18] * S[17] + H[23] * S[19] + H[28] *
+    S[20];
+  real t362 = J[3] + (H[3] * t295 + H[8] * t307 + H[13] * t320 + H[18] * t333 + H[23] * t346 + H[28]
+    * t359);
+  real t374 = H[0] * t295 + H[5] * t307 + H[10] * t320 + H[15] * t333 + H[20] * t346 + H[25] * t359;
+  real t375 = t374 * t169;
+  real t390 = H[1] * t295 + H[6] * t307 + H[11] * t320 + H[16] * t333 + H[21] * t346 + H[26] * t359
+    - t374 * t170;
+  real t391 = t280 * t390;
+  real t408 = H[2] * t295 + H[7] * t307 + H[12] * t320 + H[17] * t333 + H[22] * t346 + H[27] * t359
+    - t374 * t264 - t281 * t390;
+  real t409 = 1.0 / t283;
+  real t410 = t409 * t408;
+  real t412 = t362 - t374 * t375 - t390 * t391 - t408 * t410;
+  real t413 = t362 * ((real)1 / (real)10000000000000) < t412;
+  if (!(t413 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+  real t424 = H[4] * S[0] + H[9] * S[1] + H[14] * S[2] + H[19] * S[3] + H[24] * S[4] + H[29] * S[5];
+  real t436 = H[4] * S[1] + H[9] * S[6] + H[14] * S[7] + H[19] * S[8] + H[24] * S[9] + H[29] *
+    S[10];
+  real t449 = H[4] * S[2] + H[9] * S[7] + H[14] * S[11] + H[19] * S[12] + H[24] * S[13] + H[29] *
+    S[14];
+  real t462 = H[4] * S[3] + H[9] * S[8] + H[14] * S[12] + H[19] * S[15] + H[24] * S[16] + H[29] *
+    S[17];
+  real t475 = H[4] * S[4] + H[9] * S[9] + H[14] * S[13] + H[19] * S[16] + H[24] * S[18] + H[29] *
+    S[19];
+  real t488 = H[4] * S[5] + H[9] * S[10] + H[14] * S[14] + H[19] * S[17] + H[24] * S[19] + H[29] *
+    S[20];
+  real t491 = J[4] + (H[4] * t424 + H[9] * t436 + H[14] * t449 + H[19] * t462 + H[24] * t475 + H[29]
+    * t488);
+  real t503 = H[0] * t424 + H[5] * t436 + H[10] * t449 + H[15] * t462 + H[20] * t475 + H[25] * t488;
+  real t504 = t503 * t169;
+  real t519 = H[1] * t424 + H[6] * t436 + H[11] * t449 + H[16] * t462 + H[21] * t475 + H[26] * t488
+    - t503 * t170;
+  real t520 = t280 * t519;
+  real t537 = H[2] * t424 + H[7] * t436 + H[12] * t449 + H[17] * t462 + H[22] * t475 + H[27] * t488
+    - t503 * t264 - t281 * t519;
+  real t538 = t409 * t537;
+  real t557 = H[3] * t424 + H[8] * t436 + H[13] * t449 + H[18] * t462 + H[23] * t475 + H[28] * t488
+    - t503 * t375 - t391 * t519 - t410 * t537;
+  real t558 = 1.0 / t412;
+  real t559 = t558 * t557;
+  real t561 = t491 - t503 * t504 - t519 * t520 - t537 * t538 - t557 * t559;
+  real t562 = t491 * ((real)1 / (real)10000000000000) < t561;
+  if (!(t562 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+  if (!(t78 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+  if (!(t173 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+  if (!(t284 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+  if (!(t413 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+  if (!(t562 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+  real t571 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t572 = (0.0 < floor_[0]) ? floor_[0] : t571;
+  real t582 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t583 = (0.0 < floor_[1]) ? floor_[1] : t582;
+  if (!(((H[10] * H[10] + (H[0] * H[0] + H[5] * H[5])) * t572 + (H[25] * H[25] + (H[15] * H[15] + H[20] * H[20])) * t583 < t77))) return 1; /* speed 1 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t572 * (H[11] * H[11] + (H[1] * H[1] + H[6] * H[6])) + t583 * (H[26] * H[26] + (H[16] * H[16] + H[21] * H[21])) < t156))) return 1; /* speed 2 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t572 * (H[12] * H[12] + (H[2] * H[2] + H[7] * H[7])) + t583 * (H[27] * H[27] + (H[17] * H[17] + H[22] * H[22])) < t251))) return 1; /* speed 3 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t572 * (H[13] * H[13] + (H[3] * H[3] + H[8] * H[8])) + t583 * (H[28] * H[28] + (H[18] * H[18] + H[23] * H[23])) < t362))) return 1; /* speed 4 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t572 * (H[14] * H[14] + (H[4] * H[4] + H[9] * H[9])) + t583 * (H[29] * H[29] + (H[19] * H[19] + H[24] * H[24])) < t491))) return 1; /* speed 5 of 5 moves no inertia: its acceleration is undetermined */
+  real t645 = t89 - t10 * t170;
+  real t650 = t184 - t10 * t264 - t281 * t645;
+  real t657 = t295 - t10 * t375 - t391 * t645 - t410 * t650;
+  real t659 = 1.0 / t561;
+  real t668 = t659 * (t424 - t10 * t504 - t520 * t645 - t538 * t650 - t559 * t657);
+  real t670 = t558 * t657 - t559 * t668;
+  real t674 = t409 * t650 - t410 * t670 - t538 * t668;
+  real t680 = t280 * t645 - t281 * t674 - t391 * t670 - t520 * t668;
+  real t688 = t10 * t169 - t170 * t680 - t264 * t674 - t375 * t670 - t504 * t668;
+  G[0] = t688;
+  real t691 = t101 - t22 * t170;
+  real t696 = t196 - t22 * t264 - t281 * t691;
+  real t703 = t307 - t22 * t375 - t391 * t691 - t410 * t696;
+  real t713 = t659 * (t436 - t22 * t504 - t520 * t691 - t538 * t696 - t559 * t703);
+  real t715 = t558 * t703 - t559 * t713;
+  real t719 = t409 * t696 - t410 * t715 - t538 * t713;
+  real t725 = t280 * t691 - t281 * t719 - t391 * t715 - t520 * t713;
+  real t733 = t22 * t169 - t170 * t725 - t264 * t719 - t375 * t715 - t504 * t713;
+  G[1] = t733;
+  real t736 = t114 - t35 * t170;
+  real t741 = t209 - t35 * t264 - t281 * t736;
+  real t748 = t320 - t35 * t375 - t391 * t736 - t410 * t741;
+  real t758 = t659 * (t449 - t35 * t504 - t520 * t736 - t538 * t741 - t559 * t748);
+  real t760 = t558 * t748 - t559 * t758;
+  real t764 = t409 * t741 - t410 * t760 - t538 * t758;
+  real t770 = t280 * t736 - t281 * t764 - t391 * t760 - t520 * t758;
+  real t778 = t35 * t169 - t170 * t770 - t264 * t764 - t375 * t760 - t504 * t758;
+  G[2] = t778;
+  real t781 = t127 - t48 * t170;
+  real t786 = t222 - t48 * t264 - t281 * t781;
+  real t793 = t333 - t48 * t375 - t391 * t781 - t410 * t786;
+  real t803 = t659 * (t462 - t48 * t504 - t520 * t781 - t538 * t786 - t559 * t793);
+  real t805 = t558 * t793 - t559 * t803;
+  real t809 = t409 * t786 - t410 * t805 - t538 * t803;
+  real t815 = t280 * t781 - t281 * t809 - t391 * t805 - t520 * t803;
+  real t823 = t48 * t169 - t170 * t815 - t264 * t809 - t375 * t805 - t504 * t803;
+  G[3] = t823;
+  real t826 = t140 - t61 * t170;
+  real t831 = t235 - t61 * t264 - t281 * t826;
+  real t838 = t346 - t61 * t375 - t391 * t826 - t410 * t831;
+  real t848 = t659 * (t475 - t61 * t504 - t520 * t826 - t538 * t831 - t559 * t838);
+  real t850 = t558 * t838 - t559 * t848;
+  real t854 = t409 * t831 - t410 * t850 - t538 * t848;
+  real t860 = t280 * t826 - t281 * t854 - t391 * t850 - t520 * t848;
+  real t868 = t61 * t169 - t170 * t860 - t264 * t854 - t375 * t850 - t504 * t848;
+  G[4] = t868;
+  real t871 = t153 - t74 * t170;
+  real t876 = t248 - t74 * t264 - t281 * t871;
+  real t883 = t359 - t74 * t375 - t391 * t871 - t410 * t876;
+  real t893 = t659 * (t488 - t74 * t504 - t520 * t871 - t538 * t876 - t559 * t883);
+  real t895 = t558 * t883 - t559 * t893;
+  real t899 = t409 * t876 - t410 * t895 - t538 * t893;
+  real t905 = t280 * t871 - t281 * t899 - t391 * t895 - t520 * t893;
+  real t913 = t74 * t169 - t170 * t905 - t264 * t899 - t375 * t895 - t504 * t893;
+  G[5] = t913;
+  G[6] = t680;
+  G[7] = t725;
+  G[8] = t770;
+  G[9] = t815;
+  G[10] = t860;
+  G[11] = t905;
+  G[12] = t674;
+  G[13] = t719;
+  G[14] = t764;
+  G[15] = t809;
+  G[16] = t854;
+  G[17] = t899;
+  G[18] = t670;
+  G[19] = t715;
+  G[20] = t760;
+  G[21] = t805;
+  G[22] = t850;
+  G[23] = t895;
+  G[24] = t668;
+  G[25] = t713;
+  G[26] = t758;
+  G[27] = t803;
+  G[28] = t848;
+  G[29] = t893;
+  real t925 = tau[0] - (H[0] * e[0] + H[5] * e[1] + H[10] * e[2] + H[15] * e[3] + H[20] * e[4] +
+    H[25] * e[5]);
+  real t940 = tau[1] - (H[1] * e[0] + H[6] * e[1] + H[11] * e[2] + H[16] * e[3] + H[21] * e[4] +
+    H[26] * e[5]) - t170 * t925;
+  real t957 = tau[2] - (H[2] * e[0] + H[7] * e[1] + H[12] * e[2] + H[17] * e[3] + H[22] * e[4] +
+    H[27] * e[5]) - t264 * t925 - t281 * t940;
+  real t976 = tau[3] - (H[3] * e[0] + H[8] * e[1] + H[13] * e[2] + H[18] * e[3] + H[23] * e[4] +
+    H[28] * e[5]) - t375 * t925 - t391 * t940 - t410 * t957;
+  real t998 = t659 * (tau[4] - (H[4] * e[0] + H[9] * e[1] + H[14] * e[2] + H[19] * e[3] + H[24] *
+    e[4] + H[29] * e[5]) - t504 * t925 - t520 * t940 - t538 * t957 - t559 * t976);
+  real t1000 = t558 * t976 - t559 * t998;
+  real t1004 = t409 * t957 - t410 * t1000 - t538 * t998;
+  real t1010 = t280 * t940 - t281 * t1004 - t391 * t1000 - t520 * t998;
+  real t1018 = t169 * t925 - t170 * t1010 - t264 * t1004 - t375 * t1000 - t504 * t998;
+  g[0] = t1018;
+  g[1] = t1010;
+  g[2] = t1004;
+  g[3] = t1000;
+  g[4] = t998;
+  real t1028 = S[0] - (t10 * t688 + t89 * t680 + t184 * t674 + t295 * t670 + t424 * t668);
+  real t1039 = S[1] - (t10 * t733 + t89 * t725 + t184 * t719 + t295 * t715 + t424 * t713);
+  real t1051 = S[2] - (t10 * t778 + t89 * t770 + t184 * t764 + t295 * t760 + t424 * t758);
+  real t1053 = Rc[0] * t1028 + Rc[1] * t1039 + Rc[2] * t1051;
+  real t1065 = S[6] - (t22 * t733 + t101 * t725 + t196 * t719 + t307 * t715 + t436 * t713);
+  real t1077 = S[7] - (t22 * t778 + t101 * t770 + t196 * t764 + t307 * t760 + t436 * t758);
+  real t1079 = Rc[0] * t1039 + Rc[1] * t1065 + Rc[2] * t1077;
+  real t1094 = S[11] - (t35 * t778 + t114 * t770 + t209 * t764 + t320 * t760 + t449 * t758);
+  real t1096 = Rc[0] * t1051 + Rc[1] * t1077 + Rc[2] * t1094;
+  real t1098 = Rc[0] * t1053 + Rc[1] * t1079 + Rc[2] * t1096;
+  S_I[0] += t1098;
+  real t1103 = Rc[3] * t1053 + Rc[4] * t1079 + Rc[5] * t1096;
+  S_I[1] += t1103;
+  real t1108 = Rc[6] * t1053 + Rc[7] * t1079 + Rc[8] * t1096;
+  S_I[2] += t1108;
+  real t1118 = S[3] - (t10 * t823 + t89 * t815 + t184 * t809 + t295 * t805 + t424 * t803);
+  real t1129 = S[8] - (t22 * t823 + t101 * t815 + t196 * t809 + t307 * t805 + t436 * t803);
+  real t1141 = S[12] - (t35 * t823 + t114 * t815 + t209 * t809 + t320 * t805 + t449 * t803);
+  real t1143 = Rc[0] * t1118 + Rc[1] * t1129 + Rc[2] * t1141;
+  real t1154 = S[4] - (t10 * t868 + t89 * t860 + t184 * t854 + t295 * t850 + t424 * t848);
+  real t1165 = S[9] - (t22 * t868 + t101 * t860 + t196 * t854 + t307 * t850 + t436 * t848);
+  real t1177 = S[13] - (t35 * t868 + t114 * t860 + t209 * t854 + t320 * t850 + t449 * t848);
+  real t1179 = Rc[0] * t1154 + Rc[1] * t1165 + Rc[2] * t1177;
+  real t1191 = S[5] - (t10 * t913 + t89 * t905 + t184 * t899 + t295 * t895 + t424 * t893);
+  real t1202 = S[10] - (t22 * t913 + t101 * t905 + t196 * t899 + t307 * t895 + t436 * t893);
+  real t1214 = S[14] - (t35 * t913 + t114 * t905 + t209 * t899 + t320 * t895 + t449 * t893);
+  real t1216 = Rc[0] * t1191 + Rc[1] * t1202 + Rc[2] * t1214;
+  real t1218 = Rc[0] * t1143 + Rc[1] * t1179 + Rc[2] * t1216;
+  real t1219 = r[1] * t1108;
+  real t1220 = r[2] * t1103;
+  S_I[3] += t1218 + (t1219 - t1220);
+  real t1227 = Rc[3] * t1143 + Rc[4] * t1179 + Rc[5] * t1216;
+  real t1231 = t1227 + (r[2] * t1098 - r[0] * t1108);
+  S_I[4] += t1231;
+  real t1236 = Rc[6] * t1143 + Rc[7] * t1179 + Rc[8] * t1216;
+  real t1240 = t1236 + (r[0] * t1103 - r[1] * t1098);
+  S_I[5] += t1240;
+  real t1245 = Rc[3] * t1028 + Rc[4] * t1039 + Rc[5] * t1051;
+  real t1251 = Rc[3] * t1039 + Rc[4] * t1065 + Rc[5] * t1077;
+  real t1258 = Rc[3] * t1051 + Rc[4] * t1077 + Rc[5] * t1094;
+  real t1260 = Rc[3] * t1245 + Rc[4] * t1251 + Rc[5] * t1258;
+  S_I[6] += t1260;
+  real t1265 = Rc[6] * t1245 + Rc[7] * t1251 + Rc[8] * t1258;
+  S_I[7] += t1265;
+  real t1270 = Rc[3] * t1118 + Rc[4] * t1129 + Rc[5] * t1141;
+  real t1276 = Rc[3] * t1154 + Rc[4] * t1165 + Rc[5] * t1177;
+  real t1283 = Rc[3] * t1191 + Rc[4] * t1202 + Rc[5] * t1214;
+  real t1285 = Rc[0] * t1270 + Rc[1] * t1276 + Rc[2] * t1283;
+  real t1289 = t1285 + (r[1] * t1265 - r[2] * t1260);
+  S_I[8] += t1289;
+  real t1294 = Rc[3] * t1270 + Rc[4] * t1276 + Rc[5] * t1283;
+  real t1295 = r[0] * t1265;
+  real t1297 = t1294 + (t1220 - t1295);
+  S_I[9] += t1297;
+  real t1302 = Rc[6] * t1270 + Rc[7] * t1276 + Rc[8] * t1283;
+  real t1306 = t1302 + (r[0] * t1260 - r[1] * t1103);
+  S_I[10] += t1306;
+  real t1326 = Rc[6] * (Rc[6] * t1028 + Rc[7] * t1039 + Rc[8] * t1051) + Rc[7] * (Rc[6] * t1039 +
+    Rc[7] * t1065 + Rc[8] * t1077) + Rc[8] * (Rc[6] * t1051 + Rc[7] * t1077 + Rc[8] * t1094);
+  S_I[11] += t1326;
+  real t1331 = Rc[6] * t1118 + Rc[7] * t1129 + Rc[8] * t1141;
+  real t1337 = Rc[6] * t1154 + Rc[7] * t1165 + Rc[8] * t1177;
+  real t1344 = Rc[6] * t1191 + Rc[7] * t1202 + Rc[8] * t1214;
+  real t1346 = Rc[0] * t1331 + Rc[1] * t1337 + Rc[2] * t1344;
+  real t1350 = t1346 + (r[1] * t1326 - r[2] * t1265);
+  S_I[12] += t1350;
+  real t1355 = Rc[3] * t1331 + Rc[4] * t1337 + Rc[5] * t1344;
+  real t1359 = t1355 + (r[2] * t1108 - r[0] * t1326);
+  S_I[13] += t1359;
+  real t1366 = Rc[6] * t1331 + Rc[7] * t1337 + Rc[8] * t1344 + (t1295 - t1219);
+  S_I[14] += t1366;
+  real t1376 = S[15] - (t48 * t823 + t127 * t815 + t222 * t809 + t333 * t805 + t462 * t803);
+  real t1387 = S[16] - (t48 * t868 + t127 * t860 + t222 * t854 + t333 * t850 + t462 * t848);
+  real t1399 = S[17] - (t48 * t913 + t127 * t905 + t222 * t899 + t333 * t895 + t462 * t893);
+  real t1401 = Rc[0] * t1376 + Rc[1] * t1387 + Rc[2] * t1399;
+  real t1413 = S[18] - (t61 * t868 + t140 * t860 + t235 * t854 + t346 * t850 + t475 * t848);
+  real t1425 = S[19] - (t61 * t913 + t140 * t905 + t235 * t899 + t346 * t895 + t475 * t893);
+  real t1427 = Rc[0] * t1387 + Rc[1] * t1413 + Rc[2] * t1425;
+  real t1442 = S[20] - (t74 * t913 + t153 * t905 + t248 * t899 + t359 * t895 + t488 * t893);
+  real t1444 = Rc[0] * t1399 + Rc[1] * t1425 + Rc[2] * t1442;
+  S_I[15] += Rc[0] * t1401 + Rc[1] * t1427 + Rc[2] * t1444 + (r[1] * t1350 - r[2] * t1289 + (r[1] *
+    t1346 - r[2] * t1285));
+  S_I[16] += Rc[3] * t1401 + Rc[4] * t1427 + Rc[5] * t1444 + (r[1] * t1359 - r[2] * t1297 + (r[2] *
+    t1218 - r[0] * t1346));
+  S_I[17] += Rc[6] * t1401 + Rc[7] * t1427 + Rc[8] * t1444 + (r[1] * t1366 - r[2] * t1306 + (r[0] *
+    t1285 - r[1] * t1218));
+  real t1485 = Rc[3] * t1376 + Rc[4] * t1387 + Rc[5] * t1399;
+  real t1491 = Rc[3] * t1387 + Rc[4] * t1413 + Rc[5] * t1425;
+  real t1498 = Rc[3] * t1399 + Rc[4] * t1425 + Rc[5] * t1442;
+  S_I[18] += Rc[3] * t1485 + Rc[4] * t1491 + Rc[5] * t1498 + (r[2] * t1231 - r[0] * t1359 + (r[2] *
+    t1227 - r[0] * t1355));
+  S_I[19] += Rc[6] * t1485 + Rc[7] * t1491 + Rc[8] * t1498 + (r[2] * t1240 - r[0] * t1366 + (r[0] *
+    t1294 - r[1] * t1227));
+  S_I[20] += Rc[6] * (Rc[6] * t1376 + Rc[7] * t1387 + Rc[8] * t1399) + Rc[7] * (Rc[6] * t1387 +
+    Rc[7] * t1413 + Rc[8] * t1425) + Rc[8] * (Rc[6] * t1399 + Rc[7] * t1425 + Rc[8] * t1442) + (r[0]
+    * t1306 - r[1] * t1240 + (r[0] * t1302 - r[1] * t1236));
+  real t1559 = e[0] + (t10 * t1018 + t89 * t1010 + t184 * t1004 + t295 * t1000 + t424 * t998);
+  real t1570 = e[1] + (t22 * t1018 + t101 * t1010 + t196 * t1004 + t307 * t1000 + t436 * t998);
+  real t1582 = e[2] + (t35 * t1018 + t114 * t1010 + t209 * t1004 + t320 * t1000 + t449 * t998);
+  e_I[0] += Rc[0] * t1559 + Rc[1] * t1570 + Rc[2] * t1582;
+  e_I[1] += Rc[3] * t1559 + Rc[4] * t1570 + Rc[5] * t1582;
+  e_I[2] += Rc[6] * t1559 + Rc[7] * t1570 + Rc[8] * t1582;
+  real t1604 = e[3] + (t48 * t1018 + t127 * t1010 + t222 * t1004 + t333 * t1000 + t462 * t998);
+  real t1615 = e[4] + (t61 * t1018 + t140 * t1010 + t235 * t1004 + t346 * t1000 + t475 * t998);
+  real t1627 = e[5] + (t74 * t1018 + t153 * t1010 + t248 * t1004 + t359 * t1000 + t488 * t998);
+  e_I[3] += Rc[0] * t1604 + Rc[1] * t1615 + Rc[2] * t1627 + (t1559 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t1570 * (Rc[7] * r[1] - Rc[4] * r[2]) + t1582 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t1604 + Rc[4] * t1615 + Rc[5] * t1627 + (t1559 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t1570 * (Rc[1] * r[2] - Rc[7] * r[0]) + t1582 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t1604 + Rc[7] * t1615 + Rc[8] * t1627 + (t1559 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t1570 * (Rc[4] * r[0] - Rc[1] * r[1]) + t1582 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"J", 5, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 5, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_condense_outputs[] = {
-    {"G", 30, "", 0, 0},
-    {"g", 5, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic5_condense_guards[] = {
-    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 5 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic5_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 5 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the free coordinates
@@ -2277,290 +469,58 @@ static const mstmm_guard mstmm_sweep_generic5_condense_guards[] = {
  * out udot[5] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic5_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic5_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    const real t78 = G[18] * t16;
-    const real t79 = G[19] * t22;
-    const real t80 = t78 + t79;
-    const real t81 = G[20] * t29;
-    const real t82 = t80 + t81;
-    const real t83 = G[21] * t36;
-    const real t84 = t82 + t83;
-    const real t85 = G[22] * t43;
-    const real t86 = t84 + t85;
-    const real t87 = G[23] * t50;
-    const real t88 = t86 + t87;
-    const real t89 = g[3] - t88;
-    udot[3] = t89;
-    const real t90 = G[24] * t16;
-    const real t91 = G[25] * t22;
-    const real t92 = t90 + t91;
-    const real t93 = G[26] * t29;
-    const real t94 = t92 + t93;
-    const real t95 = G[27] * t36;
-    const real t96 = t94 + t95;
-    const real t97 = G[28] * t43;
-    const real t98 = t96 + t97;
-    const real t99 = G[29] * t50;
-    const real t100 = t98 + t99;
-    const real t101 = g[4] - t100;
-    udot[4] = t101;
-    const real t102 = H[0] * t53;
-    const real t103 = H[1] * t65;
-    const real t104 = t102 + t103;
-    const real t105 = H[2] * t77;
-    const real t106 = t104 + t105;
-    const real t107 = H[3] * t89;
-    const real t108 = t106 + t107;
-    const real t109 = H[4] * t101;
-    const real t110 = t108 + t109;
-    const real t111 = t16 + t110;
-    delta[0] = t111;
-    const real t112 = H[5] * t53;
-    const real t113 = H[6] * t65;
-    const real t114 = t112 + t113;
-    const real t115 = H[7] * t77;
-    const real t116 = t114 + t115;
-    const real t117 = H[8] * t89;
-    const real t118 = t116 + t117;
-    const real t119 = H[9] * t101;
-    const real t120 = t118 + t119;
-    const real t121 = t22 + t120;
-    delta[1] = t121;
-    const real t122 = H[10] * t53;
-    const real t123 = H[11] * t65;
-    const real t124 = t122 + t123;
-    const real t125 = H[12] * t77;
-    const real t126 = t124 + t125;
-    const real t127 = H[13] * t89;
-    const real t128 = t126 + t127;
-    const real t129 = H[14] * t101;
-    const real t130 = t128 + t129;
-    const real t131 = t29 + t130;
-    delta[2] = t131;
-    const real t132 = H[15] * t53;
-    const real t133 = H[16] * t65;
-    const real t134 = t132 + t133;
-    const real t135 = H[17] * t77;
-    const real t136 = t134 + t135;
-    const real t137 = H[18] * t89;
-    const real t138 = t136 + t137;
-    const real t139 = H[19] * t101;
-    const real t140 = t138 + t139;
-    const real t141 = t36 + t140;
-    delta[3] = t141;
-    const real t142 = H[20] * t53;
-    const real t143 = H[21] * t65;
-    const real t144 = t142 + t143;
-    const real t145 = H[22] * t77;
-    const real t146 = t144 + t145;
-    const real t147 = H[23] * t89;
-    const real t148 = t146 + t147;
-    const real t149 = H[24] * t101;
-    const real t150 = t148 + t149;
-    const real t151 = t43 + t150;
-    delta[4] = t151;
-    const real t152 = H[25] * t53;
-    const real t153 = H[26] * t65;
-    const real t154 = t152 + t153;
-    const real t155 = H[27] * t77;
-    const real t156 = t154 + t155;
-    const real t157 = H[28] * t89;
-    const real t158 = t156 + t157;
-    const real t159 = H[29] * t101;
-    const real t160 = t158 + t159;
-    const real t161 = t50 + t160;
-    delta[5] = t161;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  real t89 = g[3] - (G[18] * t16 + G[19] * t22 + G[20] * t29 + G[21] * t36 + G[22] * t43 + G[23] *
+    t50);
+  udot[3] = t89;
+  real t101 = g[4] - (G[24] * t16 + G[25] * t22 + G[26] * t29 + G[27] * t36 + G[28] * t43 + G[29] *
+    t50);
+  udot[4] = t101;
+  delta[0] = t16 + (H[0] * t53 + H[1] * t65 + H[2] * t77 + H[3] * t89 + H[4] * t101);
+  delta[1] = t22 + (H[5] * t53 + H[6] * t65 + H[7] * t77 + H[8] * t89 + H[9] * t101);
+  delta[2] = t29 + (H[10] * t53 + H[11] * t65 + H[12] * t77 + H[13] * t89 + H[14] * t101);
+  delta[3] = t36 + (H[15] * t53 + H[16] * t65 + H[17] * t77 + H[18] * t89 + H[19] * t101);
+  delta[4] = t43 + (H[20] * t53 + H[21] * t65 + H[22] * t77 + H[23] * t89 + H[24] * t101);
+  delta[5] = t50 + (H[25] * t53 + H[26] * t65 + H[27] * t77 + H[28] * t89 + H[29] * t101);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"G", 30, "", 0, 0},
-    {"g", 5, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_recover_outputs[] = {
-    {"udot", 5, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 5 speeds
  * in  H[6][5] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[5] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic5_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic5_effort(in_t H, in_t f, out_t tau)
 {
-    const real t0 = H[0] * f[0];
-    const real t1 = H[5] * f[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * f[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * f[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * f[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * f[5];
-    const real t10 = t8 + t9;
-    tau[0] = t10;
-    const real t11 = H[1] * f[0];
-    const real t12 = H[6] * f[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[11] * f[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[16] * f[3];
-    const real t17 = t15 + t16;
-    const real t18 = H[21] * f[4];
-    const real t19 = t17 + t18;
-    const real t20 = H[26] * f[5];
-    const real t21 = t19 + t20;
-    tau[1] = t21;
-    const real t22 = H[2] * f[0];
-    const real t23 = H[7] * f[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[12] * f[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[17] * f[3];
-    const real t28 = t26 + t27;
-    const real t29 = H[22] * f[4];
-    const real t30 = t28 + t29;
-    const real t31 = H[27] * f[5];
-    const real t32 = t30 + t31;
-    tau[2] = t32;
-    const real t33 = H[3] * f[0];
-    const real t34 = H[8] * f[1];
-    const real t35 = t33 + t34;
-    const real t36 = H[13] * f[2];
-    const real t37 = t35 + t36;
-    const real t38 = H[18] * f[3];
-    const real t39 = t37 + t38;
-    const real t40 = H[23] * f[4];
-    const real t41 = t39 + t40;
-    const real t42 = H[28] * f[5];
-    const real t43 = t41 + t42;
-    tau[3] = t43;
-    const real t44 = H[4] * f[0];
-    const real t45 = H[9] * f[1];
-    const real t46 = t44 + t45;
-    const real t47 = H[14] * f[2];
-    const real t48 = t46 + t47;
-    const real t49 = H[19] * f[3];
-    const real t50 = t48 + t49;
-    const real t51 = H[24] * f[4];
-    const real t52 = t50 + t51;
-    const real t53 = H[29] * f[5];
-    const real t54 = t52 + t53;
-    tau[4] = t54;
-    return 0;
+  tau[0] = H[0] * f[0] + H[5] * f[1] + H[10] * f[2] + H[15] * f[3] + H[20] * f[4] + H[25] * f[5];
+  tau[1] = H[1] * f[0] + H[6] * f[1] + H[11] * f[2] + H[16] * f[3] + H[21] * f[4] + H[26] * f[5];
+  tau[2] = H[2] * f[0] + H[7] * f[1] + H[12] * f[2] + H[17] * f[3] + H[22] * f[4] + H[27] * f[5];
+  tau[3] = H[3] * f[0] + H[8] * f[1] + H[13] * f[2] + H[18] * f[3] + H[23] * f[4] + H[28] * f[5];
+  tau[4] = H[4] * f[0] + H[9] * f[1] + H[14] * f[2] + H[19] * f[3] + H[24] * f[4] + H[29] * f[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_effort_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_effort_outputs[] = {
-    {"tau", 5, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 5 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -2570,429 +530,93 @@ static const mstmm_port mstmm_sweep_generic5_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[5] accelerations of the coordinates
  */
-int mstmm_sweep_generic5_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic5_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    const real t0 = H[0] * H[0];
-    const real t1 = H[5] * H[5];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * H[10];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * H[15];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * H[20];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * H[25];
-    const real t10 = t8 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[6] * H[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[11] * H[11];
-    const real t16 = t14 + t15;
-    const real t17 = H[16] * H[16];
-    const real t18 = t16 + t17;
-    const real t19 = H[21] * H[21];
-    const real t20 = t18 + t19;
-    const real t21 = H[26] * H[26];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[0] * H[1];
-    const real t25 = H[5] * H[6];
-    const real t26 = t24 + t25;
-    const real t27 = H[10] * H[11];
-    const real t28 = t26 + t27;
-    const real t29 = H[15] * H[16];
-    const real t30 = t28 + t29;
-    const real t31 = H[20] * H[21];
-    const real t32 = t30 + t31;
-    const real t33 = H[25] * H[26];
-    const real t34 = t32 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[7] * H[7];
-    const real t42 = t40 + t41;
-    const real t43 = H[12] * H[12];
-    const real t44 = t42 + t43;
-    const real t45 = H[17] * H[17];
-    const real t46 = t44 + t45;
-    const real t47 = H[22] * H[22];
-    const real t48 = t46 + t47;
-    const real t49 = H[27] * H[27];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[0] * H[2];
-    const real t53 = H[5] * H[7];
-    const real t54 = t52 + t53;
-    const real t55 = H[10] * H[12];
-    const real t56 = t54 + t55;
-    const real t57 = H[15] * H[17];
-    const real t58 = t56 + t57;
-    const real t59 = H[20] * H[22];
-    const real t60 = t58 + t59;
-    const real t61 = H[25] * H[27];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[6] * H[7];
-    const real t68 = t66 + t67;
-    const real t69 = H[11] * H[12];
-    const real t70 = t68 + t69;
-    const real t71 = H[16] * H[17];
-    const real t72 = t70 + t71;
-    const real t73 = H[21] * H[22];
-    const real t74 = t72 + t73;
-    const real t75 = H[26] * H[27];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[3] * H[3];
-    const real t85 = H[8] * H[8];
-    const real t86 = t84 + t85;
-    const real t87 = H[13] * H[13];
-    const real t88 = t86 + t87;
-    const real t89 = H[18] * H[18];
-    const real t90 = t88 + t89;
-    const real t91 = H[23] * H[23];
-    const real t92 = t90 + t91;
-    const real t93 = H[28] * H[28];
-    const real t94 = t92 + t93;
-    const real t95 = t94 * ((real)1 / (real)10000000000000);
-    const real t96 = H[0] * H[3];
-    const real t97 = H[5] * H[8];
-    const real t98 = t96 + t97;
-    const real t99 = H[10] * H[13];
-    const real t100 = t98 + t99;
-    const real t101 = H[15] * H[18];
-    const real t102 = t100 + t101;
-    const real t103 = H[20] * H[23];
-    const real t104 = t102 + t103;
-    const real t105 = H[25] * H[28];
-    const real t106 = t104 + t105;
-    const real t107 = t106 * t35;
-    const real t108 = t106 * t107;
-    const real t109 = t94 - t108;
-    const real t110 = H[1] * H[3];
-    const real t111 = H[6] * H[8];
-    const real t112 = t110 + t111;
-    const real t113 = H[11] * H[13];
-    const real t114 = t112 + t113;
-    const real t115 = H[16] * H[18];
-    const real t116 = t114 + t115;
-    const real t117 = H[21] * H[23];
-    const real t118 = t116 + t117;
-    const real t119 = H[26] * H[28];
-    const real t120 = t118 + t119;
-    const real t121 = t106 * t36;
-    const real t122 = t120 - t121;
-    const real t123 = t79 * t122;
-    const real t124 = t122 * t123;
-    const real t125 = t109 - t124;
-    const real t126 = H[2] * H[3];
-    const real t127 = H[7] * H[8];
-    const real t128 = t126 + t127;
-    const real t129 = H[12] * H[13];
-    const real t130 = t128 + t129;
-    const real t131 = H[17] * H[18];
-    const real t132 = t130 + t131;
-    const real t133 = H[22] * H[23];
-    const real t134 = t132 + t133;
-    const real t135 = H[27] * H[28];
-    const real t136 = t134 + t135;
-    const real t137 = t106 * t63;
-    const real t138 = t136 - t137;
-    const real t139 = t80 * t122;
-    const real t140 = t138 - t139;
-    const real t141 = 1.0 / t82;
-    const real t142 = t141 * t140;
-    const real t143 = t140 * t142;
-    const real t144 = t125 - t143;
-    const real t145 = t95 < t144;
-    if (!(t145 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t146 = H[4] * H[4];
-    const real t147 = H[9] * H[9];
-    const real t148 = t146 + t147;
-    const real t149 = H[14] * H[14];
-    const real t150 = t148 + t149;
-    const real t151 = H[19] * H[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[24] * H[24];
-    const real t154 = t152 + t153;
-    const real t155 = H[29] * H[29];
-    const real t156 = t154 + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * H[4];
-    const real t159 = H[5] * H[9];
-    const real t160 = t158 + t159;
-    const real t161 = H[10] * H[14];
-    const real t162 = t160 + t161;
-    const real t163 = H[15] * H[19];
-    const real t164 = t162 + t163;
-    const real t165 = H[20] * H[24];
-    const real t166 = t164 + t165;
-    const real t167 = H[25] * H[29];
-    const real t168 = t166 + t167;
-    const real t169 = t168 * t35;
-    const real t170 = t168 * t169;
-    const real t171 = t156 - t170;
-    const real t172 = H[1] * H[4];
-    const real t173 = H[6] * H[9];
-    const real t174 = t172 + t173;
-    const real t175 = H[11] * H[14];
-    const real t176 = t174 + t175;
-    const real t177 = H[16] * H[19];
-    const real t178 = t176 + t177;
-    const real t179 = H[21] * H[24];
-    const real t180 = t178 + t179;
-    const real t181 = H[26] * H[29];
-    const real t182 = t180 + t181;
-    const real t183 = t168 * t36;
-    const real t184 = t182 - t183;
-    const real t185 = t79 * t184;
-    const real t186 = t184 * t185;
-    const real t187 = t171 - t186;
-    const real t188 = H[2] * H[4];
-    const real t189 = H[7] * H[9];
-    const real t190 = t188 + t189;
-    const real t191 = H[12] * H[14];
-    const real t192 = t190 + t191;
-    const real t193 = H[17] * H[19];
-    const real t194 = t192 + t193;
-    const real t195 = H[22] * H[24];
-    const real t196 = t194 + t195;
-    const real t197 = H[27] * H[29];
-    const real t198 = t196 + t197;
-    const real t199 = t168 * t63;
-    const real t200 = t198 - t199;
-    const real t201 = t80 * t184;
-    const real t202 = t200 - t201;
-    const real t203 = t141 * t202;
-    const real t204 = t202 * t203;
-    const real t205 = t187 - t204;
-    const real t206 = H[3] * H[4];
-    const real t207 = H[8] * H[9];
-    const real t208 = t206 + t207;
-    const real t209 = H[13] * H[14];
-    const real t210 = t208 + t209;
-    const real t211 = H[18] * H[19];
-    const real t212 = t210 + t211;
-    const real t213 = H[23] * H[24];
-    const real t214 = t212 + t213;
-    const real t215 = H[28] * H[29];
-    const real t216 = t214 + t215;
-    const real t217 = t168 * t107;
-    const real t218 = t216 - t217;
-    const real t219 = t123 * t184;
-    const real t220 = t218 - t219;
-    const real t221 = t142 * t202;
-    const real t222 = t220 - t221;
-    const real t223 = 1.0 / t144;
-    const real t224 = t223 * t222;
-    const real t225 = t222 * t224;
-    const real t226 = t205 - t225;
-    const real t227 = t157 < t226;
-    if (!(t227 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t228 = r[2] * delta_I[4];
-    const real t229 = r[1] * delta_I[5];
-    const real t230 = t228 - t229;
-    const real t231 = delta_I[0] + t230;
-    const real t232 = Rc[0] * t231;
-    const real t233 = r[0] * delta_I[5];
-    const real t234 = r[2] * delta_I[3];
-    const real t235 = t233 - t234;
-    const real t236 = delta_I[1] + t235;
-    const real t237 = Rc[3] * t236;
-    const real t238 = t232 + t237;
-    const real t239 = r[1] * delta_I[3];
-    const real t240 = r[0] * delta_I[4];
-    const real t241 = t239 - t240;
-    const real t242 = delta_I[2] + t241;
-    const real t243 = Rc[6] * t242;
-    const real t244 = t238 + t243;
-    const real t245 = delta[0] - t244;
-    const real t246 = H[0] * t245;
-    const real t247 = Rc[1] * t231;
-    const real t248 = Rc[4] * t236;
-    const real t249 = t247 + t248;
-    const real t250 = Rc[7] * t242;
-    const real t251 = t249 + t250;
-    const real t252 = delta[1] - t251;
-    const real t253 = H[5] * t252;
-    const real t254 = t246 + t253;
-    const real t255 = Rc[2] * t231;
-    const real t256 = Rc[5] * t236;
-    const real t257 = t255 + t256;
-    const real t258 = Rc[8] * t242;
-    const real t259 = t257 + t258;
-    const real t260 = delta[2] - t259;
-    const real t261 = H[10] * t260;
-    const real t262 = t254 + t261;
-    const real t263 = Rc[0] * delta_I[3];
-    const real t264 = Rc[3] * delta_I[4];
-    const real t265 = t263 + t264;
-    const real t266 = Rc[6] * delta_I[5];
-    const real t267 = t265 + t266;
-    const real t268 = delta[3] - t267;
-    const real t269 = H[15] * t268;
-    const real t270 = t262 + t269;
-    const real t271 = Rc[1] * delta_I[3];
-    const real t272 = Rc[4] * delta_I[4];
-    const real t273 = t271 + t272;
-    const real t274 = Rc[7] * delta_I[5];
-    const real t275 = t273 + t274;
-    const real t276 = delta[4] - t275;
-    const real t277 = H[20] * t276;
-    const real t278 = t270 + t277;
-    const real t279 = Rc[2] * delta_I[3];
-    const real t280 = Rc[5] * delta_I[4];
-    const real t281 = t279 + t280;
-    const real t282 = Rc[8] * delta_I[5];
-    const real t283 = t281 + t282;
-    const real t284 = delta[5] - t283;
-    const real t285 = H[25] * t284;
-    const real t286 = t278 + t285;
-    const real t287 = t286 * t35;
-    const real t288 = H[1] * t245;
-    const real t289 = H[6] * t252;
-    const real t290 = t288 + t289;
-    const real t291 = H[11] * t260;
-    const real t292 = t290 + t291;
-    const real t293 = H[16] * t268;
-    const real t294 = t292 + t293;
-    const real t295 = H[21] * t276;
-    const real t296 = t294 + t295;
-    const real t297 = H[26] * t284;
-    const real t298 = t296 + t297;
-    const real t299 = t286 * t36;
-    const real t300 = t298 - t299;
-    const real t301 = t79 * t300;
-    const real t302 = H[2] * t245;
-    const real t303 = H[7] * t252;
-    const real t304 = t302 + t303;
-    const real t305 = H[12] * t260;
-    const real t306 = t304 + t305;
-    const real t307 = H[17] * t268;
-    const real t308 = t306 + t307;
-    const real t309 = H[22] * t276;
-    const real t310 = t308 + t309;
-    const real t311 = H[27] * t284;
-    const real t312 = t310 + t311;
-    const real t313 = t286 * t63;
-    const real t314 = t312 - t313;
-    const real t315 = t80 * t300;
-    const real t316 = t314 - t315;
-    const real t317 = t141 * t316;
-    const real t318 = H[3] * t245;
-    const real t319 = H[8] * t252;
-    const real t320 = t318 + t319;
-    const real t321 = H[13] * t260;
-    const real t322 = t320 + t321;
-    const real t323 = H[18] * t268;
-    const real t324 = t322 + t323;
-    const real t325 = H[23] * t276;
-    const real t326 = t324 + t325;
-    const real t327 = H[28] * t284;
-    const real t328 = t326 + t327;
-    const real t329 = t286 * t107;
-    const real t330 = t328 - t329;
-    const real t331 = t123 * t300;
-    const real t332 = t330 - t331;
-    const real t333 = t142 * t316;
-    const real t334 = t332 - t333;
-    const real t335 = t223 * t334;
-    const real t336 = 1.0 / t226;
-    const real t337 = H[4] * t245;
-    const real t338 = H[9] * t252;
-    const real t339 = t337 + t338;
-    const real t340 = H[14] * t260;
-    const real t341 = t339 + t340;
-    const real t342 = H[19] * t268;
-    const real t343 = t341 + t342;
-    const real t344 = H[24] * t276;
-    const real t345 = t343 + t344;
-    const real t346 = H[29] * t284;
-    const real t347 = t345 + t346;
-    const real t348 = t286 * t169;
-    const real t349 = t347 - t348;
-    const real t350 = t185 * t300;
-    const real t351 = t349 - t350;
-    const real t352 = t203 * t316;
-    const real t353 = t351 - t352;
-    const real t354 = t224 * t334;
-    const real t355 = t353 - t354;
-    const real t356 = t336 * t355;
-    const real t357 = t224 * t356;
-    const real t358 = t335 - t357;
-    const real t359 = t142 * t358;
-    const real t360 = t317 - t359;
-    const real t361 = t203 * t356;
-    const real t362 = t360 - t361;
-    const real t363 = t80 * t362;
-    const real t364 = t301 - t363;
-    const real t365 = t123 * t358;
-    const real t366 = t364 - t365;
-    const real t367 = t185 * t356;
-    const real t368 = t366 - t367;
-    const real t369 = t36 * t368;
-    const real t370 = t287 - t369;
-    const real t371 = t63 * t362;
-    const real t372 = t370 - t371;
-    const real t373 = t107 * t358;
-    const real t374 = t372 - t373;
-    const real t375 = t169 * t356;
-    const real t376 = t374 - t375;
-    udot[0] = t376;
-    udot[1] = t368;
-    udot[2] = t362;
-    udot[3] = t358;
-    udot[4] = t356;
-    return 0;
+  real t10 = H[0] * H[0] + H[5] * H[5] + H[10] * H[10] + H[15] * H[15] + H[20] * H[20] + H[25] *
+    H[25];
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[6] * H[6] + H[11] * H[11] + H[16] * H[16] + H[21] * H[21] + H[26] *
+    H[26];
+  real t34 = H[0] * H[1] + H[5] * H[6] + H[10] * H[11] + H[15] * H[16] + H[20] * H[21] + H[25] *
+    H[26];
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[7] * H[7] + H[12] * H[12] + H[17] * H[17] + H[22] * H[22] + H[27] *
+    H[27];
+  real t62 = H[0] * H[2] + H[5] * H[7] + H[10] * H[12] + H[15] * H[17] + H[20] * H[22] + H[25] *
+    H[27];
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[6] * H[7] + H[11] * H[12] + H[16] * H[17] + H[21] * H[22] + H[26] *
+    H[27] - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+  real t94 = H[3] * H[3] + H[8] * H[8] + H[13] * H[13] + H[18] * H[18] + H[23] * H[23] + H[28] *
+    H[28];
+  real t106 = H[0] * H[3] + H[5] * H[8] + H[10] * H[13] + H[15] * H[18] + H[20] * H[23] + H[25] *
+    H[28];
+  real t107 = t106 * t35;
+  real t122 = H[1] * H[3] + H[6] * H[8] + H[11] * H[13] + H[16] * H[18] + H[21] * H[23] + H[26] *
+    H[28] - t106 * t36;
+  real t123 = t79 * t122;
+  real t140 = H[2] * H[3] + H[7] * H[8] + H[12] * H[13] + H[17] * H[18] + H[22] * H[23] + H[27] *
+    H[28] - t106 * t63 - t80 * t122;
+  real t141 = 1.0 / t82;
+  real t142 = t141 * t140;
+  real t144 = t94 - t106 * t107 - t122 * t123 - t140 * t142;
+  if (!((t94 * ((real)1 / (real)10000000000000) < t144))) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+  real t156 = H[4] * H[4] + H[9] * H[9] + H[14] * H[14] + H[19] * H[19] + H[24] * H[24] + H[29] *
+    H[29];
+  real t168 = H[0] * H[4] + H[5] * H[9] + H[10] * H[14] + H[15] * H[19] + H[20] * H[24] + H[25] *
+    H[29];
+  real t169 = t168 * t35;
+  real t184 = H[1] * H[4] + H[6] * H[9] + H[11] * H[14] + H[16] * H[19] + H[21] * H[24] + H[26] *
+    H[29] - t168 * t36;
+  real t185 = t79 * t184;
+  real t202 = H[2] * H[4] + H[7] * H[9] + H[12] * H[14] + H[17] * H[19] + H[22] * H[24] + H[27] *
+    H[29] - t168 * t63 - t80 * t184;
+  real t203 = t141 * t202;
+  real t222 = H[3] * H[4] + H[8] * H[9] + H[13] * H[14] + H[18] * H[19] + H[23] * H[24] + H[28] *
+    H[29] - t168 * t107 - t123 * t184 - t142 * t202;
+  real t223 = 1.0 / t144;
+  real t224 = t223 * t222;
+  real t226 = t156 - t168 * t169 - t184 * t185 - t202 * t203 - t222 * t224;
+  if (!((t156 * ((real)1 / (real)10000000000000) < t226))) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+  real t231 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t236 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t242 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t245 = delta[0] - (Rc[0] * t231 + Rc[3] * t236 + Rc[6] * t242);
+  real t252 = delta[1] - (Rc[1] * t231 + Rc[4] * t236 + Rc[7] * t242);
+  real t260 = delta[2] - (Rc[2] * t231 + Rc[5] * t236 + Rc[8] * t242);
+  real t268 = delta[3] - (Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5]);
+  real t276 = delta[4] - (Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5]);
+  real t284 = delta[5] - (Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5]);
+  real t286 = H[0] * t245 + H[5] * t252 + H[10] * t260 + H[15] * t268 + H[20] * t276 + H[25] * t284;
+  real t300 = H[1] * t245 + H[6] * t252 + H[11] * t260 + H[16] * t268 + H[21] * t276 + H[26] * t284
+    - t286 * t36;
+  real t316 = H[2] * t245 + H[7] * t252 + H[12] * t260 + H[17] * t268 + H[22] * t276 + H[27] * t284
+    - t286 * t63 - t80 * t300;
+  real t334 = H[3] * t245 + H[8] * t252 + H[13] * t260 + H[18] * t268 + H[23] * t276 + H[28] * t284
+    - t286 * t107 - t123 * t300 - t142 * t316;
+  real t356 = 1.0 / t226 * (H[4] * t245 + H[9] * t252 + H[14] * t260 + H[19] * t268 + H[24] * t276 +
+    H[29] * t284 - t286 * t169 - t185 * t300 - t203 * t316 - t224 * t334);
+  real t358 = t223 * t334 - t224 * t356;
+  real t362 = t141 * t316 - t142 * t358 - t203 * t356;
+  real t368 = t79 * t300 - t80 * t362 - t123 * t358 - t185 * t356;
+  udot[0] = t286 * t35 - t36 * t368 - t63 * t362 - t107 * t358 - t169 * t356;
+  udot[1] = t368;
+  udot[2] = t362;
+  udot[3] = t358;
+  udot[4] = t356;
+  return 0;
 }
 
-static int mstmm_sweep_generic5_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_project_outputs[] = {
-    {"udot", 5, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic5_project_guards[] = {
-    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic5_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 5 free speeds, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the free coordinates
@@ -3004,1618 +628,350 @@ static const mstmm_guard mstmm_sweep_generic5_project_guards[] = {
  * out G[5][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic5_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic5_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[5] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[5] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[10] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[15] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[20] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[25] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[5] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[5] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[10] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[15] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[20] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[25] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[10] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[5] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[10] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[15] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[20] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[25] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[15] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[5] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[10] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[15] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[20] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[25] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[20] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[5] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[10] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[15] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[20] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[25] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[25] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] - W[0];
-    const real t78 = t76 + t77;
-    const real t79 = 0.0 < t78;
-    if (!(t79 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t80 = H[1] * S[0];
-    const real t81 = H[6] * S[1];
-    const real t82 = t80 + t81;
-    const real t83 = H[11] * S[2];
-    const real t84 = t82 + t83;
-    const real t85 = H[16] * S[3];
-    const real t86 = t84 + t85;
-    const real t87 = H[21] * S[4];
-    const real t88 = t86 + t87;
-    const real t89 = H[26] * S[5];
-    const real t90 = t88 + t89;
-    const real t91 = H[1] * t90;
-    const real t92 = H[1] * S[1];
-    const real t93 = H[6] * S[6];
-    const real t94 = t92 + t93;
-    const real t95 = H[11] * S[7];
-    const real t96 = t94 + t95;
-    const real t97 = H[16] * S[8];
-    const real t98 = t96 + t97;
-    const real t99 = H[21] * S[9];
-    const real t100 = t98 + t99;
-    const real t101 = H[26] * S[10];
-    const real t102 = t100 + t101;
-    const real t103 = H[6] * t102;
-    const real t104 = t91 + t103;
-    const real t105 = H[1] * S[2];
-    const real t106 = H[6] * S[7];
-    const real t107 = t105 + t106;
-    const real t108 = H[11] * S[11];
-    const real t109 = t107 + t108;
-    const real t110 = H[16] * S[12];
-    const real t111 = t109 + t110;
-    const real t112 = H[21] * S[13];
-    const real t113 = t111 + t112;
-    const real t114 = H[26] * S[14];
-    const real t115 = t113 + t114;
-    const real t116 = H[11] * t115;
-    const real t117 = t104 + t116;
-    const real t118 = H[1] * S[3];
-    const real t119 = H[6] * S[8];
-    const real t120 = t118 + t119;
-    const real t121 = H[11] * S[12];
-    const real t122 = t120 + t121;
-    const real t123 = H[16] * S[15];
-    const real t124 = t122 + t123;
-    const real t125 = H[21] * S[16];
-    const real t126 = t124 + t125;
-    const real t127 = H[26] * S[17];
-    const real t128 = t126 + t127;
-    const real t129 = H[16] * t128;
-    const real t130 = t117 + t129;
-    const real t131 = H[1] * S[4];
-    const real t132 = H[6] * S[9];
-    const real t133 = t131 + t132;
-    const real t134 = H[11] * S[13];
-    const real t135 = t133 + t134;
-    const real t136 = H[16] * S[16];
-    const real t137 = t135 + t136;
-    const real t138 = H[21] * S[18];
-    const real t139 = t137 + t138;
-    const real t140 = H[26] * S[19];
-    const real t141 = t139 + t140;
-    const real t142 = H[21] * t141;
-    const real t143 = t130 + t142;
-    const real t144 = H[1] * S[5];
-    const real t145 = H[6] * S[10];
-    const real t146 = t144 + t145;
-    const real t147 = H[11] * S[14];
-    const real t148 = t146 + t147;
-    const real t149 = H[16] * S[17];
-    const real t150 = t148 + t149;
-    const real t151 = H[21] * S[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[26] * S[20];
-    const real t154 = t152 + t153;
-    const real t155 = H[26] * t154;
-    const real t156 = t143 + t155;
-    const real t157 = J[1] - W[6];
-    const real t158 = t156 + t157;
-    const real t159 = t158 * ((real)1 / (real)10000000000000);
-    const real t160 = H[0] * t90;
-    const real t161 = H[5] * t102;
-    const real t162 = t160 + t161;
-    const real t163 = H[10] * t115;
-    const real t164 = t162 + t163;
-    const real t165 = H[15] * t128;
-    const real t166 = t164 + t165;
-    const real t167 = H[20] * t141;
-    const real t168 = t166 + t167;
-    const real t169 = H[25] * t154;
-    const real t170 = t168 + t169;
-    const real t171 = W[1] + W[5];
-    const real t172 = 0.5 * t171;
-    const real t173 = t170 - t172;
-    const real t174 = 1.0 / t78;
-    const real t175 = t173 * t174;
-    const real t176 = t173 * t175;
-    const real t177 = t158 - t176;
-    const real t178 = t159 < t177;
-    if (!(t178 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t179 = H[2] * S[0];
-    const real t180 = H[7] * S[1];
-    const real t181 = t179 + t180;
-    const real t182 = H[12] * S[2];
-    const real t183 = t181 + t182;
-    const real t184 = H[17] * S[3];
-    const real t185 = t183 + t184;
-    const real t186 = H[22] * S[4];
-    const real t187 = t185 + t186;
-    const real t188 = H[27] * S[5];
-    const real t189 = t187 + t188;
-    const real t190 = H[2] * t189;
-    const real t191 = H[2] * S[1];
-    const real t192 = H[7] * S[6];
-    const real t193 = t191 + t192;
-    const real t194 = H[12] * S[7];
-    const real t195 = t193 + t194;
-    const real t196 = H[17] * S[8];
-    const real t197 = t195 + t196;
-    const real t198 = H[22] * S[9];
-    const real t199 = t197 + t198;
-    const real t200 = H[27] * S[10];
-    const real t201 = t199 + t200;
-    const real t202 = H[7] * t201;
-    const real t203 = t190 + t202;
-    const real t204 = H[2] * S[2];
-    const real t205 = H[7] * S[7];
-    const real t206 = t204 + t205;
-    const real t207 = H[12] * S[11];
-    const real t208 = t206 + t207;
-    const real t209 = H[17] * S[12];
-    const real t210 = t208 + t209;
-    const real t211 = H[22] * S[13];
-    const real t212 = t210 + t211;
-    const real t213 = H[27] * S[14];
-    const real t214 = t212 + t213;
-    const real t215 = H[12] * t214;
-    const real t216 = t203 + t215;
-    const real t217 = H[2] * S[3];
-    const real t218 = H[7] * S[8];
-    const real t219 = t217 + t218;
-    const real t220 = H[12] * S[12];
-    const real t221 = t219 + t220;
-    const real t222 = H[17] * S[15];
-    const real t223 = t221 + t222;
-    const real t224 = H[22] * S[16];
-    const real t225 = t223 + t224;
-    const real t226 = H[27] * S[17];
-    const real t227 = t225 + t226;
-    const real t228 = H[17] * t227;
-    const real t229 = t216 + t228;
-    const real t230 = H[2] * S[4];
-    const real t231 = H[7] * S[9];
-    const real t232 = t230 + t231;
-    const real t233 = H[12] * S[13];
-    const real t234 = t232 + t233;
-    const real t235 = H[17] * S[16];
-    const real t236 = t234 + t235;
-    const real t237 = H[22] * S[18];
-    const real t238 = t236 + t237;
-    const real t239 = H[27] * S[19];
-    const real t240 = t238 + t239;
-    const real t241 = H[22] * t240;
-    const real t242 = t229 + t241;
-    const real t243 = H[2] * S[5];
-    const real t244 = H[7] * S[10];
-    const real t245 = t243 + t244;
-    const real t246 = H[12] * S[14];
-    const real t247 = t245 + t246;
-    const real t248 = H[17] * S[17];
-    const real t249 = t247 + t248;
-    const real t250 = H[22] * S[19];
-    const real t251 = t249 + t250;
-    const real t252 = H[27] * S[20];
-    const real t253 = t251 + t252;
-    const real t254 = H[27] * t253;
-    const real t255 = t242 + t254;
-    const real t256 = J[2] - W[12];
-    const real t257 = t255 + t256;
-    const real t258 = t257 * ((real)1 / (real)10000000000000);
-    const real t259 = H[0] * t189;
-    const real t260 = H[5] * t201;
-    const real t261 = t259 + t260;
-    const real t262 = H[10] * t214;
-    const real t263 = t261 + t262;
-    const real t264 = H[15] * t227;
-    const real t265 = t263 + t264;
-    const real t266 = H[20] * t240;
-    const real t267 = t265 + t266;
-    const real t268 = H[25] * t253;
-    const real t269 = t267 + t268;
-    const real t270 = W[2] + W[10];
-    const real t271 = 0.5 * t270;
-    const real t272 = t269 - t271;
-    const real t273 = t272 * t174;
-    const real t274 = t272 * t273;
-    const real t275 = t257 - t274;
-    const real t276 = H[1] * t189;
-    const real t277 = H[6] * t201;
-    const real t278 = t276 + t277;
-    const real t279 = H[11] * t214;
-    const real t280 = t278 + t279;
-    const real t281 = H[16] * t227;
-    const real t282 = t280 + t281;
-    const real t283 = H[21] * t240;
-    const real t284 = t282 + t283;
-    const real t285 = H[26] * t253;
-    const real t286 = t284 + t285;
-    const real t287 = W[7] + W[11];
-    const real t288 = 0.5 * t287;
-    const real t289 = t286 - t288;
-    const real t290 = t272 * t175;
-    const real t291 = t289 - t290;
-    const real t292 = 1.0 / t177;
-    const real t293 = t292 * t291;
-    const real t294 = t291 * t293;
-    const real t295 = t275 - t294;
-    const real t296 = t258 < t295;
-    if (!(t296 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t297 = H[3] * S[0];
-    const real t298 = H[8] * S[1];
-    const real t299 = t297 + t298;
-    const real t300 = H[13] * S[2];
-    const real t301 = t299 + t300;
-    const real t302 = H[18] * S[3];
-    const real t303 = t301 + t302;
-    const real t304 = H[23] * S[4];
-    const real t305 = t303 + t304;
-    const real t306 = H[28] * S[5];
-    const real t307 = t305 + t306;
-    const real t308 = H[3] * t307;
-    const real t309 = H[3] * S[1];
-    const real t310 = H[8] * S[6];
-    const real t311 = t309 + t310;
-    const real t312 = H[13] * S[7];
-    const real t313 = t311 + t312;
-    const real t314 = H[18] * S[8];
-    const real t315 = t313 + t314;
-    const real t316 = H[23] * S[9];
-    const real t317 = t315 + t316;
-    const real t318 = H[28] * S[10];
-    const real t319 = t317 + t318;
-    const real t320 = H[8] * t319;
-    const real t321 = t308 + t320;
-    const real t322 = H[3] * S[2];
-    const real t323 = H[8] * S[7];
-    const real t324 = t322 + t323;
-    const real t325 = H[13] * S[11];
-    const real t326 = t324 + t325;
-    const real t327 = H[18] * S[12];
-    const real t328 = t326 + t327;
-    const real t329 = H[23] * S[13];
-    const real t330 = t328 + t329;
-    const real t331 = H[28] * S[14];
-    const real t332 = t330 + t331;
-    const real t333 = H[13] * t332;
-    const real t334 = t321 + t333;
-    const real t335 = H[3] * S[3];
-    const real t336 = H[8] * S[8];
-    const real t337 = t335 + t336;
-    const real t338 = H[13] * S[12];
-    const real t339 = t337 + t338;
-    const real t340 = H[18] * S[15];
-    const real t341 = t339 + t340;
-    const real t342 = H[23] * S[16];
-    const real t343 = t341 + t342;
-    const real t344 = H[28] * S[17];
-    const real t345 = t343 + t344;
-    const real t346 = H[18] * t345;
-    const real t347 = t334 + t346;
-    const real t348 = H[3] * S[4];
-    const real t349 = H[8] * S[9];
-    const real t350 = t348 + t349;
-    const real t351 = H[13] * S[13];
-    const real t352 = t350 + t351;
-    const real t353 = H[18] * S[16];
-    const real t354 = t352 + t353;
-    const real t355 = H[23] * S[18];
-    const real t356 = t354 + t355;
-    const real t357 = H[28] * S[19];
-    const real t358 = t356 + t357;
-    const real t359 = H[23] * t358;
-    const real t360 = t347 + t359;
-    const real t361 = H[3] * S[5];
-    const real t362 = H[8] * S[10];
-    const real t363 = t361 + t362;
-    const real t364 = H[13] * S[14];
-    const real t365 = t363 + t364;
-    const real t366 = H[18] * S[17];
-    const real t367 = t365 + t366;
-    const real t368 = H[23] * S[19];
-    const real t369 = t367 + t368;
-    const real t370 = H[28] * S[20];
-    const real t371 = t369 + t370;
-    const real t372 = H[28] * t371;
-    const real t373 = t360 + t372;
-    const real t374 = J[3] - W[18];
-    const real t375 = t373 + t374;
-    const real t376 = t375 * ((real)1 / (real)10000000000000);
-    const real t377 = H[0] * t307;
-    const real t378 = H[5] * t319;
-    const real t379 = t377 + t378;
-    const real t380 = H[10] * t332;
-    const real t381 = t379 + t380;
-    const real t382 = H[15] * t345;
-    const real t383 = t381 + t382;
-    const real t384 = H[20] * t358;
-    const real t385 = t383 + t384;
-    const real t386 = H[25] * t371;
-    const real t387 = t385 + t386;
-    const real t388 = W[3] + W[15];
-    const real t389 = 0.5 * t388;
-    const real t390 = t387 - t389;
-    const real t391 = t390 * t174;
-    const real t392 = t390 * t391;
-    const real t393 = t375 - t392;
-    const real t394 = H[1] * t307;
-    const real t395 = H[6] * t319;
-    const real t396 = t394 + t395;
-    const real t397 = H[11] * t332;
-    const real t398 = t396 + t397;
-    const real t399 = H[16] * t345;
-    const real t400 = t398 + t399;
-    const real t401 = H[21] * t358;
-    const real t402 = t400 + t401;
-    const real t403 = H[26] * t371;
-    const real t404 = t402 + t403;
-    const real t405 = W[8] + W[16];
-    const real t406 = 0.5 * t405;
-    const real t407 = t404 - t406;
-    const real t408 = t390 * t175;
-    const real t409 = t407 - t408;
-    const real t410 = t292 * t409;
-    const real t411 = t409 * t410;
-    const real t412 = t393 - t411;
-    const real t413 = H[2] * t307;
-    const real t414 = H[7] * t319;
-    const real t415 = t413 + t414;
-    const real t416 = H[12] * t332;
-    const real t417 = t415 + t416;
-    const real t418 = H[17] * t345;
-    const real t419 = t417 + t418;
-    const real t420 = H[22] * t358;
-    const real t421 = t419 + t420;
-    const real t422 = H[27] * t371;
-    const real t423 = t421 + t422;
-    const real t424 = W[13] + W[17];
-    const real t425 = 0.5 * t424;
-    const real t426 = t423 - t425;
-    const real t427 = t390 * t273;
-    const real t428 = t426 - t427;
-    const real t429 = t293 * t409;
-    const real t430 = t428 - t429;
-    const real t431 = 1.0 / t295;
-    const real t432 = t431 * t430;
-    const real t433 = t430 * t432;
-    const real t434 = t412 - t433;
-    const real t435 = t376 < t434;
-    if (!(t435 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t436 = H[4] * S[0];
-    const real t437 = H[9] * S[1];
-    const real t438 = t436 + t437;
-    const real t439 = H[14] * S[2];
-    const real t440 = t438 + t439;
-    const real t441 = H[19] * S[3];
-    const real t442 = t440 + t441;
-    const real t443 = H[24] * S[4];
-    const real t444 = t442 + t443;
-    const real t445 = H[29] * S[5];
-    const real t446 = t444 + t445;
-    const real t447 = H[4] * t446;
-    const real t448 = H[4] * S[1];
-    const real t449 = H[9] * S[6];
-    const real t450 = t448 + t449;
-    const real t451 = H[14] * S[7];
-    const real t452 = t450 + t451;
-    const real t453 = H[19] * S[8];
-    const real t454 = t452 + t453;
-    const real t455 = H[24] * S[9];
-    const real t456 = t454 + t455;
-    const real t457 = H[29] * S[10];
-    const real t458 = t456 + t457;
-    const real t459 = H[9] * t458;
-    const real t460 = t447 + t459;
-    const real t461 = H[4] * S[2];
-    const real t462 = H[9] * S[7];
-    const real t463 = t461 + t462;
-    const real t464 = H[14] * S[11];
-    const real t465 = t463 + t464;
-    const real t466 = H[19] * S[12];
-    const real t467 = t465 + t466;
-    const real t468 = H[24] * S[13];
-    const real t469 = t467 + t468;
-    const real t470 = H[29] * S[14];
-    const real t471 = t469 + t470;
-    const real t472 = H[14] * t471;
-    const real t473 = t460 + t472;
-    const real t474 = H[4] * S[3];
-    const real t475 = H[9] * S[8];
-    const real t476 = t474 + t475;
-    const real t477 = H[14] * S[12];
-    const real t478 = t476 + t477;
-    const real t479 = H[19] * S[15];
-    const real t480 = t478 + t479;
-    const real t481 = H[24] * S[16];
-    const real t482 = t480 + t481;
-    const real t483 = H[29] * S[17];
-    const real t484 = t482 + t483;
-    const real t485 = H[19] * t484;
-    const real t486 = t473 + t485;
-    const real t487 = H[4] * S[4];
-    const real t488 = H[9] * S[9];
-    const real t489 = t487 + t488;
-    const real t490 = H[14] * S[13];
-    const real t491 = t489 + t490;
-    const real t492 = H[19] * S[16];
-    const real t493 = t491 + t492;
-    const real t494 = H[24] * S[18];
-    const real t495 = t493 + t494;
-    const real t496 = H[29] * S[19];
-    const real t497 = t495 + t496;
-    const real t498 = H[24] * t497;
-    const real t499 = t486 + t498;
-    const real t500 = H[4] * S[5];
-    const real t501 = H[9] * S[10];
-    const real t502 = t500 + t501;
-    const real t503 = H[14] * S[14];
-    const real t504 = t502 + t503;
-    const real t505 = H[19] * S[17];
-    const real t506 = t504 + t505;
-    const real t507 = H[24] * S[19];
-    const real t508 = t506 + t507;
-    const real t509 = H[29] * S[20];
-    const real t510 = t508 + t509;
-    const real t511 = H[29] * t510;
-    const real t512 = t499 + t511;
-    const real t513 = J[4] - W[24];
-    const real t514 = t512 + t513;
-    const real t515 = t514 * ((real)1 / (real)10000000000000);
-    const real t516 = H[0] * t446;
-    const real t517 = H[5] * t458;
-    const real t518 = t516 + t517;
-    const real t519 = H[10] * t471;
-    const real t520 = t518 + t519;
-    const real t521 = H[15] * t484;
-    const real t522 = t520 + t521;
-    const real t523 = H[20] * t497;
-    const real t524 = t522 + t523;
-    const real t525 = H[25] * t510;
-    const real t526 = t524 + t525;
-    const real t527 = W[4] + W[20];
-    const real t528 = 0.5 * t527;
-    const real t529 = t526 - t528;
-    const real t530 = t529 * t174;
-    const real t531 = t529 * t530;
-    const real t532 = t514 - t531;
-    const real t533 = H[1] * t446;
-    const real t534 = H[6] * t458;
-    const real t535 = t533 + t534;
-    const real t536 = H[11] * t471;
-    const real t537 = t535 + t536;
-    const real t538 = H[16] * t484;
-    const real t539 = t537 + t538;
-    const real t540 = H[21] * t497;
-    const real t541 = t539 + t540;
-    const real t542 = H[26] * t510;
-    const real t543 = t541 + t542;
-    const real t544 = W[9] + W[21];
-    const real t545 = 0.5 * t544;
-    const real t546 = t543 - t545;
-    const real t547 = t529 * t175;
-    const real t548 = t546 - t547;
-    const real t549 = t292 * t548;
-    const real t550 = t548 * t549;
-    const real t551 = t532 - t550;
-    const real t552 = H[2] * t446;
-    const real t553 = H[7] * t458;
-    const real t554 = t552 + t553;
-    const real t555 = H[12] * t471;
-    const real t556 = t554 + t555;
-    const real t557 = H[17] * t484;
-    const real t558 = t556 + t557;
-    const real t559 = H[22] * t497;
-    const real t560 = t558 + t559;
-    const real t561 = H[27] * t510;
-    const real t562 = t560 + t561;
-    const real t563 = W[14] + W[22];
-    const real t564 = 0.5 * t563;
-    const real t565 = t562 - t564;
-    const real t566 = t529 * t273;
-    const real t567 = t565 - t566;
-    const real t568 = t293 * t548;
-    const real t569 = t567 - t568;
-    const real t570 = t431 * t569;
-    const real t571 = t569 * t570;
-    const real t572 = t551 - t571;
-    const real t573 = H[3] * t446;
-    const real t574 = H[8] * t458;
-    const real t575 = t573 + t574;
-    const real t576 = H[13] * t471;
-    const real t577 = t575 + t576;
-    const real t578 = H[18] * t484;
-    const real t579 = t577 + t578;
-    const real t580 = H[23] * t497;
-    const real t581 = t579 + t580;
-    const real t582 = H[28] * t510;
-    const real t583 = t581 + t582;
-    const real t584 = W[19] + W[23];
-    const real t585 = 0.5 * t584;
-    const real t586 = t583 - t585;
-    const real t587 = t529 * t391;
-    const real t588 = t586 - t587;
-    const real t589 = t410 * t548;
-    const real t590 = t588 - t589;
-    const real t591 = t432 * t569;
-    const real t592 = t590 - t591;
-    const real t593 = 1.0 / t434;
-    const real t594 = t593 * t592;
-    const real t595 = t592 * t594;
-    const real t596 = t572 - t595;
-    const real t597 = t515 < t596;
-    if (!(t597 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t598 = H[10] * H[10];
-    const real t599 = H[0] * H[0];
-    const real t600 = H[5] * H[5];
-    const real t601 = t599 + t600;
-    const real t602 = t598 + t601;
-    const real t603 = 0.0 < floor_[0];
-    const real t604 = S[0] + S[6];
-    const real t605 = S[11] + t604;
-    const real t606 = ((real)1 / (real)300000000000000) * t605;
-    const real t607 = t603 != 0 ? floor_[0] : t606;
-    const real t608 = t602 * t607;
-    const real t609 = H[25] * H[25];
-    const real t610 = H[15] * H[15];
-    const real t611 = H[20] * H[20];
-    const real t612 = t610 + t611;
-    const real t613 = t609 + t612;
-    const real t614 = 0.0 < floor_[1];
-    const real t615 = S[15] + S[18];
-    const real t616 = S[20] + t615;
-    const real t617 = ((real)1 / (real)300000000000000) * t616;
-    const real t618 = t614 != 0 ? floor_[1] : t617;
-    const real t619 = t613 * t618;
-    const real t620 = t608 + t619;
-    const real t621 = t620 < t78;
-    if (!(t621 != 0)) return 1; /* speed 1 of 5 moves no inertia: its acceleration is undetermined */
-    const real t622 = H[11] * H[11];
-    const real t623 = H[1] * H[1];
-    const real t624 = H[6] * H[6];
-    const real t625 = t623 + t624;
-    const real t626 = t622 + t625;
-    const real t627 = t607 * t626;
-    const real t628 = H[26] * H[26];
-    const real t629 = H[16] * H[16];
-    const real t630 = H[21] * H[21];
-    const real t631 = t629 + t630;
-    const real t632 = t628 + t631;
-    const real t633 = t618 * t632;
-    const real t634 = t627 + t633;
-    const real t635 = t634 < t158;
-    if (!(t635 != 0)) return 1; /* speed 2 of 5 moves no inertia: its acceleration is undetermined */
-    const real t636 = H[12] * H[12];
-    const real t637 = H[2] * H[2];
-    const real t638 = H[7] * H[7];
-    const real t639 = t637 + t638;
-    const real t640 = t636 + t639;
-    const real t641 = t607 * t640;
-    const real t642 = H[27] * H[27];
-    const real t643 = H[17] * H[17];
-    const real t644 = H[22] * H[22];
-    const real t645 = t643 + t644;
-    const real t646 = t642 + t645;
-    const real t647 = t618 * t646;
-    const real t648 = t641 + t647;
-    const real t649 = t648 < t257;
-    if (!(t649 != 0)) return 1; /* speed 3 of 5 moves no inertia: its acceleration is undetermined */
-    const real t650 = H[13] * H[13];
-    const real t651 = H[3] * H[3];
-    const real t652 = H[8] * H[8];
-    const real t653 = t651 + t652;
-    const real t654 = t650 + t653;
-    const real t655 = t607 * t654;
-    const real t656 = H[28] * H[28];
-    const real t657 = H[18] * H[18];
-    const real t658 = H[23] * H[23];
-    const real t659 = t657 + t658;
-    const real t660 = t656 + t659;
-    const real t661 = t618 * t660;
-    const real t662 = t655 + t661;
-    const real t663 = t662 < t375;
-    if (!(t663 != 0)) return 1; /* speed 4 of 5 moves no inertia: its acceleration is undetermined */
-    const real t664 = H[14] * H[14];
-    const real t665 = H[4] * H[4];
-    const real t666 = H[9] * H[9];
-    const real t667 = t665 + t666;
-    const real t668 = t664 + t667;
-    const real t669 = t607 * t668;
-    const real t670 = H[29] * H[29];
-    const real t671 = H[19] * H[19];
-    const real t672 = H[24] * H[24];
-    const real t673 = t671 + t672;
-    const real t674 = t670 + t673;
-    const real t675 = t618 * t674;
-    const real t676 = t669 + t675;
-    const real t677 = t676 < t514;
-    if (!(t677 != 0)) return 1; /* speed 5 of 5 moves no inertia: its acceleration is undetermined */
-    F[0] = t174;
-    F[1] = 0.0;
-    F[2] = 0.0;
-    F[3] = 0.0;
-    F[4] = 0.0;
-    F[5] = t175;
-    F[6] = t292;
-    F[7] = 0.0;
-    F[8] = 0.0;
-    F[9] = 0.0;
-    F[10] = t273;
-    F[11] = t293;
-    F[12] = t431;
-    F[13] = 0.0;
-    F[14] = 0.0;
-    F[15] = t391;
-    F[16] = t410;
-    F[17] = t432;
-    F[18] = t593;
-    F[19] = 0.0;
-    F[20] = t530;
-    F[21] = t549;
-    F[22] = t570;
-    F[23] = t594;
-    const real t678 = 1.0 / t596;
-    F[24] = t678;
-    const real t679 = t10 * t174;
-    const real t680 = t10 * t175;
-    const real t681 = t90 - t680;
-    const real t682 = t292 * t681;
-    const real t683 = t10 * t273;
-    const real t684 = t189 - t683;
-    const real t685 = t293 * t681;
-    const real t686 = t684 - t685;
-    const real t687 = t431 * t686;
-    const real t688 = t10 * t391;
-    const real t689 = t307 - t688;
-    const real t690 = t410 * t681;
-    const real t691 = t689 - t690;
-    const real t692 = t432 * t686;
-    const real t693 = t691 - t692;
-    const real t694 = t593 * t693;
-    const real t695 = t10 * t530;
-    const real t696 = t446 - t695;
-    const real t697 = t549 * t681;
-    const real t698 = t696 - t697;
-    const real t699 = t570 * t686;
-    const real t700 = t698 - t699;
-    const real t701 = t594 * t693;
-    const real t702 = t700 - t701;
-    const real t703 = t678 * t702;
-    const real t704 = t594 * t703;
-    const real t705 = t694 - t704;
-    const real t706 = t432 * t705;
-    const real t707 = t687 - t706;
-    const real t708 = t570 * t703;
-    const real t709 = t707 - t708;
-    const real t710 = t293 * t709;
-    const real t711 = t682 - t710;
-    const real t712 = t410 * t705;
-    const real t713 = t711 - t712;
-    const real t714 = t549 * t703;
-    const real t715 = t713 - t714;
-    const real t716 = t175 * t715;
-    const real t717 = t679 - t716;
-    const real t718 = t273 * t709;
-    const real t719 = t717 - t718;
-    const real t720 = t391 * t705;
-    const real t721 = t719 - t720;
-    const real t722 = t530 * t703;
-    const real t723 = t721 - t722;
-    G[0] = t723;
-    const real t724 = t22 * t174;
-    const real t725 = t22 * t175;
-    const real t726 = t102 - t725;
-    const real t727 = t292 * t726;
-    const real t728 = t22 * t273;
-    const real t729 = t201 - t728;
-    const real t730 = t293 * t726;
-    const real t731 = t729 - t730;
-    const real t732 = t431 * t731;
-    const real t733 = t22 * t391;
-    const real t734 = t319 - t733;
-    const real t735 = t410 * t726;
-    const real t736 = t734 - t735;
-    const real t737 = t432 * t731;
-    const real t738 = t736 - t737;
-    const real t739 = t593 * t738;
-    const real t740 = t22 * t530;
-    const real t741 = t458 - t740;
-    const real t742 = t549 * t726;
-    const real t743 = t741 - t742;
-    const real t744 = t570 * t731;
-    const real t745 = t743 - t744;
-    const real t746 = t594 * t738;
-    const real t747 = t745 - t746;
-    const real t748 = t678 * t747;
-    const real t749 = t594 * t748;
-    const real t750 = t739 - t749;
-    const real t751 = t432 * t750;
-    const real t752 = t732 - t751;
-    const real t753 = t570 * t748;
-    const real t754 = t752 - t753;
-    const real t755 = t293 * t754;
-    const real t756 = t727 - t755;
-    const real t757 = t410 * t750;
-    const real t758 = t756 - t757;
-    const real t759 = t549 * t748;
-    const real t760 = t758 - t759;
-    const real t761 = t175 * t760;
-    const real t762 = t724 - t761;
-    const real t763 = t273 * t754;
-    const real t764 = t762 - t763;
-    const real t765 = t391 * t750;
-    const real t766 = t764 - t765;
-    const real t767 = t530 * t748;
-    const real t768 = t766 - t767;
-    G[1] = t768;
-    const real t769 = t35 * t174;
-    const real t770 = t35 * t175;
-    const real t771 = t115 - t770;
-    const real t772 = t292 * t771;
-    const real t773 = t35 * t273;
-    const real t774 = t214 - t773;
-    const real t775 = t293 * t771;
-    const real t776 = t774 - t775;
-    const real t777 = t431 * t776;
-    const real t778 = t35 * t391;
-    const real t779 = t332 - t778;
-    const real t780 = t410 * t771;
-    const real t781 = t779 - t780;
-    const real t782 = t432 * t776;
-    const real t783 = t781 - t782;
-    const real t784 = t593 * t783;
-    const real t785 = t35 * t530;
-    const real t786 = t471 - t785;
-    const real t787 = t549 * t771;
-    const real t788 = t786 - t787;
-    const real t789 = t570 * t776;
-    const real t790 = t788 - t789;
-    const real t791 = t594 * t783;
-    const real t792 = t790 - t791;
-    const real t793 = t678 * t792;
-    const real t794 = t594 * t793;
-    const real t795 = t784 - t794;
-    const real t796 = t432 * t795;
-    const real t797 = t777 - t796;
-    const real t798 = t570 * t793;
-    const real t799 = t797 - t798;
-    const real t800 = t293 * t799;
-    const real t801 = t772 - t800;
-    const real t802 = t410 * t795;
-    const real t803 = t801 - t802;
-    const real t804 = t549 * t793;
-    const real t805 = t803 - t804;
-    const real t806 = t175 * t805;
-    const real t807 = t769 - t806;
-    const real t808 = t273 * t799;
-    const real t809 = t807 - t808;
-    const real t810 = t391 * t795;
-    const real t811 = t809 - t810;
-    const real t812 = t530 * t793;
-    const real t813 = t811 - t812;
-    G[2] = t813;
-    const real t814 = t48 * t174;
-    const real t815 = t48 * t175;
-    const real t816 = t128 - t815;
-    const real t817 = t292 * t816;
-    const real t818 = t48 * t273;
-    const real t819 = t227 - t818;
-    const real t820 = t293 * t816;
-    const real t821 = t819 - t820;
-    const real t822 = t431 * t821;
-    const real t823 = t48 * t391;
-    const real t824 = t345 - t823;
-    const real t825 = t410 * t816;
-    const real t826 = t824 - t825;
-    const real t827 = t432 * t821;
-    const real t828 = t826 - t827;
-    const real t829 = t593 * t828;
-    const real t830 = t48 * t530;
-    const real t831 = t484 - t830;
-    const real t832 = t549 * t816;
-    const real t833 = t831 - t832;
-    const real t834 = t570 * t821;
-    const real t835 = t833 - t834;
-    const real t836 = t594 * t828;
-    const real t837 = t835 - t836;
-    const real t838 = t678 * t837;
-    const real t839 = t594 * t838;
-    const real t840 = t829 - t839;
-    const real t841 = t432 * t840;
-    const real t842 = t822 - t841;
-    const real t843 = t570 * t838;
-    const real t844 = t842 - t843;
-    const real t845 = t293 * t844;
-    const real t846 = t817 - t845;
-    const real t847 = t410 * t840;
-    const real t848 = t846 - t847;
-    const real t849 = t549 * t838;
-    const real t850 = t848 - t849;
-    const real t851 = t175 * t850;
-    const real t852 = t814 - t851;
-    const real t853 = t273 * t844;
-    const real t854 = t852 - t853;
-    const real t855 = t391 * t840;
-    const real t856 = t854 - t855;
-    const real t857 = t530 * t838;
-    const real t858 = t856 - t857;
-    G[3] = t858;
-    const real t859 = t61 * t174;
-    const real t860 = t61 * t175;
-    const real t861 = t141 - t860;
-    const real t862 = t292 * t861;
-    const real t863 = t61 * t273;
-    const real t864 = t240 - t863;
-    const real t865 = t293 * t861;
-    const real t866 = t864 - t865;
-    const real t867 = t431 * t866;
-    const real t868 = t61 * t391;
-    const real t869 = t358 - t868;
-    const real t870 = t410 * t861;
-    const real t871 = t869 - t870;
-    const real t872 = t432 * t866;
-    const real t873 = t871 - t872;
-    const real t874 = t593 * t873;
-    const real t875 = t61 * t530;
-    const real t876 = t497 - t875;
-    const real t877 = t549 * t861;
-    const real t878 = t876 - t877;
-    const real t879 = t570 * t866;
-    const real t880 = t878 - t879;
-    const real t881 = t594 * t873;
-    const real t882 = t880 - t881;
-    const real t883 = t678 * t882;
-    const real t884 = t594 * t883;
-    const real t885 = t874 - t884;
-    const real t886 = t432 * t885;
-    const real t887 = t867 - t886;
-    const real t888 = t570 * t883;
-    const real t889 = t887 - t888;
-    const real t890 = t293 * t889;
-    const real t891 = t862 - t890;
-    const real t892 = t410 * t885;
-    const real t893 = t891 - t892;
-    const real t894 = t549 * t883;
-    const real t895 = t893 - t894;
-    const real t896 = t175 * t895;
-    const real t897 = t859 - t896;
-    const real t898 = t273 * t889;
-    const real t899 = t897 - t898;
-    const real t900 = t391 * t885;
-    const real t901 = t899 - t900;
-    const real t902 = t530 * t883;
-    const real t903 = t901 - t902;
-    G[4] = t903;
-    const real t904 = t74 * t174;
-    const real t905 = t74 * t175;
-    const real t906 = t154 - t905;
-    const real t907 = t292 * t906;
-    const real t908 = t74 * t273;
-    const real t909 = t253 - t908;
-    const real t910 = t293 * t906;
-    const real t911 = t909 - t910;
-    const real t912 = t431 * t911;
-    const real t913 = t74 * t391;
-    const real t914 = t371 - t913;
-    const real t915 = t410 * t906;
-    const real t916 = t914 - t915;
-    const real t917 = t432 * t911;
-    const real t918 = t916 - t917;
-    const real t919 = t593 * t918;
-    const real t920 = t74 * t530;
-    const real t921 = t510 - t920;
-    const real t922 = t549 * t906;
-    const real t923 = t921 - t922;
-    const real t924 = t570 * t911;
-    const real t925 = t923 - t924;
-    const real t926 = t594 * t918;
-    const real t927 = t925 - t926;
-    const real t928 = t678 * t927;
-    const real t929 = t594 * t928;
-    const real t930 = t919 - t929;
-    const real t931 = t432 * t930;
-    const real t932 = t912 - t931;
-    const real t933 = t570 * t928;
-    const real t934 = t932 - t933;
-    const real t935 = t293 * t934;
-    const real t936 = t907 - t935;
-    const real t937 = t410 * t930;
-    const real t938 = t936 - t937;
-    const real t939 = t549 * t928;
-    const real t940 = t938 - t939;
-    const real t941 = t175 * t940;
-    const real t942 = t904 - t941;
-    const real t943 = t273 * t934;
-    const real t944 = t942 - t943;
-    const real t945 = t391 * t930;
-    const real t946 = t944 - t945;
-    const real t947 = t530 * t928;
-    const real t948 = t946 - t947;
-    G[5] = t948;
-    G[6] = t715;
-    G[7] = t760;
-    G[8] = t805;
-    G[9] = t850;
-    G[10] = t895;
-    G[11] = t940;
-    G[12] = t709;
-    G[13] = t754;
-    G[14] = t799;
-    G[15] = t844;
-    G[16] = t889;
-    G[17] = t934;
-    G[18] = t705;
-    G[19] = t750;
-    G[20] = t795;
-    G[21] = t840;
-    G[22] = t885;
-    G[23] = t930;
-    G[24] = t703;
-    G[25] = t748;
-    G[26] = t793;
-    G[27] = t838;
-    G[28] = t883;
-    G[29] = t928;
-    const real t949 = t10 * t679;
-    const real t950 = t681 * t682;
-    const real t951 = t949 + t950;
-    const real t952 = t686 * t687;
-    const real t953 = t951 + t952;
-    const real t954 = t693 * t694;
-    const real t955 = t953 + t954;
-    const real t956 = t702 * t703;
-    const real t957 = t955 + t956;
-    const real t958 = S[0] - t957;
-    const real t959 = Rc[0] * t958;
-    const real t960 = t10 * t724;
-    const real t961 = t681 * t727;
-    const real t962 = t960 + t961;
-    const real t963 = t686 * t732;
-    const real t964 = t962 + t963;
-    const real t965 = t693 * t739;
-    const real t966 = t964 + t965;
-    const real t967 = t702 * t748;
-    const real t968 = t966 + t967;
-    const real t969 = S[1] - t968;
-    const real t970 = Rc[1] * t969;
-    const real t971 = t959 + t970;
-    const real t972 = t10 * t769;
-    const real t973 = t681 * t772;
-    const real t974 = t972 + t973;
-    const real t975 = t686 * t777;
-    const real t976 = t974 + t975;
-    const real t977 = t693 * t784;
-    const real t978 = t976 + t977;
-    const real t979 = t702 * t793;
-    const real t980 = t978 + t979;
-    const real t981 = S[2] - t980;
-    const real t982 = Rc[2] * t981;
-    const real t983 = t971 + t982;
-    const real t984 = Rc[0] * t983;
-    const real t985 = Rc[0] * t969;
-    const real t986 = t22 * t724;
-    const real t987 = t726 * t727;
-    const real t988 = t986 + t987;
-    const real t989 = t731 * t732;
-    const real t990 = t988 + t989;
-    const real t991 = t738 * t739;
-    const real t992 = t990 + t991;
-    const real t993 = t747 * t748;
-    const real t994 = t992 + t993;
-    const real t995 = S[6] - t994;
-    const real t996 = Rc[1] * t995;
-    const real t997 = t985 + t996;
-    const real t998 = t22 * t769;
-    const real t999 = t726 * t772;
-    const real t1000 = t998 + t999;
-    const real t1001 = t731 * t777;
-    const real t1002 = t1000 + t1001;
-    const real t1003 = t738 * t784;
-    const real t1004 = t1002 + t1003;
-    const real t1005 = t747 * t793;
-    const real t1006 = t1004 + t1005;
-    const real t1007 = S[7] - t1006;
-    const real t1008 = Rc[2] * t1007;
-    const real t1009 = t997 + t1008;
-    const real t1010 = Rc[1] * t1009;
-    const real t1011 = t984 + t1010;
-    const real t1012 = Rc[0] * t981;
-    const real t1013 = Rc[1] * t1007;
-    const real t1014 = t1012 + t1013;
-    const real t1015 = t35 * t769;
-    const real t1016 = t771 * t772;
-    const real t1017 = t1015 + t1016;
-    const real t1018 = t776 * t777;
-    const real t1019 = t1017 + t1018;
-    const real t1020 = t783 * t784;
-    const real t1021 = t1019 + t1020;
-    const real t1022 = t792 * t793;
-    const real t1023 = t1021 + t1022;
-    const real t1024 = S[11] - t1023;
-    const real t1025 = Rc[2] * t1024;
-    const real t1026 = t1014 + t1025;
-    const real t1027 = Rc[2] * t1026;
-    const real t1028 = t1011 + t1027;
-    S_I[0] += t1028;
-    const real t1029 = Rc[3] * t983;
-    const real t1030 = Rc[4] * t1009;
-    const real t1031 = t1029 + t1030;
-    const real t1032 = Rc[5] * t1026;
-    const real t1033 = t1031 + t1032;
-    S_I[1] += t1033;
-    const real t1034 = Rc[6] * t983;
-    const real t1035 = Rc[7] * t1009;
-    const real t1036 = t1034 + t1035;
-    const real t1037 = Rc[8] * t1026;
-    const real t1038 = t1036 + t1037;
-    S_I[2] += t1038;
-    const real t1039 = t10 * t814;
-    const real t1040 = t681 * t817;
-    const real t1041 = t1039 + t1040;
-    const real t1042 = t686 * t822;
-    const real t1043 = t1041 + t1042;
-    const real t1044 = t693 * t829;
-    const real t1045 = t1043 + t1044;
-    const real t1046 = t702 * t838;
-    const real t1047 = t1045 + t1046;
-    const real t1048 = S[3] - t1047;
-    const real t1049 = Rc[0] * t1048;
-    const real t1050 = t22 * t814;
-    const real t1051 = t726 * t817;
-    const real t1052 = t1050 + t1051;
-    const real t1053 = t731 * t822;
-    const real t1054 = t1052 + t1053;
-    const real t1055 = t738 * t829;
-    const real t1056 = t1054 + t1055;
-    const real t1057 = t747 * t838;
-    const real t1058 = t1056 + t1057;
-    const real t1059 = S[8] - t1058;
-    const real t1060 = Rc[1] * t1059;
-    const real t1061 = t1049 + t1060;
-    const real t1062 = t35 * t814;
-    const real t1063 = t771 * t817;
-    const real t1064 = t1062 + t1063;
-    const real t1065 = t776 * t822;
-    const real t1066 = t1064 + t1065;
-    const real t1067 = t783 * t829;
-    const real t1068 = t1066 + t1067;
-    const real t1069 = t792 * t838;
-    const real t1070 = t1068 + t1069;
-    const real t1071 = S[12] - t1070;
-    const real t1072 = Rc[2] * t1071;
-    const real t1073 = t1061 + t1072;
-    const real t1074 = Rc[0] * t1073;
-    const real t1075 = t10 * t859;
-    const real t1076 = t681 * t862;
-    const real t1077 = t1075 + t1076;
-    const real t1078 = t686 * t867;
-    const real t1079 = t1077 + t1078;
-    const real t1080 = t693 * t874;
-    const real t1081 = t1079 + t1080;
-    const real t1082 = t702 * t883;
-    const real t1083 = t1081 + t1082;
-    const real t1084 = S[4] - t1083;
-    const real t1085 = Rc[0] * t1084;
-    const real t1086 = t22 * t859;
-    const real t1087 = t726 * t862;
-    const real t1088 = t1086 + t1087;
-    const real t1089 = t731 * t867;
-    const real t1090 = t1088 + t1089;
-    const real t1091 = t738 * t874;
-    const real t1092 = t1090 + t1091;
-    const real t1093 = t747 * t883;
-    const real t1094 = t1092 + t1093;
-    const real t1095 = S[9] - t1094;
-    const real t1096 = Rc[1] * t1095;
-    const real t1097 = t1085 + t1096;
-    const real t1098 = t35 * t859;
-    const real t1099 = t771 * t862;
-    const real t1100 = t1098 + t1099;
-    const real t1101 = t776 * t867;
-    const real t1102 = t1100 + t1101;
-    const real t1103 = t783 * t874;
-    const real t1104 = t1102 + t1103;
-    const real t1105 = t792 * t883;
-    const real t1106 = t1104 + t1105;
-    const real t1107 = S[13] - t1106;
-    const real t1108 = Rc[2] * t1107;
-    const real t1109 = t1097 + t1108;
-    const real t1110 = Rc[1] * t1109;
-    const real t1111 = t1074 + t1110;
-    const real t1112 = t10 * t904;
-    const real t1113 = t681 * t907;
-    const real t1114 = t1112 + t1113;
-    const real t1115 = t686 * t912;
-    const real t1116 = t1114 + t1115;
-    const real t1117 = t693 * t919;
-    const real t1118 = t1116 + t1117;
-    const real t1119 = t702 * t928;
-    const real t1120 = t1118 + t1119;
-    const real t1121 = S[5] - t1120;
-    const real t1122 = Rc[0] * t1121;
-    const real t1123 = t22 * t904;
-    const real t1124 = t726 * t907;
-    const real t1125 = t1123 + t1124;
-    const real t1126 = t731 * t912;
-    const real t1127 = t1125 + t1126;
-    const real t1128 = t738 * t919;
-    const real t1129 = t1127 + t1128;
-    const real t1130 = t747 * t928;
-    const real t1131 = t1129 + t1130;
-    const real t1132 = S[10] - t1131;
-    const real t1133 = Rc[1] * t1132;
-    const real t1134 = t1122 + t1133;
-    const real t1135 = t35 * t904;
-    const real t1136 = t771 * t907;
-    const real t1137 = t1135 + t1136;
-    const real t1138 = t776 * t912;
-    const real t1139 = t1137 + t1138;
-    const real t1140 = t783 * t919;
-    const real t1141 = t1139 + t1140;
-    const real t1142 = t792 * t928;
-    const real t1143 = t1141 + t1142;
-    const real t1144 = S[14] - t1143;
-    const real t1145 = Rc[2] * t1144;
-    const real t1146 = t1134 + t1145;
-    const real t1147 = Rc[2] * t1146;
-    const real t1148 = t1111 + t1147;
-    const real t1149 = r[1] * t1038;
-    const real t1150 = r[2] * t1033;
-    const real t1151 = t1149 - t1150;
-    const real t1152 = t1148 + t1151;
-    S_I[3] += t1152;
-    const real t1153 = Rc[3] * t1073;
-    const real t1154 = Rc[4] * t1109;
-    const real t1155 = t1153 + t1154;
-    const real t1156 = Rc[5] * t1146;
-    const real t1157 = t1155 + t1156;
-    const real t1158 = r[2] * t1028;
-    const real t1159 = r[0] * t1038;
-    const real t1160 = t1158 - t1159;
-    const real t1161 = t1157 + t1160;
-    S_I[4] += t1161;
-    const real t1162 = Rc[6] * t1073;
-    const real t1163 = Rc[7] * t1109;
-    const real t1164 = t1162 + t1163;
-    const real t1165 = Rc[8] * t1146;
-    const real t1166 = t1164 + t1165;
-    const real t1167 = r[0] * t1033;
-    const real t1168 = r[1] * t1028;
-    const real t1169 = t1167 - t1168;
-    const real t1170 = t1166 + t1169;
-    S_I[5] += t1170;
-    const real t1171 = Rc[3] * t958;
-    const real t1172 = Rc[4] * t969;
-    const real t1173 = t1171 + t1172;
-    const real t1174 = Rc[5] * t981;
-    const real t1175 = t1173 + t1174;
-    const real t1176 = Rc[3] * t1175;
-    const real t1177 = Rc[3] * t969;
-    const real t1178 = Rc[4] * t995;
-    const real t1179 = t1177 + t1178;
-    const real t1180 = Rc[5] * t1007;
-    const real t1181 = t1179 + t1180;
-    const real t1182 = Rc[4] * t1181;
-    const real t1183 = t1176 + t1182;
-    const real t1184 = Rc[3] * t981;
-    const real t1185 = Rc[4] * t1007;
-    const real t1186 = t1184 + t1185;
-    const real t1187 = Rc[5] * t1024;
-    const real t1188 = t1186 + t1187;
-    const real t1189 = Rc[5] * t1188;
-    const real t1190 = t1183 + t1189;
-    S_I[6] += t1190;
-    const real t1191 = Rc[6] * t1175;
-    const real t1192 = Rc[7] * t1181;
-    const real t1193 = t1191 + t1192;
-    const real t1194 = Rc[8] * t1188;
-    const real t1195 = t1193 + t1194;
-    S_I[7] += t1195;
-    const real t1196 = Rc[3] * t1048;
-    const real t1197 = Rc[4] * t1059;
-    const real t1198 = t1196 + t1197;
-    const real t1199 = Rc[5] * t1071;
-    const real t1200 = t1198 + t1199;
-    const real t1201 = Rc[0] * t1200;
-    const real t1202 = Rc[3] * t1084;
-    const real t1203 = Rc[4] * t1095;
-    const real t1204 = t1202 + t1203;
-    const real t1205 = Rc[5] * t1107;
-    const real t1206 = t1204 + t1205;
-    const real t1207 = Rc[1] * t1206;
-    const real t1208 = t1201 + t1207;
-    const real t1209 = Rc[3] * t1121;
-    const real t1210 = Rc[4] * t1132;
-    const real t1211 = t1209 + t1210;
-    const real t1212 = Rc[5] * t1144;
-    const real t1213 = t1211 + t1212;
-    const real t1214 = Rc[2] * t1213;
-    const real t1215 = t1208 + t1214;
-    const real t1216 = r[1] * t1195;
-    const real t1217 = r[2] * t1190;
-    const real t1218 = t1216 - t1217;
-    const real t1219 = t1215 + t1218;
-    S_I[8] += t1219;
-    const real t1220 = Rc[3] * t1200;
-    const real t1221 = Rc[4] * t1206;
-    const real t1222 = t1220 + t1221;
-    const real t1223 = Rc[5] * t1213;
-    const real t1224 = t1222 + t1223;
-    const real t1225 = r[0] * t1195;
-    const real t1226 = t1150 - t1225;
-    const real t1227 = t1224 + t1226;
-    S_I[9] += t1227;
-    const real t1228 = Rc[6] * t1200;
-    const real t1229 = Rc[7] * t1206;
-    const real t1230 = t1228 + t1229;
-    const real t1231 = Rc[8] * t1213;
-    const real t1232 = t1230 + t1231;
-    const real t1233 = r[0] * t1190;
-    const real t1234 = r[1] * t1033;
-    const real t1235 = t1233 - t1234;
-    const real t1236 = t1232 + t1235;
-    S_I[10] += t1236;
-    const real t1237 = Rc[6] * t958;
-    const real t1238 = Rc[7] * t969;
-    const real t1239 = t1237 + t1238;
-    const real t1240 = Rc[8] * t981;
-    const real t1241 = t1239 + t1240;
-    const real t1242 = Rc[6] * t1241;
-    const real t1243 = Rc[6] * t969;
-    const real t1244 = Rc[7] * t995;
-    const real t1245 = t1243 + t1244;
-    const real t1246 = Rc[8] * t1007;
-    const real t1247 = t1245 + t1246;
-    const real t1248 = Rc[7] * t1247;
-    const real t1249 = t1242 + t1248;
-    const real t1250 = Rc[6] * t981;
-    const real t1251 = Rc[7] * t1007;
-    const real t1252 = t1250 + t1251;
-    const real t1253 = Rc[8] * t1024;
-    const real t1254 = t1252 + t1253;
-    const real t1255 = Rc[8] * t1254;
-    const real t1256 = t1249 + t1255;
-    S_I[11] += t1256;
-    const real t1257 = Rc[6] * t1048;
-    const real t1258 = Rc[7] * t1059;
-    const real t1259 = t1257 + t1258;
-    const real t1260 = Rc[8] * t1071;
-    const real t1261 = t1259 + t1260;
-    const real t1262 = Rc[0] * t1261;
-    const real t1263 = Rc[6] * t1084;
-    const real t1264 = Rc[7] * t1095;
-    const real t1265 = t1263 + t1264;
-    const real t1266 = Rc[8] * t1107;
-    const real t1267 = t1265 + t1266;
-    const real t1268 = Rc[1] * t1267;
-    const real t1269 = t1262 + t1268;
-    const real t1270 = Rc[6] * t1121;
-    const real t1271 = Rc[7] * t1132;
-    const real t1272 = t1270 + t1271;
-    const real t1273 = Rc[8] * t1144;
-    const real t1274 = t1272 + t1273;
-    const real t1275 = Rc[2] * t1274;
-    const real t1276 = t1269 + t1275;
-    const real t1277 = r[1] * t1256;
-    const real t1278 = r[2] * t1195;
-    const real t1279 = t1277 - t1278;
-    const real t1280 = t1276 + t1279;
-    S_I[12] += t1280;
-    const real t1281 = Rc[3] * t1261;
-    const real t1282 = Rc[4] * t1267;
-    const real t1283 = t1281 + t1282;
-    const real t1284 = Rc[5] * t1274;
-    const real t1285 = t1283 + t1284;
-    const real t1286 = r[2] * t1038;
-    const real t1287 = r[0] * t1256;
-    const real t1288 = t1286 - t1287;
-    const real t1289 = t1285 + t1288;
-    S_I[13] += t1289;
-    const real t1290 = Rc[6] * t1261;
-    const real t1291 = Rc[7] * t1267;
-    const real t1292 = t1290 + t1291;
-    const real t1293 = Rc[8] * t1274;
-    const real t1294 = t1292 + t1293;
-    const real t1295 = t1225 - t1149;
-    const real t1296 = t1294 + t1295;
-    S_I[14] += t1296;
-    const real t1297 = t48 * t814;
-    const real t1298 = t816 * t817;
-    const real t1299 = t1297 + t1298;
-    const real t1300 = t821 * t822;
-    const real t1301 = t1299 + t1300;
-    const real t1302 = t828 * t829;
-    const real t1303 = t1301 + t1302;
-    const real t1304 = t837 * t838;
-    const real t1305 = t1303 + t1304;
-    const real t1306 = S[15] - t1305;
-    const real t1307 = Rc[0] * t1306;
-    const real t1308 = t48 * t859;
-    const real t1309 = t816 * t862;
-    const real t1310 = t1308 + t1309;
-    const real t1311 = t821 * t867;
-    const real t1312 = t1310 + t1311;
-    const real t1313 = t828 * t874;
-    const real t1314 = t1312 + t1313;
-    const real t1315 = t837 * t883;
-    const real t1316 = t1314 + t1315;
-    const real t1317 = S[16] - t1316;
-    const real t1318 = Rc[1] * t1317;
-    const real t1319 = t1307 + t1318;
-    const real t1320 = t48 * t904;
-    const real t1321 = t816 * t907;
-    const real t1322 = t1320 + t1321;
-    const real t1323 = t821 * t912;
-    const real t1324 = t1322 + t1323;
-    const real t1325 = t828 * t919;
-    const real t1326 = t1324 + t1325;
-    const real t1327 = t837 * t928;
-    const real t1328 = t1326 + t1327;
-    const real t1329 = S[17] - t1328;
-    const real t1330 = Rc[2] * t1329;
-    const real t1331 = t1319 + t1330;
-    const real t1332 = Rc[0] * t1331;
-    const real t1333 = Rc[0] * t1317;
-    const real t1334 = t61 * t859;
-    const real t1335 = t861 * t862;
-    const real t1336 = t1334 + t1335;
-    const real t1337 = t866 * t867;
-    const real t1338 = t1336 + t1337;
-    const real t1339 = t873 * t874;
-    const real t1340 = t1338 + t1339;
-    const real t1341 = t882 * t883;
-    const real t1342 = t1340 + t1341;
-    const real t1343 = S[18] - t1342;
-    const real t1344 = Rc[1] * t1343;
-    const real t1345 = t1333 + t1344;
-    const real t1346 = t61 * t904;
-    const real t1347 = t861 * t907;
-    const real t1348 = t1346 + t1347;
-    const real t1349 = t866 * t912;
-    const real t1350 = t1348 + t1349;
-    const real t1351 = t873 * t919;
-    const real t1352 = t1350 + t1351;
-    const real t1353 = t882 * t928;
-    const real t1354 = t1352 + t1353;
-    const real t1355 = S[19] - t1354;
-    const real t1356 = Rc[2] * t1355;
-    const real t1357 = t1345 + t1356;
-    const real t1358 = Rc[1] * t1357;
-    const real t1359 = t1332 + t1358;
-    const real t1360 = Rc[0] * t1329;
-    const real t1361 = Rc[1] * t1355;
-    const real t1362 = t1360 + t1361;
-    const real t1363 = t74 * t904;
-    const real t1364 = t906 * t907;
-    const real t1365 = t1363 + t1364;
-    const real t1366 = t911 * t912;
-    const real t1367 = t1365 + t1366;
-    const real t1368 = t918 * t919;
-    const real t1369 = t1367 + t1368;
-    const real t1370 = t927 * t928;
-    const real t1371 = t1369 + t1370;
-    const real t1372 = S[20] - t1371;
-    const real t1373 = Rc[2] * t1372;
-    const real t1374 = t1362 + t1373;
-    const real t1375 = Rc[2] * t1374;
-    const real t1376 = t1359 + t1375;
-    const real t1377 = r[1] * t1280;
-    const real t1378 = r[2] * t1219;
-    const real t1379 = t1377 - t1378;
-    const real t1380 = r[1] * t1276;
-    const real t1381 = r[2] * t1215;
-    const real t1382 = t1380 - t1381;
-    const real t1383 = t1379 + t1382;
-    const real t1384 = t1376 + t1383;
-    S_I[15] += t1384;
-    const real t1385 = Rc[3] * t1331;
-    const real t1386 = Rc[4] * t1357;
-    const real t1387 = t1385 + t1386;
-    const real t1388 = Rc[5] * t1374;
-    const real t1389 = t1387 + t1388;
-    const real t1390 = r[1] * t1289;
-    const real t1391 = r[2] * t1227;
-    const real t1392 = t1390 - t1391;
-    const real t1393 = r[2] * t1148;
-    const real t1394 = r[0] * t1276;
-    const real t1395 = t1393 - t1394;
-    const real t1396 = t1392 + t1395;
-    const real t1397 = t1389 + t1396;
-    S_I[16] += t1397;
-    const real t1398 = Rc[6] * t1331;
-    const real t1399 = Rc[7] * t1357;
-    const real t1400 = t1398 + t1399;
-    const real t1401 = Rc[8] * t1374;
-    const real t1402 = t1400 + t1401;
-    const real t1403 = r[1] * t1296;
-    const real t1404 = r[2] * t1236;
-    const real t1405 = t1403 - t1404;
-    const real t1406 = r[0] * t1215;
-    const real t1407 = r[1] * t1148;
-    const real t1408 = t1406 - t1407;
-    const real t1409 = t1405 + t1408;
-    const real t1410 = t1402 + t1409;
-    S_I[17] += t1410;
-    const real t1411 = Rc[3] * t1306;
-    const real t1412 = Rc[4] * t1317;
-    const real t1413 = t1411 + t1412;
-    const real t1414 = Rc[5] * t1329;
-    const real t1415 = t1413 + t1414;
-    const real t1416 = Rc[3] * t1415;
-    const real t1417 = Rc[3] * t1317;
-    const real t1418 = Rc[4] * t1343;
-    const real t1419 = t1417 + t1418;
-    const real t1420 = Rc[5] * t1355;
-    const real t1421 = t1419 + t1420;
-    const real t1422 = Rc[4] * t1421;
-    const real t1423 = t1416 + t1422;
-    const real t1424 = Rc[3] * t1329;
-    const real t1425 = Rc[4] * t1355;
-    const real t1426 = t1424 + t1425;
-    const real t1427 = Rc[5] * t1372;
-    const real t1428 = t1426 + t1427;
-    const real t1429 = Rc[5] * t1428;
-    const real t1430 = t1423 + t1429;
-    const real t1431 = r[2] * t1161;
-    const real t1432 = r[0] * t1289;
-    const real t1433 = t1431 - t1432;
-    const real t1434 = r[2] * t1157;
-    const real t1435 = r[0] * t1285;
-    const real t1436 = t1434 - t1435;
-    const real t1437 = t1433 + t1436;
-    const real t1438 = t1430 + t1437;
-    S_I[18] += t1438;
-    const real t1439 = Rc[6] * t1415;
-    const real t1440 = Rc[7] * t1421;
-    const real t1441 = t1439 + t1440;
-    const real t1442 = Rc[8] * t1428;
-    const real t1443 = t1441 + t1442;
-    const real t1444 = r[2] * t1170;
-    const real t1445 = r[0] * t1296;
-    const real t1446 = t1444 - t1445;
-    const real t1447 = r[0] * t1224;
-    const real t1448 = r[1] * t1157;
-    const real t1449 = t1447 - t1448;
-    const real t1450 = t1446 + t1449;
-    const real t1451 = t1443 + t1450;
-    S_I[19] += t1451;
-    const real t1452 = Rc[6] * t1306;
-    const real t1453 = Rc[7] * t1317;
-    const real t1454 = t1452 + t1453;
-    const real t1455 = Rc[8] * t1329;
-    const real t1456 = t1454 + t1455;
-    const real t1457 = Rc[6] * t1456;
-    const real t1458 = Rc[6] * t1317;
-    const real t1459 = Rc[7] * t1343;
-    const real t1460 = t1458 + t1459;
-    const real t1461 = Rc[8] * t1355;
-    const real t1462 = t1460 + t1461;
-    const real t1463 = Rc[7] * t1462;
-    const real t1464 = t1457 + t1463;
-    const real t1465 = Rc[6] * t1329;
-    const real t1466 = Rc[7] * t1355;
-    const real t1467 = t1465 + t1466;
-    const real t1468 = Rc[8] * t1372;
-    const real t1469 = t1467 + t1468;
-    const real t1470 = Rc[8] * t1469;
-    const real t1471 = t1464 + t1470;
-    const real t1472 = r[0] * t1236;
-    const real t1473 = r[1] * t1170;
-    const real t1474 = t1472 - t1473;
-    const real t1475 = r[0] * t1232;
-    const real t1476 = r[1] * t1166;
-    const real t1477 = t1475 - t1476;
-    const real t1478 = t1474 + t1477;
-    const real t1479 = t1471 + t1478;
-    S_I[20] += t1479;
-    return 0;
+  real t10 = H[0] * S[0] + H[5] * S[1] + H[10] * S[2] + H[15] * S[3] + H[20] * S[4] + H[25] * S[5];
+  real t22 = H[0] * S[1] + H[5] * S[6] + H[10] * S[7] + H[15] * S[8] + H[20] * S[9] + H[25] * S[10];
+  real t35 = H[0] * S[2] + H[5] * S[7] + H[10] * S[11] + H[15] * S[12] + H[20] * S[13] + H[25] *
+    S[14];
+  real t48 = H[0] * S[3] + H[5] * S[8] + H[10] * S[12] + H[15] * S[15] + H[20] * S[16] + H[25] *
+    S[17];
+  real t61 = H[0] * S[4] + H[5] * S[9] + H[10] * S[13] + H[15] * S[16] + H[20] * S[18] + H[25] *
+    S[19];
+  real t74 = H[0] * S[5] + H[5] * S[10] + H[10] * S[14] + H[15] * S[17] + H[20] * S[19] + H[25] *
+    S[20];
+  real t78 = H[0] * t10 + H[5] * t22 + H[10] * t35 + H[15] * t48 + H[20] * t61 + H[25] * t74 + (J[0]
+    - W[0]);
+  if (!((0.0 < t78))) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+  real t90 = H[1] * S[0] + H[6] * S[1] + H[11] * S[2] + H[16] * S[3] + H[21] * S[4] + H[26] * S[5];
+  real t102 = H[1] * S[1] + H[6] * S[6] + H[11] * S[7] + H[16] * S[8] + H[21] * S[9] + H[26] *
+    S[10];
+  real t115 = H[1] * S[2] + H[6] * S[7] + H[11] * S[11] + H[16] * S[12] + H[21] * S[13] + H[26] *
+    S[14];
+  real t128 = H[1] * S[3] + H[6] * S[8] + H[11] * S[12] + H[16] * S[15] + H[21] * S[16] + H[26] *
+    S[17];
+  real t141 = H[1] * S[4] + H[6] * S[9] + H[11] * S[13] + H[16] * S[16] + H[21] * S[18] + H[26] *
+    S[19];
+  real t154 = H[1] * S[5] + H[6] * S[10] + H[11] * S[14] + H[16] * S[17] + H[21] * S[19] + H[26] *
+    S[20];
+  real t158 = H[1] * t90 + H[6] * t102 + H[11] * t115 + H[16] * t128 + H[21] * t141 + H[26] * t154 +
+    (J[1] - W[6]);
+  real t173 = H[0] * t90 + H[5] * t102 + H[10] * t115 + H[15] * t128 + H[20] * t141 + H[25] * t154 -
+    0.5 * (W[1] + W[5]);
+  real t174 = 1.0 / t78;
+  real t175 = t173 * t174;
+  real t177 = t158 - t173 * t175;
+  if (!((t158 * ((real)1 / (real)10000000000000) < t177))) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+  real t189 = H[2] * S[0] + H[7] * S[1] + H[12] * S[2] + H[17] * S[3] + H[22] * S[4] + H[27] * S[5];
+  real t201 = H[2] * S[1] + H[7] * S[6] + H[12] * S[7] + H[17] * S[8] + H[22] * S[9] + H[27] *
+    S[10];
+  real t214 = H[2] * S[2] + H[7] * S[7] + H[12] * S[11] + H[17] * S[12] + H[22] * S[13] + H[27] *
+    S[14];
+  real t227 = H[2] * S[3] + H[7] * S[8] + H[12] * S[12] + H[17] * S[15] + H[22] * S[16] + H[27] *
+    S[17];
+  real t240 = H[2] * S[4] + H[7] * S[9] + H[12] * S[13] + H[17] * S[16] + H[22] * S[18] + H[27] *
+    S[19];
+  real t253 = H[2] * S[5] + H[7] * S[10] + H[12] * S[14] + H[17] * S[17] + H[22] * S[19] + H[27] *
+    S[20];
+  real t257 = H[2] * t189 + H[7] * t201 + H[12] * t214 + H[17] * t227 + H[22] * t240 + H[27] * t253
+    + (J[2] - W[12]);
+  real t272 = H[0] * t189 + H[5] * t201 + H[10] * t214 + H[15] * t227 + H[20] * t240 + H[25] * t253
+    - 0.5 * (W[2] + W[10]);
+  real t273 = t272 * t174;
+  real t291 = H[1] * t189 + H[6] * t201 + H[11] * t214 + H[16] * t227 + H[21] * t240 + H[26] * t253
+    - 0.5 * (W[7] + W[11]) - t272 * t175;
+  real t292 = 1.0 / t177;
+  real t293 = t292 * t291;
+  real t295 = t257 - t272 * t273 - t291 * t293;
+  if (!((t257 * ((real)1 / (real)10000000000000) < t295))) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+  real t307 = H[3] * S[0] + H[8] * S[1] + H[13] * S[2] + H[18] * S[3] + H[23] * S[4] + H[28] * S[5];
+  real t319 = H[3] * S[1] + H[8] * S[6] + H[13] * S[7] + H[18] * S[8] + H[23] * S[9] + H[28] *
+    S[10];
+  real t332 = H[3] * S[2] + H[8] * S[7] + H[13] * S[11] + H[18] * S[12] + H[23] * S[13] + H[28] *
+    S[14];
+  real t345 = H[3] * S[3] + H[8] * S[8] + H[13] * S[12] + H[18] * S[15] + H[23] * S[16] + H[28] *
+    S[17];
+  real t358 = H[3] * S[4] + H[8] * S[9] + H[13] * S[13] + H[18] * S[16] + H[23] * S[18] + H[28] *
+    S[19];
+  real t371 = H[3] * S[5] + H[8] * S[10] + H[13] * S[14] + H[18] * S[17] + H[23] * S[19] + H[28] *
+    S[20];
+  real t375 = H[3] * t307 + H[8] * t319 + H[13] * t332 + H[18] * t345 + H[23] * t358 + H[28] * t371
+    + (J[3] - W[18]);
+  real t390 = H[0] * t307 + H[5] * t319 + H[10] * t332 + H[15] * t345 + H[20] * t358 + H[25] * t371
+    - 0.5 * (W[3] + W[15]);
+  real t391 = t390 * t174;
+  real t409 = H[1] * t307 + H[6] * t319 + H[11] * t332 + H[16] * t345 + H[21] * t358 + H[26] * t371
+    - 0.5 * (W[8] + W[16]) - t390 * t175;
+  real t410 = t292 * t409;
+  real t430 = H[2] * t307 + H[7] * t319 + H[12] * t332 + H[17] * t345 + H[22] * t358 + H[27] * t371
+    - 0.5 * (W[13] + W[17]) - t390 * t273 - t293 * t409;
+  real t431 = 1.0 / t295;
+  real t432 = t431 * t430;
+  real t434 = t375 - t390 * t391 - t409 * t410 - t430 * t432;
+  if (!((t375 * ((real)1 / (real)10000000000000) < t434))) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+  real t446 = H[4] * S[0] + H[9] * S[1] + H[14] * S[2] + H[19] * S[3] + H[24] * S[4] + H[29] * S[5];
+  real t458 = H[4] * S[1] + H[9] * S[6] + H[14] * S[7] + H[19] * S[8] + H[24] * S[9] + H[29] *
+    S[10];
+  real t471 = H[4] * S[2] + H[9] * S[7] + H[14] * S[11] + H[19] * S[12] + H[24] * S[13] + H[29] *
+    S[14];
+  real t484 = H[4] * S[3] + H[9] * S[8] + H[14] * S[12] + H[19] * S[15] + H[24] * S[16] + H[29] *
+    S[17];
+  real t497 = H[4] * S[4] + H[9] * S[9] + H[14] * S[13] + H[19] * S[16] + H[24] * S[18] + H[29] *
+    S[19];
+  real t510 = H[4] * S[5] + H[9] * S[10] + H[14] * S[14] + H[19] * S[17] + H[24] * S[19] + H[29] *
+    S[20];
+  real t514 = H[4] * t446 + H[9] * t458 + H[14] * t471 + H[19] * t484 + H[24] * t497 + H[29] * t510
+    + (J[4] - W[24]);
+  real t529 = H[0] * t446 + H[5] * t458 + H[10] * t471 + H[15] * t484 + H[20] * t497 + H[25] * t510
+    - 0.5 * (W[4] + W[20]);
+  real t530 = t529 * t174;
+  real t548 = H[1] * t446 + H[6] * t458 + H[11] * t471 + H[16] * t484 + H[21] * t497 + H[26] * t510
+    - 0.5 * (W[9] + W[21]) - t529 * t175;
+  real t549 = t292 * t548;
+  real t569 = H[2] * t446 + H[7] * t458 + H[12] * t471 + H[17] * t484 + H[22] * t497 + H[27] * t510
+    - 0.5 * (W[14] + W[22]) - t529 * t273 - t293 * t548;
+  real t570 = t431 * t569;
+  real t592 = H[3] * t446 + H[8] * t458 + H[13] * t471 + H[18] * t484 + H[23] * t497 + H[28] * t510
+    - 0.5 * (W[19] + W[23]) - t529 * t391 - t410 * t548 - t432 * t569;
+  real t593 = 1.0 / t434;
+  real t594 = t593 * t592;
+  real t596 = t514 - t529 * t530 - t548 * t549 - t569 * t570 - t592 * t594;
+  if (!((t514 * ((real)1 / (real)10000000000000) < t596))) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+  real t606 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t607 = (0.0 < floor_[0]) ? floor_[0] : t606;
+  real t617 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t618 = (0.0 < floor_[1]) ? floor_[1] : t617;
+  if (!(((H[10] * H[10] + (H[0] * H[0] + H[5] * H[5])) * t607 + (H[25] * H[25] + (H[15] * H[15] + H[20] * H[20])) * t618 < t78))) return 1; /* speed 1 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t607 * (H[11] * H[11] + (H[1] * H[1] + H[6] * H[6])) + t618 * (H[26] * H[26] + (H[16] * H[16] + H[21] * H[21])) < t158))) return 1; /* speed 2 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t607 * (H[12] * H[12] + (H[2] * H[2] + H[7] * H[7])) + t618 * (H[27] * H[27] + (H[17] * H[17] + H[22] * H[22])) < t257))) return 1; /* speed 3 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t607 * (H[13] * H[13] + (H[3] * H[3] + H[8] * H[8])) + t618 * (H[28] * H[28] + (H[18] * H[18] + H[23] * H[23])) < t375))) return 1; /* speed 4 of 5 moves no inertia: its acceleration is undetermined */
+  if (!((t607 * (H[14] * H[14] + (H[4] * H[4] + H[9] * H[9])) + t618 * (H[29] * H[29] + (H[19] * H[19] + H[24] * H[24])) < t514))) return 1; /* speed 5 of 5 moves no inertia: its acceleration is undetermined */
+  F[0] = t174;
+  F[1] = F[2] = F[3] = F[4] = 0.0;
+  F[5] = t175;
+  F[6] = t292;
+  F[7] = F[8] = F[9] = 0.0;
+  F[10] = t273;
+  F[11] = t293;
+  F[12] = t431;
+  F[13] = F[14] = 0.0;
+  F[15] = t391;
+  F[16] = t410;
+  F[17] = t432;
+  F[18] = t593;
+  F[19] = 0.0;
+  F[20] = t530;
+  F[21] = t549;
+  F[22] = t570;
+  F[23] = t594;
+  real t678 = 1.0 / t596;
+  F[24] = t678;
+  real t679 = t10 * t174;
+  real t681 = t90 - t10 * t175;
+  real t682 = t292 * t681;
+  real t686 = t189 - t10 * t273 - t293 * t681;
+  real t687 = t431 * t686;
+  real t693 = t307 - t10 * t391 - t410 * t681 - t432 * t686;
+  real t694 = t593 * t693;
+  real t702 = t446 - t10 * t530 - t549 * t681 - t570 * t686 - t594 * t693;
+  real t703 = t678 * t702;
+  real t705 = t694 - t594 * t703;
+  real t709 = t687 - t432 * t705 - t570 * t703;
+  real t715 = t682 - t293 * t709 - t410 * t705 - t549 * t703;
+  G[0] = t679 - t175 * t715 - t273 * t709 - t391 * t705 - t530 * t703;
+  real t724 = t22 * t174;
+  real t726 = t102 - t22 * t175;
+  real t727 = t292 * t726;
+  real t731 = t201 - t22 * t273 - t293 * t726;
+  real t732 = t431 * t731;
+  real t738 = t319 - t22 * t391 - t410 * t726 - t432 * t731;
+  real t739 = t593 * t738;
+  real t747 = t458 - t22 * t530 - t549 * t726 - t570 * t731 - t594 * t738;
+  real t748 = t678 * t747;
+  real t750 = t739 - t594 * t748;
+  real t754 = t732 - t432 * t750 - t570 * t748;
+  real t760 = t727 - t293 * t754 - t410 * t750 - t549 * t748;
+  G[1] = t724 - t175 * t760 - t273 * t754 - t391 * t750 - t530 * t748;
+  real t769 = t35 * t174;
+  real t771 = t115 - t35 * t175;
+  real t772 = t292 * t771;
+  real t776 = t214 - t35 * t273 - t293 * t771;
+  real t777 = t431 * t776;
+  real t783 = t332 - t35 * t391 - t410 * t771 - t432 * t776;
+  real t784 = t593 * t783;
+  real t792 = t471 - t35 * t530 - t549 * t771 - t570 * t776 - t594 * t783;
+  real t793 = t678 * t792;
+  real t795 = t784 - t594 * t793;
+  real t799 = t777 - t432 * t795 - t570 * t793;
+  real t805 = t772 - t293 * t799 - t410 * t795 - t549 * t793;
+  G[2] = t769 - t175 * t805 - t273 * t799 - t391 * t795 - t530 * t793;
+  real t814 = t48 * t174;
+  real t816 = t128 - t48 * t175;
+  real t817 = t292 * t816;
+  real t821 = t227 - t48 * t273 - t293 * t816;
+  real t822 = t431 * t821;
+  real t828 = t345 - t48 * t391 - t410 * t816 - t432 * t821;
+  real t829 = t593 * t828;
+  real t837 = t484 - t48 * t530 - t549 * t816 - t570 * t821 - t594 * t828;
+  real t838 = t678 * t837;
+  real t840 = t829 - t594 * t838;
+  real t844 = t822 - t432 * t840 - t570 * t838;
+  real t850 = t817 - t293 * t844 - t410 * t840 - t549 * t838;
+  G[3] = t814 - t175 * t850 - t273 * t844 - t391 * t840 - t530 * t838;
+  real t859 = t61 * t174;
+  real t861 = t141 - t61 * t175;
+  real t862 = t292 * t861;
+  real t866 = t240 - t61 * t273 - t293 * t861;
+  real t867 = t431 * t866;
+  real t873 = t358 - t61 * t391 - t410 * t861 - t432 * t866;
+  real t874 = t593 * t873;
+  real t882 = t497 - t61 * t530 - t549 * t861 - t570 * t866 - t594 * t873;
+  real t883 = t678 * t882;
+  real t885 = t874 - t594 * t883;
+  real t889 = t867 - t432 * t885 - t570 * t883;
+  real t895 = t862 - t293 * t889 - t410 * t885 - t549 * t883;
+  G[4] = t859 - t175 * t895 - t273 * t889 - t391 * t885 - t530 * t883;
+  real t904 = t74 * t174;
+  real t906 = t154 - t74 * t175;
+  real t907 = t292 * t906;
+  real t911 = t253 - t74 * t273 - t293 * t906;
+  real t912 = t431 * t911;
+  real t918 = t371 - t74 * t391 - t410 * t906 - t432 * t911;
+  real t919 = t593 * t918;
+  real t927 = t510 - t74 * t530 - t549 * t906 - t570 * t911 - t594 * t918;
+  real t928 = t678 * t927;
+  real t930 = t919 - t594 * t928;
+  real t934 = t912 - t432 * t930 - t570 * t928;
+  real t940 = t907 - t293 * t934 - t410 * t930 - t549 * t928;
+  G[5] = t904 - t175 * t940 - t273 * t934 - t391 * t930 - t530 * t928;
+  G[6] = t715;
+  G[7] = t760;
+  G[8] = t805;
+  G[9] = t850;
+  G[10] = t895;
+  G[11] = t940;
+  G[12] = t709;
+  G[13] = t754;
+  G[14] = t799;
+  G[15] = t844;
+  G[16] = t889;
+  G[17] = t934;
+  G[18] = t705;
+  G[19] = t750;
+  G[20] = t795;
+  G[21] = t840;
+  G[22] = t885;
+  G[23] = t930;
+  G[24] = t703;
+  G[25] = t748;
+  G[26] = t793;
+  G[27] = t838;
+  G[28] = t883;
+  G[29] = t928;
+  real t958 = S[0] - (t10 * t679 + t681 * t682 + t686 * t687 + t693 * t694 + t702 * t703);
+  real t969 = S[1] - (t10 * t724 + t681 * t727 + t686 * t732 + t693 * t739 + t702 * t748);
+  real t981 = S[2] - (t10 * t769 + t681 * t772 + t686 * t777 + t693 * t784 + t702 * t793);
+  real t983 = Rc[0] * t958 + Rc[1] * t969 + Rc[2] * t981;
+  real t995 = S[6] - (t22 * t724 + t726 * t727 + t731 * t732 + t738 * t739 + t747 * t748);
+  real t1007 = S[7] - (t22 * t769 + t726 * t772 + t731 * t777 + t738 * t784 + t747 * t793);
+  real t1009 = Rc[0] * t969 + Rc[1] * t995 + Rc[2] * t1007;
+  real t1024 = S[11] - (t35 * t769 + t771 * t772 + t776 * t777 + t783 * t784 + t792 * t793);
+  real t1026 = Rc[0] * t981 + Rc[1] * t1007 + Rc[2] * t1024;
+  real t1028 = Rc[0] * t983 + Rc[1] * t1009 + Rc[2] * t1026;
+  S_I[0] += t1028;
+  real t1033 = Rc[3] * t983 + Rc[4] * t1009 + Rc[5] * t1026;
+  S_I[1] += t1033;
+  real t1038 = Rc[6] * t983 + Rc[7] * t1009 + Rc[8] * t1026;
+  S_I[2] += t1038;
+  real t1048 = S[3] - (t10 * t814 + t681 * t817 + t686 * t822 + t693 * t829 + t702 * t838);
+  real t1059 = S[8] - (t22 * t814 + t726 * t817 + t731 * t822 + t738 * t829 + t747 * t838);
+  real t1071 = S[12] - (t35 * t814 + t771 * t817 + t776 * t822 + t783 * t829 + t792 * t838);
+  real t1073 = Rc[0] * t1048 + Rc[1] * t1059 + Rc[2] * t1071;
+  real t1084 = S[4] - (t10 * t859 + t681 * t862 + t686 * t867 + t693 * t874 + t702 * t883);
+  real t1095 = S[9] - (t22 * t859 + t726 * t862 + t731 * t867 + t738 * t874 + t747 * t883);
+  real t1107 = S[13] - (t35 * t859 + t771 * t862 + t776 * t867 + t783 * t874 + t792 * t883);
+  real t1109 = Rc[0] * t1084 + Rc[1] * t1095 + Rc[2] * t1107;
+  real t1121 = S[5] - (t10 * t904 + t681 * t907 + t686 * t912 + t693 * t919 + t702 * t928);
+  real t1132 = S[10] - (t22 * t904 + t726 * t907 + t731 * t912 + t738 * t919 + t747 * t928);
+  real t1144 = S[14] - (t35 * t904 + t771 * t907 + t776 * t912 + t783 * t919 + t792 * t928);
+  real t1146 = Rc[0] * t1121 + Rc[1] * t1132 + Rc[2] * t1144;
+  real t1148 = Rc[0] * t1073 + Rc[1] * t1109 + Rc[2] * t1146;
+  real t1149 = r[1] * t1038;
+  real t1150 = r[2] * t1033;
+  S_I[3] += t1148 + (t1149 - t1150);
+  real t1157 = Rc[3] * t1073 + Rc[4] * t1109 + Rc[5] * t1146;
+  real t1161 = t1157 + (r[2] * t1028 - r[0] * t1038);
+  S_I[4] += t1161;
+  real t1166 = Rc[6] * t1073 + Rc[7] * t1109 + Rc[8] * t1146;
+  real t1170 = t1166 + (r[0] * t1033 - r[1] * t1028);
+  S_I[5] += t1170;
+  real t1175 = Rc[3] * t958 + Rc[4] * t969 + Rc[5] * t981;
+  real t1181 = Rc[3] * t969 + Rc[4] * t995 + Rc[5] * t1007;
+  real t1188 = Rc[3] * t981 + Rc[4] * t1007 + Rc[5] * t1024;
+  real t1190 = Rc[3] * t1175 + Rc[4] * t1181 + Rc[5] * t1188;
+  S_I[6] += t1190;
+  real t1195 = Rc[6] * t1175 + Rc[7] * t1181 + Rc[8] * t1188;
+  S_I[7] += t1195;
+  real t1200 = Rc[3] * t1048 + Rc[4] * t1059 + Rc[5] * t1071;
+  real t1206 = Rc[3] * t1084 + Rc[4] * t1095 + Rc[5] * t1107;
+  real t1213 = Rc[3] * t1121 + Rc[4] * t1132 + Rc[5] * t1144;
+  real t1215 = Rc[0] * t1200 + Rc[1] * t1206 + Rc[2] * t1213;
+  real t1219 = t1215 + (r[1] * t1195 - r[2] * t1190);
+  S_I[8] += t1219;
+  real t1224 = Rc[3] * t1200 + Rc[4] * t1206 + Rc[5] * t1213;
+  real t1225 = r[0] * t1195;
+  real t1227 = t1224 + (t1150 - t1225);
+  S_I[9] += t1227;
+  real t1232 = Rc[6] * t1200 + Rc[7] * t1206 + Rc[8] * t1213;
+  real t1236 = t1232 + (r[0] * t1190 - r[1] * t1033);
+  S_I[10] += t1236;
+  real t1256 = Rc[6] * (Rc[6] * t958 + Rc[7] * t969 + Rc[8] * t981) + Rc[7] * (Rc[6] * t969 + Rc[7]
+    * t995 + Rc[8] * t1007) + Rc[8] * (Rc[6] * t981 + Rc[7] * t1007 + Rc[8] * t1024);
+  S_I[11] += t1256;
+  real t1261 = Rc[6] * t1048 + Rc[7] * t1059 + Rc[8] * t1071;
+  real t1267 = Rc[6] * t1084 + Rc[7] * t1095 + Rc[8] * t1107;
+  real t1274 = Rc[6] * t1121 + Rc[7] * t1132 + Rc[8] * t1144;
+  real t1276 = Rc[0] * t1261 + Rc[1] * t1267 + Rc[2] * t1274;
+  real t1280 = t1276 + (r[1] * t1256 - r[2] * t1195);
+  S_I[12] += t1280;
+  real t1285 = Rc[3] * t1261 + Rc[4] * t1267 + Rc[5] * t1274;
+  real t1289 = t1285 + (r[2] * t1038 - r[0] * t1256);
+  S_I[13] += t1289;
+  real t1296 = Rc[6] * t1261 + Rc[7] * t1267 + Rc[8] * t1274 + (t1225 - t1149);
+  S_I[14] += t1296;
+  real t1306 = S[15] - (t48 * t814 + t816 * t817 + t821 * t822 + t828 * t829 + t837 * t838);
+  real t1317 = S[16] - (t48 * t859 + t816 * t862 + t821 * t867 + t828 * t874 + t837 * t883);
+  real t1329 = S[17] - (t48 * t904 + t816 * t907 + t821 * t912 + t828 * t919 + t837 * t928);
+  real t1331 = Rc[0] * t1306 + Rc[1] * t1317 + Rc[2] * t1329;
+  real t1343 = S[18] - (t61 * t859 + t861 * t862 + t866 * t867 + t873 * t874 + t882 * t883);
+  real t1355 = S[19] - (t61 * t904 + t861 * t907 + t866 * t912 + t873 * t919 + t882 * t928);
+  real t1357 = Rc[0] * t1317 + Rc[1] * t1343 + Rc[2] * t1355;
+  real t1372 = S[20] - (t74 * t904 + t906 * t907 + t911 * t912 + t918 * t919 + t927 * t928);
+  real t1374 = Rc[0] * t1329 + Rc[1] * t1355 + Rc[2] * t1372;
+  S_I[15] += Rc[0] * t1331 + Rc[1] * t1357 + Rc[2] * t1374 + (r[1] * t1280 - r[2] * t1219 + (r[1] *
+    t1276 - r[2] * t1215));
+  S_I[16] += Rc[3] * t1331 + Rc[4] * t1357 + Rc[5] * t1374 + (r[1] * t1289 - r[2] * t1227 + (r[2] *
+    t1148 - r[0] * t1276));
+  S_I[17] += Rc[6] * t1331 + Rc[7] * t1357 + Rc[8] * t1374 + (r[1] * t1296 - r[2] * t1236 + (r[0] *
+    t1215 - r[1] * t1148));
+  real t1415 = Rc[3] * t1306 + Rc[4] * t1317 + Rc[5] * t1329;
+  real t1421 = Rc[3] * t1317 + Rc[4] * t1343 + Rc[5] * t1355;
+  real t1428 = Rc[3] * t1329 + Rc[4] * t1355 + Rc[5] * t1372;
+  S_I[18] += Rc[3] * t1415 + Rc[4] * t1421 + Rc[5] * t1428 + (r[2] * t1161 - r[0] * t1289 + (r[2] *
+    t1157 - r[0] * t1285));
+  S_I[19] += Rc[6] * t1415 + Rc[7] * t1421 + Rc[8] * t1428 + (r[2] * t1170 - r[0] * t1296 + (r[0] *
+    t1224 - r[1] * t1157));
+  S_I[20] += Rc[6] * (Rc[6] * t1306 + Rc[7] * t1317 + Rc[8] * t1329) + Rc[7] * (Rc[6] * t1317 +
+    Rc[7] * t1343 + Rc[8] * t1355) + Rc[8] * (Rc[6] * t1329 + Rc[7] * t1355 + Rc[8] * t1372) + (r[0]
+    * t1236 - r[1] * t1170 + (r[0] * t1232 - r[1] * t1166));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"J", 5, "kg*m2 or kg", 0, 0},
-    {"W", 25, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_factor_outputs[] = {
-    {"F", 25, "", 0, 0},
-    {"G", 30, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic5_factor_guards[] = {
-    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 5 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic5_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with 5 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the free coordinates
@@ -4625,242 +981,46 @@ static const mstmm_guard mstmm_sweep_generic5_factor_guards[] = {
  * out y[5] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic5_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[5] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[6] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[11] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[16] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[21] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[26] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[7] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[12] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[17] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[22] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[27] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = H[3] * e[0];
-    const real t37 = H[8] * e[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[13] * e[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[18] * e[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[23] * e[4];
-    const real t44 = t42 + t43;
-    const real t45 = H[28] * e[5];
-    const real t46 = t44 + t45;
-    const real t47 = tau[3] - t46;
-    y[3] = t47;
-    const real t48 = H[4] * e[0];
-    const real t49 = H[9] * e[1];
-    const real t50 = t48 + t49;
-    const real t51 = H[14] * e[2];
-    const real t52 = t50 + t51;
-    const real t53 = H[19] * e[3];
-    const real t54 = t52 + t53;
-    const real t55 = H[24] * e[4];
-    const real t56 = t54 + t55;
-    const real t57 = H[29] * e[5];
-    const real t58 = t56 + t57;
-    const real t59 = tau[4] - t58;
-    y[4] = t59;
-    const real t60 = G[0] * t11;
-    const real t61 = G[6] * t23;
-    const real t62 = t60 + t61;
-    const real t63 = G[12] * t35;
-    const real t64 = t62 + t63;
-    const real t65 = G[18] * t47;
-    const real t66 = t64 + t65;
-    const real t67 = G[24] * t59;
-    const real t68 = t66 + t67;
-    const real t69 = e[0] + t68;
-    const real t70 = Rc[0] * t69;
-    const real t71 = G[1] * t11;
-    const real t72 = G[7] * t23;
-    const real t73 = t71 + t72;
-    const real t74 = G[13] * t35;
-    const real t75 = t73 + t74;
-    const real t76 = G[19] * t47;
-    const real t77 = t75 + t76;
-    const real t78 = G[25] * t59;
-    const real t79 = t77 + t78;
-    const real t80 = e[1] + t79;
-    const real t81 = Rc[1] * t80;
-    const real t82 = t70 + t81;
-    const real t83 = G[2] * t11;
-    const real t84 = G[8] * t23;
-    const real t85 = t83 + t84;
-    const real t86 = G[14] * t35;
-    const real t87 = t85 + t86;
-    const real t88 = G[20] * t47;
-    const real t89 = t87 + t88;
-    const real t90 = G[26] * t59;
-    const real t91 = t89 + t90;
-    const real t92 = e[2] + t91;
-    const real t93 = Rc[2] * t92;
-    const real t94 = t82 + t93;
-    e_I[0] += t94;
-    const real t95 = Rc[3] * t69;
-    const real t96 = Rc[4] * t80;
-    const real t97 = t95 + t96;
-    const real t98 = Rc[5] * t92;
-    const real t99 = t97 + t98;
-    e_I[1] += t99;
-    const real t100 = Rc[6] * t69;
-    const real t101 = Rc[7] * t80;
-    const real t102 = t100 + t101;
-    const real t103 = Rc[8] * t92;
-    const real t104 = t102 + t103;
-    e_I[2] += t104;
-    const real t105 = G[3] * t11;
-    const real t106 = G[9] * t23;
-    const real t107 = t105 + t106;
-    const real t108 = G[15] * t35;
-    const real t109 = t107 + t108;
-    const real t110 = G[21] * t47;
-    const real t111 = t109 + t110;
-    const real t112 = G[27] * t59;
-    const real t113 = t111 + t112;
-    const real t114 = e[3] + t113;
-    const real t115 = Rc[0] * t114;
-    const real t116 = G[4] * t11;
-    const real t117 = G[10] * t23;
-    const real t118 = t116 + t117;
-    const real t119 = G[16] * t35;
-    const real t120 = t118 + t119;
-    const real t121 = G[22] * t47;
-    const real t122 = t120 + t121;
-    const real t123 = G[28] * t59;
-    const real t124 = t122 + t123;
-    const real t125 = e[4] + t124;
-    const real t126 = Rc[1] * t125;
-    const real t127 = t115 + t126;
-    const real t128 = G[5] * t11;
-    const real t129 = G[11] * t23;
-    const real t130 = t128 + t129;
-    const real t131 = G[17] * t35;
-    const real t132 = t130 + t131;
-    const real t133 = G[23] * t47;
-    const real t134 = t132 + t133;
-    const real t135 = G[29] * t59;
-    const real t136 = t134 + t135;
-    const real t137 = e[5] + t136;
-    const real t138 = Rc[2] * t137;
-    const real t139 = t127 + t138;
-    const real t140 = Rc[6] * r[1];
-    const real t141 = Rc[3] * r[2];
-    const real t142 = t140 - t141;
-    const real t143 = t69 * t142;
-    const real t144 = Rc[7] * r[1];
-    const real t145 = Rc[4] * r[2];
-    const real t146 = t144 - t145;
-    const real t147 = t80 * t146;
-    const real t148 = t143 + t147;
-    const real t149 = Rc[8] * r[1];
-    const real t150 = Rc[5] * r[2];
-    const real t151 = t149 - t150;
-    const real t152 = t92 * t151;
-    const real t153 = t148 + t152;
-    const real t154 = t139 + t153;
-    e_I[3] += t154;
-    const real t155 = Rc[3] * t114;
-    const real t156 = Rc[4] * t125;
-    const real t157 = t155 + t156;
-    const real t158 = Rc[5] * t137;
-    const real t159 = t157 + t158;
-    const real t160 = Rc[0] * r[2];
-    const real t161 = Rc[6] * r[0];
-    const real t162 = t160 - t161;
-    const real t163 = t69 * t162;
-    const real t164 = Rc[1] * r[2];
-    const real t165 = Rc[7] * r[0];
-    const real t166 = t164 - t165;
-    const real t167 = t80 * t166;
-    const real t168 = t163 + t167;
-    const real t169 = Rc[2] * r[2];
-    const real t170 = Rc[8] * r[0];
-    const real t171 = t169 - t170;
-    const real t172 = t92 * t171;
-    const real t173 = t168 + t172;
-    const real t174 = t159 + t173;
-    e_I[4] += t174;
-    const real t175 = Rc[6] * t114;
-    const real t176 = Rc[7] * t125;
-    const real t177 = t175 + t176;
-    const real t178 = Rc[8] * t137;
-    const real t179 = t177 + t178;
-    const real t180 = Rc[3] * r[0];
-    const real t181 = Rc[0] * r[1];
-    const real t182 = t180 - t181;
-    const real t183 = t69 * t182;
-    const real t184 = Rc[4] * r[0];
-    const real t185 = Rc[1] * r[1];
-    const real t186 = t184 - t185;
-    const real t187 = t80 * t186;
-    const real t188 = t183 + t187;
-    const real t189 = Rc[5] * r[0];
-    const real t190 = Rc[2] * r[1];
-    const real t191 = t189 - t190;
-    const real t192 = t92 * t191;
-    const real t193 = t188 + t192;
-    const real t194 = t179 + t193;
-    e_I[5] += t194;
-    return 0;
+  real t11 = tau[0] - (H[0] * e[0] + H[5] * e[1] + H[10] * e[2] + H[15] * e[3] + H[20] * e[4] +
+    H[25] * e[5]);
+  y[0] = t11;
+  real t23 = tau[1] - (H[1] * e[0] + H[6] * e[1] + H[11] * e[2] + H[16] * e[3] + H[21] * e[4] +
+    H[26] * e[5]);
+  y[1] = t23;
+  real t35 = tau[2] - (H[2] * e[0] + H[7] * e[1] + H[12] * e[2] + H[17] * e[3] + H[22] * e[4] +
+    H[27] * e[5]);
+  y[2] = t35;
+  real t47 = tau[3] - (H[3] * e[0] + H[8] * e[1] + H[13] * e[2] + H[18] * e[3] + H[23] * e[4] +
+    H[28] * e[5]);
+  y[3] = t47;
+  real t59 = tau[4] - (H[4] * e[0] + H[9] * e[1] + H[14] * e[2] + H[19] * e[3] + H[24] * e[4] +
+    H[29] * e[5]);
+  y[4] = t59;
+  real t69 = e[0] + (G[0] * t11 + G[6] * t23 + G[12] * t35 + G[18] * t47 + G[24] * t59);
+  real t80 = e[1] + (G[1] * t11 + G[7] * t23 + G[13] * t35 + G[19] * t47 + G[25] * t59);
+  real t92 = e[2] + (G[2] * t11 + G[8] * t23 + G[14] * t35 + G[20] * t47 + G[26] * t59);
+  e_I[0] += Rc[0] * t69 + Rc[1] * t80 + Rc[2] * t92;
+  e_I[1] += Rc[3] * t69 + Rc[4] * t80 + Rc[5] * t92;
+  e_I[2] += Rc[6] * t69 + Rc[7] * t80 + Rc[8] * t92;
+  real t114 = e[3] + (G[3] * t11 + G[9] * t23 + G[15] * t35 + G[21] * t47 + G[27] * t59);
+  real t125 = e[4] + (G[4] * t11 + G[10] * t23 + G[16] * t35 + G[22] * t47 + G[28] * t59);
+  real t137 = e[5] + (G[5] * t11 + G[11] * t23 + G[17] * t35 + G[23] * t47 + G[29] * t59);
+  e_I[3] += Rc[0] * t114 + Rc[1] * t125 + Rc[2] * t137 + (t69 * (Rc[6] * r[1] - Rc[3] * r[2]) + t80
+    * (Rc[7] * r[1] - Rc[4] * r[2]) + t92 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t114 + Rc[4] * t125 + Rc[5] * t137 + (t69 * (Rc[0] * r[2] - Rc[6] * r[0]) + t80
+    * (Rc[1] * r[2] - Rc[7] * r[0]) + t92 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t114 + Rc[7] * t125 + Rc[8] * t137 + (t69 * (Rc[3] * r[0] - Rc[0] * r[1]) + t80
+    * (Rc[4] * r[0] - Rc[1] * r[1]) + t92 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"G", 30, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 5, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_column_load_outputs[] = {
-    {"y", 5, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 5 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][5] motion subspace of the free coordinates
@@ -4871,255 +1031,52 @@ static const mstmm_port mstmm_sweep_generic5_column_load_outputs[] = {
  * out udot[5] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic5_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic5_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[5] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[6] * t2;
-    const real t4 = F[10] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[11] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[12] * t7;
-    const real t9 = F[15] * y[0];
-    const real t10 = y[3] - t9;
-    const real t11 = F[16] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = F[17] * t7;
-    const real t14 = t12 - t13;
-    const real t15 = F[18] * t14;
-    const real t16 = F[20] * y[0];
-    const real t17 = y[4] - t16;
-    const real t18 = F[21] * t2;
-    const real t19 = t17 - t18;
-    const real t20 = F[22] * t7;
-    const real t21 = t19 - t20;
-    const real t22 = F[23] * t14;
-    const real t23 = t21 - t22;
-    const real t24 = F[24] * t23;
-    const real t25 = F[23] * t24;
-    const real t26 = t15 - t25;
-    const real t27 = F[17] * t26;
-    const real t28 = t8 - t27;
-    const real t29 = F[22] * t24;
-    const real t30 = t28 - t29;
-    const real t31 = F[11] * t30;
-    const real t32 = t3 - t31;
-    const real t33 = F[16] * t26;
-    const real t34 = t32 - t33;
-    const real t35 = F[21] * t24;
-    const real t36 = t34 - t35;
-    const real t37 = F[5] * t36;
-    const real t38 = t0 - t37;
-    const real t39 = F[10] * t30;
-    const real t40 = t38 - t39;
-    const real t41 = F[15] * t26;
-    const real t42 = t40 - t41;
-    const real t43 = F[20] * t24;
-    const real t44 = t42 - t43;
-    const real t45 = r[2] * delta_I[4];
-    const real t46 = r[1] * delta_I[5];
-    const real t47 = t45 - t46;
-    const real t48 = delta_I[0] + t47;
-    const real t49 = Rc[0] * t48;
-    const real t50 = r[0] * delta_I[5];
-    const real t51 = r[2] * delta_I[3];
-    const real t52 = t50 - t51;
-    const real t53 = delta_I[1] + t52;
-    const real t54 = Rc[3] * t53;
-    const real t55 = t49 + t54;
-    const real t56 = r[1] * delta_I[3];
-    const real t57 = r[0] * delta_I[4];
-    const real t58 = t56 - t57;
-    const real t59 = delta_I[2] + t58;
-    const real t60 = Rc[6] * t59;
-    const real t61 = t55 + t60;
-    const real t62 = G[0] * t61;
-    const real t63 = Rc[1] * t48;
-    const real t64 = Rc[4] * t53;
-    const real t65 = t63 + t64;
-    const real t66 = Rc[7] * t59;
-    const real t67 = t65 + t66;
-    const real t68 = G[1] * t67;
-    const real t69 = t62 + t68;
-    const real t70 = Rc[2] * t48;
-    const real t71 = Rc[5] * t53;
-    const real t72 = t70 + t71;
-    const real t73 = Rc[8] * t59;
-    const real t74 = t72 + t73;
-    const real t75 = G[2] * t74;
-    const real t76 = t69 + t75;
-    const real t77 = Rc[0] * delta_I[3];
-    const real t78 = Rc[3] * delta_I[4];
-    const real t79 = t77 + t78;
-    const real t80 = Rc[6] * delta_I[5];
-    const real t81 = t79 + t80;
-    const real t82 = G[3] * t81;
-    const real t83 = t76 + t82;
-    const real t84 = Rc[1] * delta_I[3];
-    const real t85 = Rc[4] * delta_I[4];
-    const real t86 = t84 + t85;
-    const real t87 = Rc[7] * delta_I[5];
-    const real t88 = t86 + t87;
-    const real t89 = G[4] * t88;
-    const real t90 = t83 + t89;
-    const real t91 = Rc[2] * delta_I[3];
-    const real t92 = Rc[5] * delta_I[4];
-    const real t93 = t91 + t92;
-    const real t94 = Rc[8] * delta_I[5];
-    const real t95 = t93 + t94;
-    const real t96 = G[5] * t95;
-    const real t97 = t90 + t96;
-    const real t98 = t44 - t97;
-    udot[0] = t98;
-    const real t99 = G[6] * t61;
-    const real t100 = G[7] * t67;
-    const real t101 = t99 + t100;
-    const real t102 = G[8] * t74;
-    const real t103 = t101 + t102;
-    const real t104 = G[9] * t81;
-    const real t105 = t103 + t104;
-    const real t106 = G[10] * t88;
-    const real t107 = t105 + t106;
-    const real t108 = G[11] * t95;
-    const real t109 = t107 + t108;
-    const real t110 = t36 - t109;
-    udot[1] = t110;
-    const real t111 = G[12] * t61;
-    const real t112 = G[13] * t67;
-    const real t113 = t111 + t112;
-    const real t114 = G[14] * t74;
-    const real t115 = t113 + t114;
-    const real t116 = G[15] * t81;
-    const real t117 = t115 + t116;
-    const real t118 = G[16] * t88;
-    const real t119 = t117 + t118;
-    const real t120 = G[17] * t95;
-    const real t121 = t119 + t120;
-    const real t122 = t30 - t121;
-    udot[2] = t122;
-    const real t123 = G[18] * t61;
-    const real t124 = G[19] * t67;
-    const real t125 = t123 + t124;
-    const real t126 = G[20] * t74;
-    const real t127 = t125 + t126;
-    const real t128 = G[21] * t81;
-    const real t129 = t127 + t128;
-    const real t130 = G[22] * t88;
-    const real t131 = t129 + t130;
-    const real t132 = G[23] * t95;
-    const real t133 = t131 + t132;
-    const real t134 = t26 - t133;
-    udot[3] = t134;
-    const real t135 = G[24] * t61;
-    const real t136 = G[25] * t67;
-    const real t137 = t135 + t136;
-    const real t138 = G[26] * t74;
-    const real t139 = t137 + t138;
-    const real t140 = G[27] * t81;
-    const real t141 = t139 + t140;
-    const real t142 = G[28] * t88;
-    const real t143 = t141 + t142;
-    const real t144 = G[29] * t95;
-    const real t145 = t143 + t144;
-    const real t146 = t24 - t145;
-    udot[4] = t146;
-    const real t147 = H[0] * t98;
-    const real t148 = H[1] * t110;
-    const real t149 = t147 + t148;
-    const real t150 = H[2] * t122;
-    const real t151 = t149 + t150;
-    const real t152 = H[3] * t134;
-    const real t153 = t151 + t152;
-    const real t154 = H[4] * t146;
-    const real t155 = t153 + t154;
-    const real t156 = t61 + t155;
-    delta[0] = t156;
-    const real t157 = H[5] * t98;
-    const real t158 = H[6] * t110;
-    const real t159 = t157 + t158;
-    const real t160 = H[7] * t122;
-    const real t161 = t159 + t160;
-    const real t162 = H[8] * t134;
-    const real t163 = t161 + t162;
-    const real t164 = H[9] * t146;
-    const real t165 = t163 + t164;
-    const real t166 = t67 + t165;
-    delta[1] = t166;
-    const real t167 = H[10] * t98;
-    const real t168 = H[11] * t110;
-    const real t169 = t167 + t168;
-    const real t170 = H[12] * t122;
-    const real t171 = t169 + t170;
-    const real t172 = H[13] * t134;
-    const real t173 = t171 + t172;
-    const real t174 = H[14] * t146;
-    const real t175 = t173 + t174;
-    const real t176 = t74 + t175;
-    delta[2] = t176;
-    const real t177 = H[15] * t98;
-    const real t178 = H[16] * t110;
-    const real t179 = t177 + t178;
-    const real t180 = H[17] * t122;
-    const real t181 = t179 + t180;
-    const real t182 = H[18] * t134;
-    const real t183 = t181 + t182;
-    const real t184 = H[19] * t146;
-    const real t185 = t183 + t184;
-    const real t186 = t81 + t185;
-    delta[3] = t186;
-    const real t187 = H[20] * t98;
-    const real t188 = H[21] * t110;
-    const real t189 = t187 + t188;
-    const real t190 = H[22] * t122;
-    const real t191 = t189 + t190;
-    const real t192 = H[23] * t134;
-    const real t193 = t191 + t192;
-    const real t194 = H[24] * t146;
-    const real t195 = t193 + t194;
-    const real t196 = t88 + t195;
-    delta[4] = t196;
-    const real t197 = H[25] * t98;
-    const real t198 = H[26] * t110;
-    const real t199 = t197 + t198;
-    const real t200 = H[27] * t122;
-    const real t201 = t199 + t200;
-    const real t202 = H[28] * t134;
-    const real t203 = t201 + t202;
-    const real t204 = H[29] * t146;
-    const real t205 = t203 + t204;
-    const real t206 = t95 + t205;
-    delta[5] = t206;
-    return 0;
+  real t2 = y[1] - F[5] * y[0];
+  real t7 = y[2] - F[10] * y[0] - F[11] * t2;
+  real t14 = y[3] - F[15] * y[0] - F[16] * t2 - F[17] * t7;
+  real t24 = F[24] * (y[4] - F[20] * y[0] - F[21] * t2 - F[22] * t7 - F[23] * t14);
+  real t26 = F[18] * t14 - F[23] * t24;
+  real t30 = F[12] * t7 - F[17] * t26 - F[22] * t24;
+  real t36 = F[6] * t2 - F[11] * t30 - F[16] * t26 - F[21] * t24;
+  real t48 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t53 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t59 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t61 = Rc[0] * t48 + Rc[3] * t53 + Rc[6] * t59;
+  real t67 = Rc[1] * t48 + Rc[4] * t53 + Rc[7] * t59;
+  real t74 = Rc[2] * t48 + Rc[5] * t53 + Rc[8] * t59;
+  real t81 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t88 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t95 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t98 = F[0] * y[0] - F[5] * t36 - F[10] * t30 - F[15] * t26 - F[20] * t24 - (G[0] * t61 + G[1]
+    * t67 + G[2] * t74 + G[3] * t81 + G[4] * t88 + G[5] * t95);
+  udot[0] = t98;
+  real t110 = t36 - (G[6] * t61 + G[7] * t67 + G[8] * t74 + G[9] * t81 + G[10] * t88 + G[11] * t95);
+  udot[1] = t110;
+  real t122 = t30 - (G[12] * t61 + G[13] * t67 + G[14] * t74 + G[15] * t81 + G[16] * t88 + G[17] *
+    t95);
+  udot[2] = t122;
+  real t134 = t26 - (G[18] * t61 + G[19] * t67 + G[20] * t74 + G[21] * t81 + G[22] * t88 + G[23] *
+    t95);
+  udot[3] = t134;
+  real t146 = t24 - (G[24] * t61 + G[25] * t67 + G[26] * t74 + G[27] * t81 + G[28] * t88 + G[29] *
+    t95);
+  udot[4] = t146;
+  delta[0] = t61 + (H[0] * t98 + H[1] * t110 + H[2] * t122 + H[3] * t134 + H[4] * t146);
+  delta[1] = t67 + (H[5] * t98 + H[6] * t110 + H[7] * t122 + H[8] * t134 + H[9] * t146);
+  delta[2] = t74 + (H[10] * t98 + H[11] * t110 + H[12] * t122 + H[13] * t134 + H[14] * t146);
+  delta[3] = t81 + (H[15] * t98 + H[16] * t110 + H[17] * t122 + H[18] * t134 + H[19] * t146);
+  delta[4] = t88 + (H[20] * t98 + H[21] * t110 + H[22] * t122 + H[23] * t134 + H[24] * t146);
+  delta[5] = t95 + (H[25] * t98 + H[26] * t110 + H[27] * t122 + H[28] * t134 + H[29] * t146);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"F", 25, "", 0, 0},
-    {"G", 30, "", 0, 0},
-    {"y", 5, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_column_acceleration_outputs[] = {
-    {"udot", 5, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with 5 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6][5] motion subspace of the free coordinates
@@ -5135,2272 +1092,783 @@ static const mstmm_port mstmm_sweep_generic5_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic5_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic5_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    const real t0 = H[10] * H[10];
-    const real t1 = H[0] * H[0];
-    const real t2 = H[5] * H[5];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 0.0 < floor_[0];
-    const real t6 = U[11] * U[11];
-    const real t7 = U[7] * U[7];
-    const real t8 = U[6] * U[6];
-    const real t9 = U[2] * U[2];
-    const real t10 = U[0] * U[0];
-    const real t11 = U[1] * U[1];
-    const real t12 = t10 + t11;
-    const real t13 = t9 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = t7 + t14;
-    const real t16 = t6 + t15;
-    const real t17 = ((real)1 / (real)300000000000000) * t16;
-    const real t18 = t5 != 0 ? floor_[0] : t17;
-    const real t19 = t4 * t18;
-    const real t20 = H[25] * H[25];
-    const real t21 = H[15] * H[15];
-    const real t22 = H[20] * H[20];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    const real t25 = 0.0 < floor_[1];
-    const real t26 = U[20] * U[20];
-    const real t27 = U[19] * U[19];
-    const real t28 = U[18] * U[18];
-    const real t29 = U[17] * U[17];
-    const real t30 = U[16] * U[16];
-    const real t31 = U[15] * U[15];
-    const real t32 = U[14] * U[14];
-    const real t33 = U[13] * U[13];
-    const real t34 = U[12] * U[12];
-    const real t35 = U[10] * U[10];
-    const real t36 = U[9] * U[9];
-    const real t37 = U[8] * U[8];
-    const real t38 = U[5] * U[5];
-    const real t39 = U[3] * U[3];
-    const real t40 = U[4] * U[4];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = t36 + t43;
-    const real t45 = t35 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = t33 + t46;
-    const real t48 = t32 + t47;
-    const real t49 = t31 + t48;
-    const real t50 = t30 + t49;
-    const real t51 = t29 + t50;
-    const real t52 = t28 + t51;
-    const real t53 = t27 + t52;
-    const real t54 = t26 + t53;
-    const real t55 = ((real)1 / (real)300000000000000) * t54;
-    const real t56 = t25 != 0 ? floor_[1] : t55;
-    const real t57 = t24 * t56;
-    const real t58 = t19 + t57;
-    const real t59 = H[25] * U[20];
-    const real t60 = t59 * t59;
-    const real t61 = H[20] * U[18];
-    const real t62 = H[25] * U[19];
-    const real t63 = t61 + t62;
-    const real t64 = t63 * t63;
-    const real t65 = H[15] * U[15];
-    const real t66 = H[20] * U[16];
-    const real t67 = t65 + t66;
-    const real t68 = H[25] * U[17];
-    const real t69 = t67 + t68;
-    const real t70 = t69 * t69;
-    const real t71 = H[10] * U[11];
-    const real t72 = H[15] * U[12];
-    const real t73 = t71 + t72;
-    const real t74 = H[20] * U[13];
-    const real t75 = t73 + t74;
-    const real t76 = H[25] * U[14];
-    const real t77 = t75 + t76;
-    const real t78 = t77 * t77;
-    const real t79 = H[5] * U[6];
-    const real t80 = H[10] * U[7];
-    const real t81 = t79 + t80;
-    const real t82 = H[15] * U[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[20] * U[9];
-    const real t85 = t83 + t84;
-    const real t86 = H[25] * U[10];
-    const real t87 = t85 + t86;
-    const real t88 = t87 * t87;
-    const real t89 = H[0] * U[0];
-    const real t90 = H[5] * U[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[10] * U[2];
-    const real t93 = t91 + t92;
-    const real t94 = H[15] * U[3];
-    const real t95 = t93 + t94;
-    const real t96 = H[20] * U[4];
-    const real t97 = t95 + t96;
-    const real t98 = H[25] * U[5];
-    const real t99 = t97 + t98;
-    const real t100 = t99 * t99;
-    const real t101 = J[0] + t100;
-    const real t102 = t88 + t101;
-    const real t103 = t78 + t102;
-    const real t104 = t70 + t103;
-    const real t105 = t64 + t104;
-    const real t106 = t60 + t105;
-    const real t107 = t58 < t106;
-    if (!(t107 != 0)) return 1; /* speed 1 of 5 moves no inertia: its acceleration is undetermined */
-    const real t108 = H[11] * H[11];
-    const real t109 = H[1] * H[1];
-    const real t110 = H[6] * H[6];
-    const real t111 = t109 + t110;
-    const real t112 = t108 + t111;
-    const real t113 = t18 * t112;
-    const real t114 = H[26] * H[26];
-    const real t115 = H[16] * H[16];
-    const real t116 = H[21] * H[21];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    const real t119 = t56 * t118;
-    const real t120 = t113 + t119;
-    const real t121 = H[26] * U[20];
-    const real t122 = t121 * t121;
-    const real t123 = H[21] * U[18];
-    const real t124 = H[26] * U[19];
-    const real t125 = t123 + t124;
-    const real t126 = t125 * t125;
-    const real t127 = H[16] * U[15];
-    const real t128 = H[21] * U[16];
-    const real t129 = t127 + t128;
-    const real t130 = H[26] * U[17];
-    const real t131 = t129 + t130;
-    const real t132 = t131 * t131;
-    const real t133 = H[11] * U[11];
-    const real t134 = H[16] * U[12];
-    const real t135 = t133 + t134;
-    const real t136 = H[21] * U[13];
-    const real t137 = t135 + t136;
-    const real t138 = H[26] * U[14];
-    const real t139 = t137 + t138;
-    const real t140 = t139 * t139;
-    const real t141 = H[6] * U[6];
-    const real t142 = H[11] * U[7];
-    const real t143 = t141 + t142;
-    const real t144 = H[16] * U[8];
-    const real t145 = t143 + t144;
-    const real t146 = H[21] * U[9];
-    const real t147 = t145 + t146;
-    const real t148 = H[26] * U[10];
-    const real t149 = t147 + t148;
-    const real t150 = t149 * t149;
-    const real t151 = H[1] * U[0];
-    const real t152 = H[6] * U[1];
-    const real t153 = t151 + t152;
-    const real t154 = H[11] * U[2];
-    const real t155 = t153 + t154;
-    const real t156 = H[16] * U[3];
-    const real t157 = t155 + t156;
-    const real t158 = H[21] * U[4];
-    const real t159 = t157 + t158;
-    const real t160 = H[26] * U[5];
-    const real t161 = t159 + t160;
-    const real t162 = t161 * t161;
-    const real t163 = J[1] + t162;
-    const real t164 = t150 + t163;
-    const real t165 = t140 + t164;
-    const real t166 = t132 + t165;
-    const real t167 = t126 + t166;
-    const real t168 = t122 + t167;
-    const real t169 = t120 < t168;
-    if (!(t169 != 0)) return 1; /* speed 2 of 5 moves no inertia: its acceleration is undetermined */
-    const real t170 = H[12] * H[12];
-    const real t171 = H[2] * H[2];
-    const real t172 = H[7] * H[7];
-    const real t173 = t171 + t172;
-    const real t174 = t170 + t173;
-    const real t175 = t18 * t174;
-    const real t176 = H[27] * H[27];
-    const real t177 = H[17] * H[17];
-    const real t178 = H[22] * H[22];
-    const real t179 = t177 + t178;
-    const real t180 = t176 + t179;
-    const real t181 = t56 * t180;
-    const real t182 = t175 + t181;
-    const real t183 = H[27] * U[20];
-    const real t184 = t183 * t183;
-    const real t185 = H[22] * U[18];
-    const real t186 = H[27] * U[19];
-    const real t187 = t185 + t186;
-    const real t188 = t187 * t187;
-    const real t189 = H[17] * U[15];
-    const real t190 = H[22] * U[16];
-    const real t191 = t189 + t190;
-    const real t192 = H[27] * U[17];
-    const real t193 = t191 + t192;
-    const real t194 = t193 * t193;
-    const real t195 = H[12] * U[11];
-    const real t196 = H[17] * U[12];
-    const real t197 = t195 + t196;
-    const real t198 = H[22] * U[13];
-    const real t199 = t197 + t198;
-    const real t200 = H[27] * U[14];
-    const real t201 = t199 + t200;
-    const real t202 = t201 * t201;
-    const real t203 = H[7] * U[6];
-    const real t204 = H[12] * U[7];
-    const real t205 = t203 + t204;
-    const real t206 = H[17] * U[8];
-    const real t207 = t205 + t206;
-    const real t208 = H[22] * U[9];
-    const real t209 = t207 + t208;
-    const real t210 = H[27] * U[10];
-    const real t211 = t209 + t210;
-    const real t212 = t211 * t211;
-    const real t213 = H[2] * U[0];
-    const real t214 = H[7] * U[1];
-    const real t215 = t213 + t214;
-    const real t216 = H[12] * U[2];
-    const real t217 = t215 + t216;
-    const real t218 = H[17] * U[3];
-    const real t219 = t217 + t218;
-    const real t220 = H[22] * U[4];
-    const real t221 = t219 + t220;
-    const real t222 = H[27] * U[5];
-    const real t223 = t221 + t222;
-    const real t224 = t223 * t223;
-    const real t225 = J[2] + t224;
-    const real t226 = t212 + t225;
-    const real t227 = t202 + t226;
-    const real t228 = t194 + t227;
-    const real t229 = t188 + t228;
-    const real t230 = t184 + t229;
-    const real t231 = t182 < t230;
-    if (!(t231 != 0)) return 1; /* speed 3 of 5 moves no inertia: its acceleration is undetermined */
-    const real t232 = H[13] * H[13];
-    const real t233 = H[3] * H[3];
-    const real t234 = H[8] * H[8];
-    const real t235 = t233 + t234;
-    const real t236 = t232 + t235;
-    const real t237 = t18 * t236;
-    const real t238 = H[28] * H[28];
-    const real t239 = H[18] * H[18];
-    const real t240 = H[23] * H[23];
-    const real t241 = t239 + t240;
-    const real t242 = t238 + t241;
-    const real t243 = t56 * t242;
-    const real t244 = t237 + t243;
-    const real t245 = H[28] * U[20];
-    const real t246 = t245 * t245;
-    const real t247 = H[23] * U[18];
-    const real t248 = H[28] * U[19];
-    const real t249 = t247 + t248;
-    const real t250 = t249 * t249;
-    const real t251 = H[18] * U[15];
-    const real t252 = H[23] * U[16];
-    const real t253 = t251 + t252;
-    const real t254 = H[28] * U[17];
-    const real t255 = t253 + t254;
-    const real t256 = t255 * t255;
-    const real t257 = H[13] * U[11];
-    const real t258 = H[18] * U[12];
-    const real t259 = t257 + t258;
-    const real t260 = H[23] * U[13];
-    const real t261 = t259 + t260;
-    const real t262 = H[28] * U[14];
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t263;
-    const real t265 = H[8] * U[6];
-    const real t266 = H[13] * U[7];
-    const real t267 = t265 + t266;
-    const real t268 = H[18] * U[8];
-    const real t269 = t267 + t268;
-    const real t270 = H[23] * U[9];
-    const real t271 = t269 + t270;
-    const real t272 = H[28] * U[10];
-    const real t273 = t271 + t272;
-    const real t274 = t273 * t273;
-    const real t275 = H[3] * U[0];
-    const real t276 = H[8] * U[1];
-    const real t277 = t275 + t276;
-    const real t278 = H[13] * U[2];
-    const real t279 = t277 + t278;
-    const real t280 = H[18] * U[3];
-    const real t281 = t279 + t280;
-    const real t282 = H[23] * U[4];
-    const real t283 = t281 + t282;
-    const real t284 = H[28] * U[5];
-    const real t285 = t283 + t284;
-    const real t286 = t285 * t285;
-    const real t287 = J[3] + t286;
-    const real t288 = t274 + t287;
-    const real t289 = t264 + t288;
-    const real t290 = t256 + t289;
-    const real t291 = t250 + t290;
-    const real t292 = t246 + t291;
-    const real t293 = t244 < t292;
-    if (!(t293 != 0)) return 1; /* speed 4 of 5 moves no inertia: its acceleration is undetermined */
-    const real t294 = H[14] * H[14];
-    const real t295 = H[4] * H[4];
-    const real t296 = H[9] * H[9];
-    const real t297 = t295 + t296;
-    const real t298 = t294 + t297;
-    const real t299 = t18 * t298;
-    const real t300 = H[29] * H[29];
-    const real t301 = H[19] * H[19];
-    const real t302 = H[24] * H[24];
-    const real t303 = t301 + t302;
-    const real t304 = t300 + t303;
-    const real t305 = t56 * t304;
-    const real t306 = t299 + t305;
-    const real t307 = H[29] * U[20];
-    const real t308 = t307 * t307;
-    const real t309 = H[24] * U[18];
-    const real t310 = H[29] * U[19];
-    const real t311 = t309 + t310;
-    const real t312 = t311 * t311;
-    const real t313 = H[19] * U[15];
-    const real t314 = H[24] * U[16];
-    const real t315 = t313 + t314;
-    const real t316 = H[29] * U[17];
-    const real t317 = t315 + t316;
-    const real t318 = t317 * t317;
-    const real t319 = H[14] * U[11];
-    const real t320 = H[19] * U[12];
-    const real t321 = t319 + t320;
-    const real t322 = H[24] * U[13];
-    const real t323 = t321 + t322;
-    const real t324 = H[29] * U[14];
-    const real t325 = t323 + t324;
-    const real t326 = t325 * t325;
-    const real t327 = H[9] * U[6];
-    const real t328 = H[14] * U[7];
-    const real t329 = t327 + t328;
-    const real t330 = H[19] * U[8];
-    const real t331 = t329 + t330;
-    const real t332 = H[24] * U[9];
-    const real t333 = t331 + t332;
-    const real t334 = H[29] * U[10];
-    const real t335 = t333 + t334;
-    const real t336 = t335 * t335;
-    const real t337 = H[4] * U[0];
-    const real t338 = H[9] * U[1];
-    const real t339 = t337 + t338;
-    const real t340 = H[14] * U[2];
-    const real t341 = t339 + t340;
-    const real t342 = H[19] * U[3];
-    const real t343 = t341 + t342;
-    const real t344 = H[24] * U[4];
-    const real t345 = t343 + t344;
-    const real t346 = H[29] * U[5];
-    const real t347 = t345 + t346;
-    const real t348 = t347 * t347;
-    const real t349 = J[4] + t348;
-    const real t350 = t336 + t349;
-    const real t351 = t326 + t350;
-    const real t352 = t318 + t351;
-    const real t353 = t312 + t352;
-    const real t354 = t308 + t353;
-    const real t355 = t306 < t354;
-    if (!(t355 != 0)) return 1; /* speed 5 of 5 moves no inertia: its acceleration is undetermined */
-    const real t356 = 1e-26 * t106;
-    const real t357 = sqrt(J[0]);
-    const real t358 = t357 * t357;
-    const real t359 = t60 + t358;
-    const real t360 = sqrt(t359);
-    const real t361 = t360 * t360;
-    const real t362 = t64 + t361;
-    const real t363 = sqrt(t362);
-    const real t364 = t363 * t363;
-    const real t365 = t70 + t364;
-    const real t366 = sqrt(t365);
-    const real t367 = t366 * t366;
-    const real t368 = t78 + t367;
-    const real t369 = sqrt(t368);
-    const real t370 = t369 * t369;
-    const real t371 = t88 + t370;
-    const real t372 = sqrt(t371);
-    const real t373 = t372 * t372;
-    const real t374 = t100 + t373;
-    const real t375 = sqrt(t374);
-    const real t376 = t375 * t375;
-    const real t377 = t356 < t376;
-    if (!(t377 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t378 = 1e-26 * t168;
-    const real t379 = 0.0 < t372;
-    const real t380 = t379 != 0 ? t372 : 1.0;
-    const real t381 = 1.0 / t380;
-    const real t382 = t87 * t381;
-    const real t383 = t379 != 0 ? t382 : 1.0;
-    const real t384 = t149 * t383;
-    const real t385 = 0.0 < t369;
-    const real t386 = t385 != 0 ? t369 : 1.0;
-    const real t387 = 1.0 / t386;
-    const real t388 = t77 * t387;
-    const real t389 = t385 != 0 ? t388 : 1.0;
-    const real t390 = t139 * t389;
-    const real t391 = 0.0 < t366;
-    const real t392 = t391 != 0 ? t366 : 1.0;
-    const real t393 = 1.0 / t392;
-    const real t394 = t69 * t393;
-    const real t395 = t391 != 0 ? t394 : 1.0;
-    const real t396 = t131 * t395;
-    const real t397 = 0.0 < t363;
-    const real t398 = t397 != 0 ? t363 : 1.0;
-    const real t399 = 1.0 / t398;
-    const real t400 = t63 * t399;
-    const real t401 = t397 != 0 ? t400 : 1.0;
-    const real t402 = t125 * t401;
-    const real t403 = 0.0 < t360;
-    const real t404 = t403 != 0 ? t360 : 1.0;
-    const real t405 = 1.0 / t404;
-    const real t406 = t59 * t405;
-    const real t407 = t403 != 0 ? t406 : 1.0;
-    const real t408 = t121 * t407;
-    const real t409 = t360 * t399;
-    const real t410 = t408 * t409;
-    const real t411 = t402 + t410;
-    const real t412 = t363 * t393;
-    const real t413 = t411 * t412;
-    const real t414 = t396 + t413;
-    const real t415 = t366 * t387;
-    const real t416 = t414 * t415;
-    const real t417 = t390 + t416;
-    const real t418 = t369 * t381;
-    const real t419 = t417 * t418;
-    const real t420 = t384 + t419;
-    const real t421 = 0.0 < t375;
-    const real t422 = t421 != 0 ? t375 : 1.0;
-    const real t423 = 1.0 / t422;
-    const real t424 = t99 * t423;
-    const real t425 = t421 != 0 ? t424 : 1.0;
-    const real t426 = t420 * t425;
-    const real t427 = t372 * t423;
-    const real t428 = t161 * t427;
-    const real t429 = t426 - t428;
-    const real t430 = t429 * t429;
-    const real t431 = t417 * t383;
-    const real t432 = t149 * t418;
-    const real t433 = t431 - t432;
-    const real t434 = t433 * t433;
-    const real t435 = t414 * t389;
-    const real t436 = t139 * t415;
-    const real t437 = t435 - t436;
-    const real t438 = t437 * t437;
-    const real t439 = t411 * t395;
-    const real t440 = t131 * t412;
-    const real t441 = t439 - t440;
-    const real t442 = t441 * t441;
-    const real t443 = t408 * t401;
-    const real t444 = t125 * t409;
-    const real t445 = t443 - t444;
-    const real t446 = t445 * t445;
-    const real t447 = t357 * t405;
-    const real t448 = t121 * t447;
-    const real t449 = t448 * t448;
-    const real t450 = sqrt(J[1]);
-    const real t451 = t450 * t450;
-    const real t452 = t449 + t451;
-    const real t453 = sqrt(t452);
-    const real t454 = t453 * t453;
-    const real t455 = t446 + t454;
-    const real t456 = sqrt(t455);
-    const real t457 = t456 * t456;
-    const real t458 = t442 + t457;
-    const real t459 = sqrt(t458);
-    const real t460 = t459 * t459;
-    const real t461 = t438 + t460;
-    const real t462 = sqrt(t461);
-    const real t463 = t462 * t462;
-    const real t464 = t434 + t463;
-    const real t465 = sqrt(t464);
-    const real t466 = t465 * t465;
-    const real t467 = t430 + t466;
-    const real t468 = sqrt(t467);
-    const real t469 = t468 * t468;
-    const real t470 = t378 < t469;
-    if (!(t470 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t471 = 1e-26 * t230;
-    const real t472 = t201 * t389;
-    const real t473 = t193 * t395;
-    const real t474 = t187 * t401;
-    const real t475 = t183 * t407;
-    const real t476 = t475 * t409;
-    const real t477 = t474 + t476;
-    const real t478 = t477 * t412;
-    const real t479 = t473 + t478;
-    const real t480 = t479 * t415;
-    const real t481 = t472 + t480;
-    const real t482 = t481 * t383;
-    const real t483 = t211 * t418;
-    const real t484 = t482 - t483;
-    const real t485 = 0.0 < t465;
-    const real t486 = t485 != 0 ? t465 : 1.0;
-    const real t487 = 1.0 / t486;
-    const real t488 = t433 * t487;
-    const real t489 = t485 != 0 ? t488 : 1.0;
-    const real t490 = t484 * t489;
-    const real t491 = t479 * t389;
-    const real t492 = t201 * t415;
-    const real t493 = t491 - t492;
-    const real t494 = 0.0 < t462;
-    const real t495 = t494 != 0 ? t462 : 1.0;
-    const real t496 = 1.0 / t495;
-    const real t497 = t437 * t496;
-    const real t498 = t494 != 0 ? t497 : 1.0;
-    const real t499 = t493 * t498;
-    const real t500 = t477 * t395;
-    const real t501 = t193 * t412;
-    const real t502 = t500 - t501;
-    const real t503 = 0.0 < t459;
-    const real t504 = t503 != 0 ? t459 : 1.0;
-    const real t505 = 1.0 / t504;
-    const real t506 = t441 * t505;
-    const real t507 = t503 != 0 ? t506 : 1.0;
-    const real t508 = t502 * t507;
-    const real t509 = t475 * t401;
-    const real t510 = t187 * t409;
-    const real t511 = t509 - t510;
-    const real t512 = 0.0 < t456;
-    const real t513 = t512 != 0 ? t456 : 1.0;
-    const real t514 = 1.0 / t513;
-    const real t515 = t445 * t514;
-    const real t516 = t512 != 0 ? t515 : 1.0;
-    const real t517 = t511 * t516;
-    const real t518 = t183 * t447;
-    const real t519 = 0.0 < t453;
-    const real t520 = t519 != 0 ? t453 : 1.0;
-    const real t521 = 1.0 / t520;
-    const real t522 = t448 * t521;
-    const real t523 = -t522;
-    const real t524 = t519 != 0 ? t523 : 1.0;
-    const real t525 = t518 * t524;
-    const real t526 = t453 * t514;
-    const real t527 = t525 * t526;
-    const real t528 = t517 - t527;
-    const real t529 = t456 * t505;
-    const real t530 = t528 * t529;
-    const real t531 = t508 + t530;
-    const real t532 = t459 * t496;
-    const real t533 = t531 * t532;
-    const real t534 = t499 + t533;
-    const real t535 = t462 * t487;
-    const real t536 = t534 * t535;
-    const real t537 = t490 + t536;
-    const real t538 = 0.0 < t468;
-    const real t539 = t538 != 0 ? t468 : 1.0;
-    const real t540 = 1.0 / t539;
-    const real t541 = t429 * t540;
-    const real t542 = t538 != 0 ? t541 : 1.0;
-    const real t543 = t537 * t542;
-    const real t544 = t211 * t383;
-    const real t545 = t481 * t418;
-    const real t546 = t544 + t545;
-    const real t547 = t546 * t425;
-    const real t548 = t223 * t427;
-    const real t549 = t547 - t548;
-    const real t550 = t465 * t540;
-    const real t551 = t549 * t550;
-    const real t552 = t543 - t551;
-    const real t553 = t552 * t552;
-    const real t554 = t534 * t489;
-    const real t555 = t484 * t535;
-    const real t556 = t554 - t555;
-    const real t557 = t556 * t556;
-    const real t558 = t531 * t498;
-    const real t559 = t493 * t532;
-    const real t560 = t558 - t559;
-    const real t561 = t560 * t560;
-    const real t562 = t528 * t507;
-    const real t563 = t502 * t529;
-    const real t564 = t562 - t563;
-    const real t565 = t564 * t564;
-    const real t566 = t525 * t516;
-    const real t567 = t511 * t526;
-    const real t568 = t566 + t567;
-    const real t569 = t568 * t568;
-    const real t570 = t450 * t521;
-    const real t571 = t518 * t570;
-    const real t572 = t571 * t571;
-    const real t573 = sqrt(J[2]);
-    const real t574 = t573 * t573;
-    const real t575 = t572 + t574;
-    const real t576 = sqrt(t575);
-    const real t577 = t576 * t576;
-    const real t578 = t569 + t577;
-    const real t579 = sqrt(t578);
-    const real t580 = t579 * t579;
-    const real t581 = t565 + t580;
-    const real t582 = sqrt(t581);
-    const real t583 = t582 * t582;
-    const real t584 = t561 + t583;
-    const real t585 = sqrt(t584);
-    const real t586 = t585 * t585;
-    const real t587 = t557 + t586;
-    const real t588 = sqrt(t587);
-    const real t589 = t588 * t588;
-    const real t590 = t553 + t589;
-    const real t591 = sqrt(t590);
-    const real t592 = t591 * t591;
-    const real t593 = t471 < t592;
-    if (!(t593 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t594 = 1e-26 * t292;
-    const real t595 = t255 * t395;
-    const real t596 = t249 * t401;
-    const real t597 = t245 * t407;
-    const real t598 = t597 * t409;
-    const real t599 = t596 + t598;
-    const real t600 = t599 * t412;
-    const real t601 = t595 + t600;
-    const real t602 = t601 * t389;
-    const real t603 = t263 * t415;
-    const real t604 = t602 - t603;
-    const real t605 = t604 * t498;
-    const real t606 = t599 * t395;
-    const real t607 = t255 * t412;
-    const real t608 = t606 - t607;
-    const real t609 = t608 * t507;
-    const real t610 = t597 * t401;
-    const real t611 = t249 * t409;
-    const real t612 = t610 - t611;
-    const real t613 = t612 * t516;
-    const real t614 = t245 * t447;
-    const real t615 = t614 * t524;
-    const real t616 = t615 * t526;
-    const real t617 = t613 - t616;
-    const real t618 = t617 * t529;
-    const real t619 = t609 + t618;
-    const real t620 = t619 * t532;
-    const real t621 = t605 + t620;
-    const real t622 = t621 * t489;
-    const real t623 = t263 * t389;
-    const real t624 = t601 * t415;
-    const real t625 = t623 + t624;
-    const real t626 = t625 * t383;
-    const real t627 = t273 * t418;
-    const real t628 = t626 - t627;
-    const real t629 = t628 * t535;
-    const real t630 = t622 - t629;
-    const real t631 = 0.0 < t588;
-    const real t632 = t631 != 0 ? t588 : 1.0;
-    const real t633 = 1.0 / t632;
-    const real t634 = t556 * t633;
-    const real t635 = t631 != 0 ? t634 : 1.0;
-    const real t636 = t630 * t635;
-    const real t637 = t619 * t498;
-    const real t638 = t604 * t532;
-    const real t639 = t637 - t638;
-    const real t640 = 0.0 < t585;
-    const real t641 = t640 != 0 ? t585 : 1.0;
-    const real t642 = 1.0 / t641;
-    const real t643 = t560 * t642;
-    const real t644 = t640 != 0 ? t643 : 1.0;
-    const real t645 = t639 * t644;
-    const real t646 = t617 * t507;
-    const real t647 = t608 * t529;
-    const real t648 = t646 - t647;
-    const real t649 = 0.0 < t582;
-    const real t650 = t649 != 0 ? t582 : 1.0;
-    const real t651 = 1.0 / t650;
-    const real t652 = t564 * t651;
-    const real t653 = t649 != 0 ? t652 : 1.0;
-    const real t654 = t648 * t653;
-    const real t655 = t614 * t570;
-    const real t656 = 0.0 < t576;
-    const real t657 = t656 != 0 ? t576 : 1.0;
-    const real t658 = 1.0 / t657;
-    const real t659 = t571 * t658;
-    const real t660 = t656 != 0 ? t659 : 1.0;
-    const real t661 = t655 * t660;
-    const real t662 = 0.0 < t579;
-    const real t663 = t662 != 0 ? t579 : 1.0;
-    const real t664 = 1.0 / t663;
-    const real t665 = t576 * t664;
-    const real t666 = t661 * t665;
-    const real t667 = t615 * t516;
-    const real t668 = t612 * t526;
-    const real t669 = t667 + t668;
-    const real t670 = t568 * t664;
-    const real t671 = -t670;
-    const real t672 = t662 != 0 ? t671 : 1.0;
-    const real t673 = t669 * t672;
-    const real t674 = t666 - t673;
-    const real t675 = t579 * t651;
-    const real t676 = t674 * t675;
-    const real t677 = t654 + t676;
-    const real t678 = t582 * t642;
-    const real t679 = t677 * t678;
-    const real t680 = t645 + t679;
-    const real t681 = t585 * t633;
-    const real t682 = t680 * t681;
-    const real t683 = t636 + t682;
-    const real t684 = 0.0 < t591;
-    const real t685 = t684 != 0 ? t591 : 1.0;
-    const real t686 = 1.0 / t685;
-    const real t687 = t552 * t686;
-    const real t688 = t684 != 0 ? t687 : 1.0;
-    const real t689 = t683 * t688;
-    const real t690 = t628 * t489;
-    const real t691 = t621 * t535;
-    const real t692 = t690 + t691;
-    const real t693 = t692 * t542;
-    const real t694 = t273 * t383;
-    const real t695 = t625 * t418;
-    const real t696 = t694 + t695;
-    const real t697 = t696 * t425;
-    const real t698 = t285 * t427;
-    const real t699 = t697 - t698;
-    const real t700 = t699 * t550;
-    const real t701 = t693 - t700;
-    const real t702 = t588 * t686;
-    const real t703 = t701 * t702;
-    const real t704 = t689 - t703;
-    const real t705 = t704 * t704;
-    const real t706 = t680 * t635;
-    const real t707 = t630 * t681;
-    const real t708 = t706 - t707;
-    const real t709 = t708 * t708;
-    const real t710 = t677 * t644;
-    const real t711 = t639 * t678;
-    const real t712 = t710 - t711;
-    const real t713 = t712 * t712;
-    const real t714 = t674 * t653;
-    const real t715 = t648 * t675;
-    const real t716 = t714 - t715;
-    const real t717 = t716 * t716;
-    const real t718 = t661 * t672;
-    const real t719 = t669 * t665;
-    const real t720 = t718 + t719;
-    const real t721 = t720 * t720;
-    const real t722 = t573 * t658;
-    const real t723 = t655 * t722;
-    const real t724 = t723 * t723;
-    const real t725 = sqrt(J[3]);
-    const real t726 = t725 * t725;
-    const real t727 = t724 + t726;
-    const real t728 = sqrt(t727);
-    const real t729 = t728 * t728;
-    const real t730 = t721 + t729;
-    const real t731 = sqrt(t730);
-    const real t732 = t731 * t731;
-    const real t733 = t717 + t732;
-    const real t734 = sqrt(t733);
-    const real t735 = t734 * t734;
-    const real t736 = t713 + t735;
-    const real t737 = sqrt(t736);
-    const real t738 = t737 * t737;
-    const real t739 = t709 + t738;
-    const real t740 = sqrt(t739);
-    const real t741 = t740 * t740;
-    const real t742 = t705 + t741;
-    const real t743 = sqrt(t742);
-    const real t744 = t743 * t743;
-    const real t745 = t594 < t744;
-    if (!(t745 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t746 = 1e-26 * t354;
-    const real t747 = t311 * t401;
-    const real t748 = t307 * t407;
-    const real t749 = t748 * t409;
-    const real t750 = t747 + t749;
-    const real t751 = t750 * t395;
-    const real t752 = t317 * t412;
-    const real t753 = t751 - t752;
-    const real t754 = t753 * t507;
-    const real t755 = t748 * t401;
-    const real t756 = t311 * t409;
-    const real t757 = t755 - t756;
-    const real t758 = t757 * t516;
-    const real t759 = t307 * t447;
-    const real t760 = t759 * t524;
-    const real t761 = t760 * t526;
-    const real t762 = t758 - t761;
-    const real t763 = t762 * t529;
-    const real t764 = t754 + t763;
-    const real t765 = t764 * t498;
-    const real t766 = t317 * t395;
-    const real t767 = t750 * t412;
-    const real t768 = t766 + t767;
-    const real t769 = t768 * t389;
-    const real t770 = t325 * t415;
-    const real t771 = t769 - t770;
-    const real t772 = t771 * t532;
-    const real t773 = t765 - t772;
-    const real t774 = t773 * t644;
-    const real t775 = t762 * t507;
-    const real t776 = t753 * t529;
-    const real t777 = t775 - t776;
-    const real t778 = t777 * t653;
-    const real t779 = t759 * t570;
-    const real t780 = t779 * t660;
-    const real t781 = t780 * t665;
-    const real t782 = t760 * t516;
-    const real t783 = t757 * t526;
-    const real t784 = t782 + t783;
-    const real t785 = t784 * t672;
-    const real t786 = t781 - t785;
-    const real t787 = t786 * t675;
-    const real t788 = t778 + t787;
-    const real t789 = t788 * t678;
-    const real t790 = t774 + t789;
-    const real t791 = t790 * t635;
-    const real t792 = t771 * t498;
-    const real t793 = t764 * t532;
-    const real t794 = t792 + t793;
-    const real t795 = t794 * t489;
-    const real t796 = t325 * t389;
-    const real t797 = t768 * t415;
-    const real t798 = t796 + t797;
-    const real t799 = t798 * t383;
-    const real t800 = t335 * t418;
-    const real t801 = t799 - t800;
-    const real t802 = t801 * t535;
-    const real t803 = t795 - t802;
-    const real t804 = t803 * t681;
-    const real t805 = t791 - t804;
-    const real t806 = 0.0 < t740;
-    const real t807 = t806 != 0 ? t740 : 1.0;
-    const real t808 = 1.0 / t807;
-    const real t809 = t708 * t808;
-    const real t810 = t806 != 0 ? t809 : 1.0;
-    const real t811 = t805 * t810;
-    const real t812 = t788 * t644;
-    const real t813 = t773 * t678;
-    const real t814 = t812 - t813;
-    const real t815 = 0.0 < t737;
-    const real t816 = t815 != 0 ? t737 : 1.0;
-    const real t817 = 1.0 / t816;
-    const real t818 = t712 * t817;
-    const real t819 = t815 != 0 ? t818 : 1.0;
-    const real t820 = t814 * t819;
-    const real t821 = t786 * t653;
-    const real t822 = t777 * t675;
-    const real t823 = t821 - t822;
-    const real t824 = 0.0 < t734;
-    const real t825 = t824 != 0 ? t734 : 1.0;
-    const real t826 = 1.0 / t825;
-    const real t827 = t716 * t826;
-    const real t828 = t824 != 0 ? t827 : 1.0;
-    const real t829 = t823 * t828;
-    const real t830 = t780 * t672;
-    const real t831 = t784 * t665;
-    const real t832 = t830 + t831;
-    const real t833 = 0.0 < t731;
-    const real t834 = t833 != 0 ? t731 : 1.0;
-    const real t835 = 1.0 / t834;
-    const real t836 = t720 * t835;
-    const real t837 = t833 != 0 ? t836 : 1.0;
-    const real t838 = t832 * t837;
-    const real t839 = t779 * t722;
-    const real t840 = 0.0 < t728;
-    const real t841 = t840 != 0 ? t728 : 1.0;
-    const real t842 = 1.0 / t841;
-    const real t843 = t723 * t842;
-    const real t844 = -t843;
-    const real t845 = t840 != 0 ? t844 : 1.0;
-    const real t846 = t839 * t845;
-    const real t847 = t728 * t835;
-    const real t848 = t846 * t847;
-    const real t849 = t838 - t848;
-    const real t850 = t731 * t826;
-    const real t851 = t849 * t850;
-    const real t852 = t829 + t851;
-    const real t853 = t734 * t817;
-    const real t854 = t852 * t853;
-    const real t855 = t820 + t854;
-    const real t856 = t737 * t808;
-    const real t857 = t855 * t856;
-    const real t858 = t811 + t857;
-    const real t859 = 0.0 < t743;
-    const real t860 = t859 != 0 ? t743 : 1.0;
-    const real t861 = 1.0 / t860;
-    const real t862 = t704 * t861;
-    const real t863 = t859 != 0 ? t862 : 1.0;
-    const real t864 = t858 * t863;
-    const real t865 = t803 * t635;
-    const real t866 = t790 * t681;
-    const real t867 = t865 + t866;
-    const real t868 = t867 * t688;
-    const real t869 = t801 * t489;
-    const real t870 = t794 * t535;
-    const real t871 = t869 + t870;
-    const real t872 = t871 * t542;
-    const real t873 = t335 * t383;
-    const real t874 = t798 * t418;
-    const real t875 = t873 + t874;
-    const real t876 = t875 * t425;
-    const real t877 = t347 * t427;
-    const real t878 = t876 - t877;
-    const real t879 = t878 * t550;
-    const real t880 = t872 - t879;
-    const real t881 = t880 * t702;
-    const real t882 = t868 - t881;
-    const real t883 = t740 * t861;
-    const real t884 = t882 * t883;
-    const real t885 = t864 - t884;
-    const real t886 = t885 * t885;
-    const real t887 = t855 * t810;
-    const real t888 = t805 * t856;
-    const real t889 = t887 - t888;
-    const real t890 = t889 * t889;
-    const real t891 = t852 * t819;
-    const real t892 = t814 * t853;
-    const real t893 = t891 - t892;
-    const real t894 = t893 * t893;
-    const real t895 = t849 * t828;
-    const real t896 = t823 * t850;
-    const real t897 = t895 - t896;
-    const real t898 = t897 * t897;
-    const real t899 = t846 * t837;
-    const real t900 = t832 * t847;
-    const real t901 = t899 + t900;
-    const real t902 = t901 * t901;
-    const real t903 = t725 * t842;
-    const real t904 = t839 * t903;
-    const real t905 = t904 * t904;
-    const real t906 = sqrt(J[4]);
-    const real t907 = t906 * t906;
-    const real t908 = t905 + t907;
-    const real t909 = sqrt(t908);
-    const real t910 = t909 * t909;
-    const real t911 = t902 + t910;
-    const real t912 = sqrt(t911);
-    const real t913 = t912 * t912;
-    const real t914 = t898 + t913;
-    const real t915 = sqrt(t914);
-    const real t916 = t915 * t915;
-    const real t917 = t894 + t916;
-    const real t918 = sqrt(t917);
-    const real t919 = t918 * t918;
-    const real t920 = t890 + t919;
-    const real t921 = sqrt(t920);
-    const real t922 = t921 * t921;
-    const real t923 = t886 + t922;
-    const real t924 = sqrt(t923);
-    const real t925 = t924 * t924;
-    const real t926 = t746 < t925;
-    if (!(t926 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t927 = U[0] * t425;
-    const real t928 = 1.0 / t375;
-    const real t929 = t927 * t928;
-    const real t930 = t161 * t425;
-    const real t931 = t420 * t427;
-    const real t932 = t930 + t931;
-    const real t933 = t932 * t928;
-    const real t934 = t699 * t542;
-    const real t935 = t692 * t550;
-    const real t936 = t934 + t935;
-    const real t937 = 1.0 / t468;
-    const real t938 = t936 * t937;
-    const real t939 = U[0] * t427;
-    const real t940 = t939 * t550;
-    const real t941 = t940 * t702;
-    const real t942 = t941 * t863;
-    const real t943 = 1.0 / t743;
-    const real t944 = t942 * t943;
-    const real t945 = t882 * t863;
-    const real t946 = t858 * t883;
-    const real t947 = t945 + t946;
-    const real t948 = t947 * t943;
-    const real t949 = t941 * t883;
-    const real t950 = 0.0 < t924;
-    const real t951 = t950 != 0 ? t924 : 1.0;
-    const real t952 = 1.0 / t951;
-    const real t953 = t885 * t952;
-    const real t954 = t950 != 0 ? t953 : 1.0;
-    const real t955 = t949 * t954;
-    const real t956 = 1.0 / t924;
-    const real t957 = t955 * t956;
-    const real t958 = t948 * t957;
-    const real t959 = t944 + t958;
-    const real t960 = t938 * t959;
-    const real t961 = t939 * t542;
-    const real t962 = t961 * t937;
-    const real t963 = t549 * t542;
-    const real t964 = t537 * t550;
-    const real t965 = t963 + t964;
-    const real t966 = t965 * t937;
-    const real t967 = t940 * t688;
-    const real t968 = 1.0 / t591;
-    const real t969 = t967 * t968;
-    const real t970 = t701 * t688;
-    const real t971 = t683 * t702;
-    const real t972 = t970 + t971;
-    const real t973 = t972 * t968;
-    const real t974 = t973 * t959;
-    const real t975 = t969 + t974;
-    const real t976 = t880 * t688;
-    const real t977 = t867 * t702;
-    const real t978 = t976 + t977;
-    const real t979 = t978 * t968;
-    const real t980 = t979 * t957;
-    const real t981 = t975 - t980;
-    const real t982 = t966 * t981;
-    const real t983 = t962 + t982;
-    const real t984 = t960 - t983;
-    const real t985 = t878 * t542;
-    const real t986 = t871 * t550;
-    const real t987 = t985 + t986;
-    const real t988 = t987 * t937;
-    const real t989 = t988 * t957;
-    const real t990 = t984 - t989;
-    const real t991 = t933 * t990;
-    const real t992 = t929 - t991;
-    const real t993 = t223 * t425;
-    const real t994 = t546 * t427;
-    const real t995 = t993 + t994;
-    const real t996 = t995 * t928;
-    const real t997 = t996 * t981;
-    const real t998 = t992 - t997;
-    const real t999 = t285 * t425;
-    const real t1000 = t696 * t427;
-    const real t1001 = t999 + t1000;
-    const real t1002 = t1001 * t928;
-    const real t1003 = t1002 * t959;
-    const real t1004 = t998 + t1003;
-    const real t1005 = t347 * t425;
-    const real t1006 = t875 * t427;
-    const real t1007 = t1005 + t1006;
-    const real t1008 = t1007 * t928;
-    const real t1009 = t1008 * t957;
-    const real t1010 = t1004 - t1009;
-    G[0] = t1010;
-    const real t1011 = U[1] * t425;
-    const real t1012 = U[6] * t383;
-    const real t1013 = t1012 * t427;
-    const real t1014 = t1011 + t1013;
-    const real t1015 = t1014 * t928;
-    const real t1016 = t1012 * t425;
-    const real t1017 = U[1] * t427;
-    const real t1018 = t1016 - t1017;
-    const real t1019 = t1018 * t542;
-    const real t1020 = U[6] * t418;
-    const real t1021 = t1020 * t489;
-    const real t1022 = t1021 * t550;
-    const real t1023 = t1019 - t1022;
-    const real t1024 = t1023 * t937;
-    const real t1025 = t1020 * t535;
-    const real t1026 = t1025 * t635;
-    const real t1027 = t1026 * t702;
-    const real t1028 = t1021 * t542;
-    const real t1029 = t1018 * t550;
-    const real t1030 = t1028 + t1029;
-    const real t1031 = t1030 * t688;
-    const real t1032 = t1027 - t1031;
-    const real t1033 = t1032 * t968;
-    const real t1034 = t1026 * t688;
-    const real t1035 = t1030 * t702;
-    const real t1036 = t1034 + t1035;
-    const real t1037 = t1036 * t863;
-    const real t1038 = t1025 * t681;
-    const real t1039 = t1038 * t810;
-    const real t1040 = t1039 * t883;
-    const real t1041 = t1037 - t1040;
-    const real t1042 = t1041 * t943;
-    const real t1043 = t1038 * t856;
-    const real t1044 = 0.0 < t921;
-    const real t1045 = t1044 != 0 ? t921 : 1.0;
-    const real t1046 = 1.0 / t1045;
-    const real t1047 = t889 * t1046;
-    const real t1048 = t1044 != 0 ? t1047 : 1.0;
-    const real t1049 = t1043 * t1048;
-    const real t1050 = t921 * t952;
-    const real t1051 = t1049 * t1050;
-    const real t1052 = t1039 * t863;
-    const real t1053 = t1036 * t883;
-    const real t1054 = t1052 + t1053;
-    const real t1055 = t1054 * t954;
-    const real t1056 = t1051 - t1055;
-    const real t1057 = t1056 * t956;
-    const real t1058 = t948 * t1057;
-    const real t1059 = t1042 - t1058;
-    const real t1060 = t973 * t1059;
-    const real t1061 = t1033 - t1060;
-    const real t1062 = t979 * t1057;
-    const real t1063 = t1061 - t1062;
-    const real t1064 = t966 * t1063;
-    const real t1065 = t1024 - t1064;
-    const real t1066 = t938 * t1059;
-    const real t1067 = t1065 - t1066;
-    const real t1068 = t988 * t1057;
-    const real t1069 = t1067 - t1068;
-    const real t1070 = t933 * t1069;
-    const real t1071 = t1015 - t1070;
-    const real t1072 = t996 * t1063;
-    const real t1073 = t1071 - t1072;
-    const real t1074 = t1002 * t1059;
-    const real t1075 = t1073 - t1074;
-    const real t1076 = t1008 * t1057;
-    const real t1077 = t1075 - t1076;
-    G[1] = t1077;
-    const real t1078 = U[2] * t425;
-    const real t1079 = U[7] * t383;
-    const real t1080 = U[11] * t389;
-    const real t1081 = t1080 * t418;
-    const real t1082 = t1079 + t1081;
-    const real t1083 = t1082 * t427;
-    const real t1084 = t1078 + t1083;
-    const real t1085 = t1084 * t928;
-    const real t1086 = t1082 * t425;
-    const real t1087 = U[2] * t427;
-    const real t1088 = t1086 - t1087;
-    const real t1089 = t1088 * t542;
-    const real t1090 = t1080 * t383;
-    const real t1091 = U[7] * t418;
-    const real t1092 = t1090 - t1091;
-    const real t1093 = t1092 * t489;
-    const real t1094 = U[11] * t415;
-    const real t1095 = t1094 * t498;
-    const real t1096 = t1095 * t535;
-    const real t1097 = t1093 - t1096;
-    const real t1098 = t1097 * t550;
-    const real t1099 = t1089 + t1098;
-    const real t1100 = t1099 * t937;
-    const real t1101 = t1097 * t542;
-    const real t1102 = t1088 * t550;
-    const real t1103 = t1101 - t1102;
-    const real t1104 = t1103 * t688;
-    const real t1105 = t1094 * t532;
-    const real t1106 = t1105 * t644;
-    const real t1107 = t1106 * t681;
-    const real t1108 = t1095 * t489;
-    const real t1109 = t1092 * t535;
-    const real t1110 = t1108 + t1109;
-    const real t1111 = t1110 * t635;
-    const real t1112 = t1107 - t1111;
-    const real t1113 = t1112 * t702;
-    const real t1114 = t1104 + t1113;
-    const real t1115 = t1114 * t968;
-    const real t1116 = t1112 * t688;
-    const real t1117 = t1103 * t702;
-    const real t1118 = t1116 - t1117;
-    const real t1119 = t1118 * t863;
-    const real t1120 = t1106 * t635;
-    const real t1121 = t1110 * t681;
-    const real t1122 = t1120 + t1121;
-    const real t1123 = t1122 * t810;
-    const real t1124 = t1105 * t678;
-    const real t1125 = t1124 * t819;
-    const real t1126 = t1125 * t856;
-    const real t1127 = t1123 - t1126;
-    const real t1128 = t1127 * t883;
-    const real t1129 = t1119 + t1128;
-    const real t1130 = t1129 * t943;
-    const real t1131 = t1127 * t863;
-    const real t1132 = t1118 * t883;
-    const real t1133 = t1131 - t1132;
-    const real t1134 = t1133 * t954;
-    const real t1135 = t1124 * t853;
-    const real t1136 = 0.0 < t918;
-    const real t1137 = t1136 != 0 ? t918 : 1.0;
-    const real t1138 = 1.0 / t1137;
-    const real t1139 = t893 * t1138;
-    const real t1140 = t1136 != 0 ? t1139 : 1.0;
-    const real t1141 = t1135 * t1140;
-    const real t1142 = t918 * t1046;
-    const real t1143 = t1141 * t1142;
-    const real t1144 = t1125 * t810;
-    const real t1145 = t1122 * t856;
-    const real t1146 = t1144 + t1145;
-    const real t1147 = t1146 * t1048;
-    const real t1148 = t1143 - t1147;
-    const real t1149 = t1148 * t1050;
-    const real t1150 = t1134 + t1149;
-    const real t1151 = t1150 * t956;
-    const real t1152 = t948 * t1151;
-    const real t1153 = t1130 - t1152;
-    const real t1154 = t973 * t1153;
-    const real t1155 = t1115 - t1154;
-    const real t1156 = t979 * t1151;
-    const real t1157 = t1155 - t1156;
-    const real t1158 = t966 * t1157;
-    const real t1159 = t1100 - t1158;
-    const real t1160 = t938 * t1153;
-    const real t1161 = t1159 - t1160;
-    const real t1162 = t988 * t1151;
-    const real t1163 = t1161 - t1162;
-    const real t1164 = t933 * t1163;
-    const real t1165 = t1085 - t1164;
-    const real t1166 = t996 * t1157;
-    const real t1167 = t1165 - t1166;
-    const real t1168 = t1002 * t1153;
-    const real t1169 = t1167 - t1168;
-    const real t1170 = t1008 * t1151;
-    const real t1171 = t1169 - t1170;
-    G[2] = t1171;
-    const real t1172 = U[3] * t425;
-    const real t1173 = U[8] * t383;
-    const real t1174 = U[12] * t389;
-    const real t1175 = U[15] * t395;
-    const real t1176 = t1175 * t415;
-    const real t1177 = t1174 + t1176;
-    const real t1178 = t1177 * t418;
-    const real t1179 = t1173 + t1178;
-    const real t1180 = t1179 * t427;
-    const real t1181 = t1172 + t1180;
-    const real t1182 = t1181 * t928;
-    const real t1183 = t1179 * t425;
-    const real t1184 = U[3] * t427;
-    const real t1185 = t1183 - t1184;
-    const real t1186 = t1185 * t542;
-    const real t1187 = t1177 * t383;
-    const real t1188 = U[8] * t418;
-    const real t1189 = t1187 - t1188;
-    const real t1190 = t1189 * t489;
-    const real t1191 = t1175 * t389;
-    const real t1192 = U[12] * t415;
-    const real t1193 = t1191 - t1192;
-    const real t1194 = t1193 * t498;
-    const real t1195 = U[15] * t412;
-    const real t1196 = t1195 * t507;
-    const real t1197 = t1196 * t532;
-    const real t1198 = t1194 - t1197;
-    const real t1199 = t1198 * t535;
-    const real t1200 = t1190 + t1199;
-    const real t1201 = t1200 * t550;
-    const real t1202 = t1186 + t1201;
-    const real t1203 = t1202 * t937;
-    const real t1204 = t1200 * t542;
-    const real t1205 = t1185 * t550;
-    const real t1206 = t1204 - t1205;
-    const real t1207 = t1206 * t688;
-    const real t1208 = t1198 * t489;
-    const real t1209 = t1189 * t535;
-    const real t1210 = t1208 - t1209;
-    const real t1211 = t1210 * t635;
-    const real t1212 = t1195 * t529;
-    const real t1213 = t1212 * t653;
-    const real t1214 = t1213 * t678;
-    const real t1215 = t1196 * t498;
-    const real t1216 = t1193 * t532;
-    const real t1217 = t1215 + t1216;
-    const real t1218 = t1217 * t644;
-    const real t1219 = t1214 - t1218;
-    const real t1220 = t1219 * t681;
-    const real t1221 = t1211 + t1220;
-    const real t1222 = t1221 * t702;
-    const real t1223 = t1207 + t1222;
-    const real t1224 = t1223 * t968;
-    const real t1225 = t1221 * t688;
-    const real t1226 = t1206 * t702;
-    const real t1227 = t1225 - t1226;
-    const real t1228 = t1227 * t863;
-    const real t1229 = t1219 * t635;
-    const real t1230 = t1210 * t681;
-    const real t1231 = t1229 - t1230;
-    const real t1232 = t1231 * t810;
-    const real t1233 = t1213 * t644;
-    const real t1234 = t1217 * t678;
-    const real t1235 = t1233 + t1234;
-    const real t1236 = t1235 * t819;
-    const real t1237 = t1212 * t675;
-    const real t1238 = t1237 * t828;
-    const real t1239 = t1238 * t853;
-    const real t1240 = t1236 - t1239;
-    const real t1241 = t1240 * t856;
-    const real t1242 = t1232 + t1241;
-    const real t1243 = t1242 * t883;
-    const real t1244 = t1228 + t1243;
-    const real t1245 = t1244 * t943;
-    const real t1246 = t1242 * t863;
-    const real t1247 = t1227 * t883;
-    const real t1248 = t1246 - t1247;
-    const real t1249 = t1248 * t954;
-    const real t1250 = t1240 * t810;
-    const real t1251 = t1231 * t856;
-    const real t1252 = t1250 - t1251;
-    const real t1253 = t1252 * t1048;
-    const real t1254 = t1237 * t850;
-    const real t1255 = 0.0 < t915;
-    const real t1256 = t1255 != 0 ? t915 : 1.0;
-    const real t1257 = 1.0 / t1256;
-    const real t1258 = t897 * t1257;
-    const real t1259 = t1255 != 0 ? t1258 : 1.0;
-    const real t1260 = t1254 * t1259;
-    const real t1261 = t915 * t1138;
-    const real t1262 = t1260 * t1261;
-    const real t1263 = t1238 * t819;
-    const real t1264 = t1235 * t853;
-    const real t1265 = t1263 + t1264;
-    const real t1266 = t1265 * t1140;
-    const real t1267 = t1262 - t1266;
-    const real t1268 = t1267 * t1142;
-    const real t1269 = t1253 + t1268;
-    const real t1270 = t1269 * t1050;
-    const real t1271 = t1249 + t1270;
-    const real t1272 = t1271 * t956;
-    const real t1273 = t948 * t1272;
-    const real t1274 = t1245 - t1273;
-    const real t1275 = t973 * t1274;
-    const real t1276 = t1224 - t1275;
-    const real t1277 = t979 * t1272;
-    const real t1278 = t1276 - t1277;
-    const real t1279 = t966 * t1278;
-    const real t1280 = t1203 - t1279;
-    const real t1281 = t938 * t1274;
-    const real t1282 = t1280 - t1281;
-    const real t1283 = t988 * t1272;
-    const real t1284 = t1282 - t1283;
-    const real t1285 = t933 * t1284;
-    const real t1286 = t1182 - t1285;
-    const real t1287 = t996 * t1278;
-    const real t1288 = t1286 - t1287;
-    const real t1289 = t1002 * t1274;
-    const real t1290 = t1288 - t1289;
-    const real t1291 = t1008 * t1272;
-    const real t1292 = t1290 - t1291;
-    G[3] = t1292;
-    const real t1293 = U[4] * t425;
-    const real t1294 = U[9] * t383;
-    const real t1295 = U[13] * t389;
-    const real t1296 = U[16] * t395;
-    const real t1297 = U[18] * t401;
-    const real t1298 = t1297 * t412;
-    const real t1299 = t1296 + t1298;
-    const real t1300 = t1299 * t415;
-    const real t1301 = t1295 + t1300;
-    const real t1302 = t1301 * t418;
-    const real t1303 = t1294 + t1302;
-    const real t1304 = t1303 * t427;
-    const real t1305 = t1293 + t1304;
-    const real t1306 = t1305 * t928;
-    const real t1307 = t1303 * t425;
-    const real t1308 = U[4] * t427;
-    const real t1309 = t1307 - t1308;
-    const real t1310 = t1309 * t542;
-    const real t1311 = t1301 * t383;
-    const real t1312 = U[9] * t418;
-    const real t1313 = t1311 - t1312;
-    const real t1314 = t1313 * t489;
-    const real t1315 = t1299 * t389;
-    const real t1316 = U[13] * t415;
-    const real t1317 = t1315 - t1316;
-    const real t1318 = t1317 * t498;
-    const real t1319 = t1297 * t395;
-    const real t1320 = U[16] * t412;
-    const real t1321 = t1319 - t1320;
-    const real t1322 = t1321 * t507;
-    const real t1323 = U[18] * t409;
-    const real t1324 = t1323 * t516;
-    const real t1325 = t1324 * t529;
-    const real t1326 = t1322 - t1325;
-    const real t1327 = t1326 * t532;
-    const real t1328 = t1318 + t1327;
-    const real t1329 = t1328 * t535;
-    const real t1330 = t1314 + t1329;
-    const real t1331 = t1330 * t550;
-    const real t1332 = t1310 + t1331;
-    const real t1333 = t1332 * t937;
-    const real t1334 = t1330 * t542;
-    const real t1335 = t1309 * t550;
-    const real t1336 = t1334 - t1335;
-    const real t1337 = t1336 * t688;
-    const real t1338 = t1328 * t489;
-    const real t1339 = t1313 * t535;
-    const real t1340 = t1338 - t1339;
-    const real t1341 = t1340 * t635;
-    const real t1342 = t1326 * t498;
-    const real t1343 = t1317 * t532;
-    const real t1344 = t1342 - t1343;
-    const real t1345 = t1344 * t644;
-    const real t1346 = t1323 * t526;
-    const real t1347 = t1346 * t672;
-    const real t1348 = t1347 * t675;
-    const real t1349 = t1324 * t507;
-    const real t1350 = t1321 * t529;
-    const real t1351 = t1349 + t1350;
-    const real t1352 = t1351 * t653;
-    const real t1353 = t1348 - t1352;
-    const real t1354 = t1353 * t678;
-    const real t1355 = t1345 + t1354;
-    const real t1356 = t1355 * t681;
-    const real t1357 = t1341 + t1356;
-    const real t1358 = t1357 * t702;
-    const real t1359 = t1337 + t1358;
-    const real t1360 = t1359 * t968;
-    const real t1361 = t1357 * t688;
-    const real t1362 = t1336 * t702;
-    const real t1363 = t1361 - t1362;
-    const real t1364 = t1363 * t863;
-    const real t1365 = t1355 * t635;
-    const real t1366 = t1340 * t681;
-    const real t1367 = t1365 - t1366;
-    const real t1368 = t1367 * t810;
-    const real t1369 = t1353 * t644;
-    const real t1370 = t1344 * t678;
-    const real t1371 = t1369 - t1370;
-    const real t1372 = t1371 * t819;
-    const real t1373 = t1347 * t653;
-    const real t1374 = t1351 * t675;
-    const real t1375 = t1373 + t1374;
-    const real t1376 = t1375 * t828;
-    const real t1377 = t1346 * t665;
-    const real t1378 = t1377 * t837;
-    const real t1379 = t1378 * t850;
-    const real t1380 = t1376 - t1379;
-    const real t1381 = t1380 * t853;
-    const real t1382 = t1372 + t1381;
-    const real t1383 = t1382 * t856;
-    const real t1384 = t1368 + t1383;
-    const real t1385 = t1384 * t883;
-    const real t1386 = t1364 + t1385;
-    const real t1387 = t1386 * t943;
-    const real t1388 = t1384 * t863;
-    const real t1389 = t1363 * t883;
-    const real t1390 = t1388 - t1389;
-    const real t1391 = t1390 * t954;
-    const real t1392 = t1382 * t810;
-    const real t1393 = t1367 * t856;
-    const real t1394 = t1392 - t1393;
-    const real t1395 = t1394 * t1048;
-    const real t1396 = t1380 * t819;
-    const real t1397 = t1371 * t853;
-    const real t1398 = t1396 - t1397;
-    const real t1399 = t1398 * t1140;
-    const real t1400 = t1377 * t847;
-    const real t1401 = 0.0 < t912;
-    const real t1402 = t1401 != 0 ? t912 : 1.0;
-    const real t1403 = 1.0 / t1402;
-    const real t1404 = t901 * t1403;
-    const real t1405 = -t1404;
-    const real t1406 = t1401 != 0 ? t1405 : 1.0;
-    const real t1407 = t1400 * t1406;
-    const real t1408 = t912 * t1257;
-    const real t1409 = t1407 * t1408;
-    const real t1410 = t1378 * t828;
-    const real t1411 = t1375 * t850;
-    const real t1412 = t1410 + t1411;
-    const real t1413 = t1412 * t1259;
-    const real t1414 = t1409 - t1413;
-    const real t1415 = t1414 * t1261;
-    const real t1416 = t1399 + t1415;
-    const real t1417 = t1416 * t1142;
-    const real t1418 = t1395 + t1417;
-    const real t1419 = t1418 * t1050;
-    const real t1420 = t1391 + t1419;
-    const real t1421 = t1420 * t956;
-    const real t1422 = t948 * t1421;
-    const real t1423 = t1387 - t1422;
-    const real t1424 = t973 * t1423;
-    const real t1425 = t1360 - t1424;
-    const real t1426 = t979 * t1421;
-    const real t1427 = t1425 - t1426;
-    const real t1428 = t966 * t1427;
-    const real t1429 = t1333 - t1428;
-    const real t1430 = t938 * t1423;
-    const real t1431 = t1429 - t1430;
-    const real t1432 = t988 * t1421;
-    const real t1433 = t1431 - t1432;
-    const real t1434 = t933 * t1433;
-    const real t1435 = t1306 - t1434;
-    const real t1436 = t996 * t1427;
-    const real t1437 = t1435 - t1436;
-    const real t1438 = t1002 * t1423;
-    const real t1439 = t1437 - t1438;
-    const real t1440 = t1008 * t1421;
-    const real t1441 = t1439 - t1440;
-    G[4] = t1441;
-    const real t1442 = U[5] * t425;
-    const real t1443 = U[10] * t383;
-    const real t1444 = U[14] * t389;
-    const real t1445 = U[17] * t395;
-    const real t1446 = U[19] * t401;
-    const real t1447 = U[20] * t407;
-    const real t1448 = t1447 * t409;
-    const real t1449 = t1446 + t1448;
-    const real t1450 = t1449 * t412;
-    const real t1451 = t1445 + t1450;
-    const real t1452 = t1451 * t415;
-    const real t1453 = t1444 + t1452;
-    const real t1454 = t1453 * t418;
-    const real t1455 = t1443 + t1454;
-    const real t1456 = t1455 * t427;
-    const real t1457 = t1442 + t1456;
-    const real t1458 = t1457 * t928;
-    const real t1459 = t1455 * t425;
-    const real t1460 = U[5] * t427;
-    const real t1461 = t1459 - t1460;
-    const real t1462 = t1461 * t542;
-    const real t1463 = t1453 * t383;
-    const real t1464 = U[10] * t418;
-    const real t1465 = t1463 - t1464;
-    const real t1466 = t1465 * t489;
-    const real t1467 = t1451 * t389;
-    const real t1468 = U[14] * t415;
-    const real t1469 = t1467 - t1468;
-    const real t1470 = t1469 * t498;
-    const real t1471 = t1449 * t395;
-    const real t1472 = U[17] * t412;
-    const real t1473 = t1471 - t1472;
-    const real t1474 = t1473 * t507;
-    const real t1475 = t1447 * t401;
-    const real t1476 = U[19] * t409;
-    const real t1477 = t1475 - t1476;
-    const real t1478 = t1477 * t516;
-    const real t1479 = U[20] * t447;
-    const real t1480 = t1479 * t524;
-    const real t1481 = t1480 * t526;
-    const real t1482 = t1478 - t1481;
-    const real t1483 = t1482 * t529;
-    const real t1484 = t1474 + t1483;
-    const real t1485 = t1484 * t532;
-    const real t1486 = t1470 + t1485;
-    const real t1487 = t1486 * t535;
-    const real t1488 = t1466 + t1487;
-    const real t1489 = t1488 * t550;
-    const real t1490 = t1462 + t1489;
-    const real t1491 = t1490 * t937;
-    const real t1492 = t1488 * t542;
-    const real t1493 = t1461 * t550;
-    const real t1494 = t1492 - t1493;
-    const real t1495 = t1494 * t688;
-    const real t1496 = t1486 * t489;
-    const real t1497 = t1465 * t535;
-    const real t1498 = t1496 - t1497;
-    const real t1499 = t1498 * t635;
-    const real t1500 = t1484 * t498;
-    const real t1501 = t1469 * t532;
-    const real t1502 = t1500 - t1501;
-    const real t1503 = t1502 * t644;
-    const real t1504 = t1482 * t507;
-    const real t1505 = t1473 * t529;
-    const real t1506 = t1504 - t1505;
-    const real t1507 = t1506 * t653;
-    const real t1508 = t1479 * t570;
-    const real t1509 = t1508 * t660;
-    const real t1510 = t1509 * t665;
-    const real t1511 = t1480 * t516;
-    const real t1512 = t1477 * t526;
-    const real t1513 = t1511 + t1512;
-    const real t1514 = t1513 * t672;
-    const real t1515 = t1510 - t1514;
-    const real t1516 = t1515 * t675;
-    const real t1517 = t1507 + t1516;
-    const real t1518 = t1517 * t678;
-    const real t1519 = t1503 + t1518;
-    const real t1520 = t1519 * t681;
-    const real t1521 = t1499 + t1520;
-    const real t1522 = t1521 * t702;
-    const real t1523 = t1495 + t1522;
-    const real t1524 = t1523 * t968;
-    const real t1525 = t1521 * t688;
-    const real t1526 = t1494 * t702;
-    const real t1527 = t1525 - t1526;
-    const real t1528 = t1527 * t863;
-    const real t1529 = t1519 * t635;
-    const real t1530 = t1498 * t681;
-    const real t1531 = t1529 - t1530;
-    const real t1532 = t1531 * t810;
-    const real t1533 = t1517 * t644;
-    const real t1534 = t1502 * t678;
-    const real t1535 = t1533 - t1534;
-    const real t1536 = t1535 * t819;
-    const real t1537 = t1515 * t653;
-    const real t1538 = t1506 * t675;
-    const real t1539 = t1537 - t1538;
-    const real t1540 = t1539 * t828;
-    const real t1541 = t1509 * t672;
-    const real t1542 = t1513 * t665;
-    const real t1543 = t1541 + t1542;
-    const real t1544 = t1543 * t837;
-    const real t1545 = t1508 * t722;
-    const real t1546 = t1545 * t845;
-    const real t1547 = t1546 * t847;
-    const real t1548 = t1544 - t1547;
-    const real t1549 = t1548 * t850;
-    const real t1550 = t1540 + t1549;
-    const real t1551 = t1550 * t853;
-    const real t1552 = t1536 + t1551;
-    const real t1553 = t1552 * t856;
-    const real t1554 = t1532 + t1553;
-    const real t1555 = t1554 * t883;
-    const real t1556 = t1528 + t1555;
-    const real t1557 = t1556 * t943;
-    const real t1558 = t1554 * t863;
-    const real t1559 = t1527 * t883;
-    const real t1560 = t1558 - t1559;
-    const real t1561 = t1560 * t954;
-    const real t1562 = t1552 * t810;
-    const real t1563 = t1531 * t856;
-    const real t1564 = t1562 - t1563;
-    const real t1565 = t1564 * t1048;
-    const real t1566 = t1550 * t819;
-    const real t1567 = t1535 * t853;
-    const real t1568 = t1566 - t1567;
-    const real t1569 = t1568 * t1140;
-    const real t1570 = t1548 * t828;
-    const real t1571 = t1539 * t850;
-    const real t1572 = t1570 - t1571;
-    const real t1573 = t1572 * t1259;
-    const real t1574 = t1545 * t903;
-    const real t1575 = 0.0 < t909;
-    const real t1576 = t1575 != 0 ? t909 : 1.0;
-    const real t1577 = 1.0 / t1576;
-    const real t1578 = t904 * t1577;
-    const real t1579 = t1575 != 0 ? t1578 : 1.0;
-    const real t1580 = t1574 * t1579;
-    const real t1581 = t909 * t1403;
-    const real t1582 = t1580 * t1581;
-    const real t1583 = t1546 * t837;
-    const real t1584 = t1543 * t847;
-    const real t1585 = t1583 + t1584;
-    const real t1586 = t1585 * t1406;
-    const real t1587 = t1582 - t1586;
-    const real t1588 = t1587 * t1408;
-    const real t1589 = t1573 + t1588;
-    const real t1590 = t1589 * t1261;
-    const real t1591 = t1569 + t1590;
-    const real t1592 = t1591 * t1142;
-    const real t1593 = t1565 + t1592;
-    const real t1594 = t1593 * t1050;
-    const real t1595 = t1561 + t1594;
-    const real t1596 = t1595 * t956;
-    const real t1597 = t948 * t1596;
-    const real t1598 = t1557 - t1597;
-    const real t1599 = t973 * t1598;
-    const real t1600 = t1524 - t1599;
-    const real t1601 = t979 * t1596;
-    const real t1602 = t1600 - t1601;
-    const real t1603 = t966 * t1602;
-    const real t1604 = t1491 - t1603;
-    const real t1605 = t938 * t1598;
-    const real t1606 = t1604 - t1605;
-    const real t1607 = t988 * t1596;
-    const real t1608 = t1606 - t1607;
-    const real t1609 = t933 * t1608;
-    const real t1610 = t1458 - t1609;
-    const real t1611 = t996 * t1602;
-    const real t1612 = t1610 - t1611;
-    const real t1613 = t1002 * t1598;
-    const real t1614 = t1612 - t1613;
-    const real t1615 = t1008 * t1596;
-    const real t1616 = t1614 - t1615;
-    G[5] = t1616;
-    G[6] = t990;
-    G[7] = t1069;
-    G[8] = t1163;
-    G[9] = t1284;
-    G[10] = t1433;
-    G[11] = t1608;
-    G[12] = t981;
-    G[13] = t1063;
-    G[14] = t1157;
-    G[15] = t1278;
-    G[16] = t1427;
-    G[17] = t1602;
-    const real t1617 = -t959;
-    G[18] = t1617;
-    G[19] = t1059;
-    G[20] = t1153;
-    G[21] = t1274;
-    G[22] = t1423;
-    G[23] = t1598;
-    G[24] = t957;
-    G[25] = t1057;
-    G[26] = t1151;
-    G[27] = t1272;
-    G[28] = t1421;
-    G[29] = t1596;
-    const real t1618 = t10 * 1e-26;
-    const real t1619 = t1618 < t10;
-    const real t1620 = t1619 != 0 ? 0.0 : e[0];
-    const real t1621 = H[0] * t1620;
-    const real t1622 = t8 + t11;
-    const real t1623 = 1e-26 * t1622;
-    const real t1624 = t1623 < t8;
-    const real t1625 = 1.0 / U[0];
-    const real t1626 = e[0] * t1625;
-    const real t1627 = t1619 != 0 ? t1626 : 0.0;
-    const real t1628 = U[1] * t1627;
-    const real t1629 = e[1] - t1628;
-    const real t1630 = t1624 != 0 ? 0.0 : t1629;
-    const real t1631 = H[5] * t1630;
-    const real t1632 = t1621 + t1631;
-    const real t1633 = t9 + t7;
-    const real t1634 = t6 + t1633;
-    const real t1635 = 1e-26 * t1634;
-    const real t1636 = t1635 < t6;
-    const real t1637 = U[2] * t1627;
-    const real t1638 = 1.0 / U[6];
-    const real t1639 = t1629 * t1638;
-    const real t1640 = t1624 != 0 ? t1639 : 0.0;
-    const real t1641 = U[7] * t1640;
-    const real t1642 = t1637 + t1641;
-    const real t1643 = e[2] - t1642;
-    const real t1644 = t1636 != 0 ? 0.0 : t1643;
-    const real t1645 = H[10] * t1644;
-    const real t1646 = t1632 + t1645;
-    const real t1647 = t39 + t37;
-    const real t1648 = t34 + t1647;
-    const real t1649 = t31 + t1648;
-    const real t1650 = 1e-26 * t1649;
-    const real t1651 = t1650 < t31;
-    const real t1652 = 1.0 / U[11];
-    const real t1653 = t1643 * t1652;
-    const real t1654 = t1636 != 0 ? t1653 : 0.0;
-    const real t1655 = U[12] * t1654;
-    const real t1656 = U[3] * t1627;
-    const real t1657 = U[8] * t1640;
-    const real t1658 = t1656 + t1657;
-    const real t1659 = t1655 + t1658;
-    const real t1660 = e[3] - t1659;
-    const real t1661 = t1651 != 0 ? 0.0 : t1660;
-    const real t1662 = H[15] * t1661;
-    const real t1663 = t1646 + t1662;
-    const real t1664 = t40 + t36;
-    const real t1665 = t33 + t1664;
-    const real t1666 = t30 + t1665;
-    const real t1667 = t28 + t1666;
-    const real t1668 = 1e-26 * t1667;
-    const real t1669 = t1668 < t28;
-    const real t1670 = 1.0 / U[15];
-    const real t1671 = t1660 * t1670;
-    const real t1672 = t1651 != 0 ? t1671 : 0.0;
-    const real t1673 = U[16] * t1672;
-    const real t1674 = U[13] * t1654;
-    const real t1675 = U[4] * t1627;
-    const real t1676 = U[9] * t1640;
-    const real t1677 = t1675 + t1676;
-    const real t1678 = t1674 + t1677;
-    const real t1679 = t1673 + t1678;
-    const real t1680 = e[4] - t1679;
-    const real t1681 = t1669 != 0 ? 0.0 : t1680;
-    const real t1682 = H[20] * t1681;
-    const real t1683 = t1663 + t1682;
-    const real t1684 = t38 + t35;
-    const real t1685 = t32 + t1684;
-    const real t1686 = t29 + t1685;
-    const real t1687 = t27 + t1686;
-    const real t1688 = t26 + t1687;
-    const real t1689 = 1e-26 * t1688;
-    const real t1690 = t1689 < t26;
-    const real t1691 = 1.0 / U[18];
-    const real t1692 = t1680 * t1691;
-    const real t1693 = t1669 != 0 ? t1692 : 0.0;
-    const real t1694 = U[19] * t1693;
-    const real t1695 = U[17] * t1672;
-    const real t1696 = U[14] * t1654;
-    const real t1697 = U[5] * t1627;
-    const real t1698 = U[10] * t1640;
-    const real t1699 = t1697 + t1698;
-    const real t1700 = t1696 + t1699;
-    const real t1701 = t1695 + t1700;
-    const real t1702 = t1694 + t1701;
-    const real t1703 = e[5] - t1702;
-    const real t1704 = t1690 != 0 ? 0.0 : t1703;
-    const real t1705 = H[25] * t1704;
-    const real t1706 = t1683 + t1705;
-    const real t1707 = tau[0] - t1706;
-    const real t1708 = t1707 * t928;
-    const real t1709 = d[0] + t1627;
-    const real t1710 = t1709 * t425;
-    const real t1711 = d[1] + t1640;
-    const real t1712 = t1711 * t383;
-    const real t1713 = d[2] + t1654;
-    const real t1714 = t1713 * t389;
-    const real t1715 = d[3] + t1672;
-    const real t1716 = t1715 * t395;
-    const real t1717 = d[4] + t1693;
-    const real t1718 = t1717 * t401;
-    const real t1719 = 1.0 / U[20];
-    const real t1720 = t1703 * t1719;
-    const real t1721 = t1690 != 0 ? t1720 : 0.0;
-    const real t1722 = d[5] + t1721;
-    const real t1723 = t1722 * t407;
-    const real t1724 = t1723 * t409;
-    const real t1725 = t1718 + t1724;
-    const real t1726 = t1725 * t412;
-    const real t1727 = t1716 + t1726;
-    const real t1728 = t1727 * t415;
-    const real t1729 = t1714 + t1728;
-    const real t1730 = t1729 * t418;
-    const real t1731 = t1712 + t1730;
-    const real t1732 = t1731 * t427;
-    const real t1733 = t1710 + t1732;
-    const real t1734 = t1708 - t1733;
-    const real t1735 = t928 * t1734;
-    const real t1736 = H[1] * t1620;
-    const real t1737 = H[6] * t1630;
-    const real t1738 = t1736 + t1737;
-    const real t1739 = H[11] * t1644;
-    const real t1740 = t1738 + t1739;
-    const real t1741 = H[16] * t1661;
-    const real t1742 = t1740 + t1741;
-    const real t1743 = H[21] * t1681;
-    const real t1744 = t1742 + t1743;
-    const real t1745 = H[26] * t1704;
-    const real t1746 = t1744 + t1745;
-    const real t1747 = tau[1] - t1746;
-    const real t1748 = t1707 * t933;
-    const real t1749 = t1747 - t1748;
-    const real t1750 = t937 * t1749;
-    const real t1751 = t1731 * t425;
-    const real t1752 = t1709 * t427;
-    const real t1753 = t1751 - t1752;
-    const real t1754 = t1753 * t542;
-    const real t1755 = t1729 * t383;
-    const real t1756 = t1711 * t418;
-    const real t1757 = t1755 - t1756;
-    const real t1758 = t1757 * t489;
-    const real t1759 = t1727 * t389;
-    const real t1760 = t1713 * t415;
-    const real t1761 = t1759 - t1760;
-    const real t1762 = t1761 * t498;
-    const real t1763 = t1725 * t395;
-    const real t1764 = t1715 * t412;
-    const real t1765 = t1763 - t1764;
-    const real t1766 = t1765 * t507;
-    const real t1767 = t1723 * t401;
-    const real t1768 = t1717 * t409;
-    const real t1769 = t1767 - t1768;
-    const real t1770 = t1769 * t516;
-    const real t1771 = t1722 * t447;
-    const real t1772 = t1771 * t524;
-    const real t1773 = t1772 * t526;
-    const real t1774 = t1770 - t1773;
-    const real t1775 = t1774 * t529;
-    const real t1776 = t1766 + t1775;
-    const real t1777 = t1776 * t532;
-    const real t1778 = t1762 + t1777;
-    const real t1779 = t1778 * t535;
-    const real t1780 = t1758 + t1779;
-    const real t1781 = t1780 * t550;
-    const real t1782 = t1754 + t1781;
-    const real t1783 = t1750 - t1782;
-    const real t1784 = t937 * t1783;
-    const real t1785 = H[2] * t1620;
-    const real t1786 = H[7] * t1630;
-    const real t1787 = t1785 + t1786;
-    const real t1788 = H[12] * t1644;
-    const real t1789 = t1787 + t1788;
-    const real t1790 = H[17] * t1661;
-    const real t1791 = t1789 + t1790;
-    const real t1792 = H[22] * t1681;
-    const real t1793 = t1791 + t1792;
-    const real t1794 = H[27] * t1704;
-    const real t1795 = t1793 + t1794;
-    const real t1796 = tau[2] - t1795;
-    const real t1797 = t1707 * t996;
-    const real t1798 = t1796 - t1797;
-    const real t1799 = t966 * t1749;
-    const real t1800 = t1798 - t1799;
-    const real t1801 = t968 * t1800;
-    const real t1802 = t1780 * t542;
-    const real t1803 = t1753 * t550;
-    const real t1804 = t1802 - t1803;
-    const real t1805 = t1804 * t688;
-    const real t1806 = t1778 * t489;
-    const real t1807 = t1757 * t535;
-    const real t1808 = t1806 - t1807;
-    const real t1809 = t1808 * t635;
-    const real t1810 = t1776 * t498;
-    const real t1811 = t1761 * t532;
-    const real t1812 = t1810 - t1811;
-    const real t1813 = t1812 * t644;
-    const real t1814 = t1774 * t507;
-    const real t1815 = t1765 * t529;
-    const real t1816 = t1814 - t1815;
-    const real t1817 = t1816 * t653;
-    const real t1818 = t1771 * t570;
-    const real t1819 = t1818 * t660;
-    const real t1820 = t1819 * t665;
-    const real t1821 = t1772 * t516;
-    const real t1822 = t1769 * t526;
-    const real t1823 = t1821 + t1822;
-    const real t1824 = t1823 * t672;
-    const real t1825 = t1820 - t1824;
-    const real t1826 = t1825 * t675;
-    const real t1827 = t1817 + t1826;
-    const real t1828 = t1827 * t678;
-    const real t1829 = t1813 + t1828;
-    const real t1830 = t1829 * t681;
-    const real t1831 = t1809 + t1830;
-    const real t1832 = t1831 * t702;
-    const real t1833 = t1805 + t1832;
-    const real t1834 = t1801 - t1833;
-    const real t1835 = t968 * t1834;
-    const real t1836 = H[3] * t1620;
-    const real t1837 = H[8] * t1630;
-    const real t1838 = t1836 + t1837;
-    const real t1839 = H[13] * t1644;
-    const real t1840 = t1838 + t1839;
-    const real t1841 = H[18] * t1661;
-    const real t1842 = t1840 + t1841;
-    const real t1843 = H[23] * t1681;
-    const real t1844 = t1842 + t1843;
-    const real t1845 = H[28] * t1704;
-    const real t1846 = t1844 + t1845;
-    const real t1847 = tau[3] - t1846;
-    const real t1848 = t1707 * t1002;
-    const real t1849 = t1847 - t1848;
-    const real t1850 = t938 * t1749;
-    const real t1851 = t1849 - t1850;
-    const real t1852 = t973 * t1800;
-    const real t1853 = t1851 - t1852;
-    const real t1854 = t943 * t1853;
-    const real t1855 = t1831 * t688;
-    const real t1856 = t1804 * t702;
-    const real t1857 = t1855 - t1856;
-    const real t1858 = t1857 * t863;
-    const real t1859 = t1829 * t635;
-    const real t1860 = t1808 * t681;
-    const real t1861 = t1859 - t1860;
-    const real t1862 = t1861 * t810;
-    const real t1863 = t1827 * t644;
-    const real t1864 = t1812 * t678;
-    const real t1865 = t1863 - t1864;
-    const real t1866 = t1865 * t819;
-    const real t1867 = t1825 * t653;
-    const real t1868 = t1816 * t675;
-    const real t1869 = t1867 - t1868;
-    const real t1870 = t1869 * t828;
-    const real t1871 = t1819 * t672;
-    const real t1872 = t1823 * t665;
-    const real t1873 = t1871 + t1872;
-    const real t1874 = t1873 * t837;
-    const real t1875 = t1818 * t722;
-    const real t1876 = t1875 * t845;
-    const real t1877 = t1876 * t847;
-    const real t1878 = t1874 - t1877;
-    const real t1879 = t1878 * t850;
-    const real t1880 = t1870 + t1879;
-    const real t1881 = t1880 * t853;
-    const real t1882 = t1866 + t1881;
-    const real t1883 = t1882 * t856;
-    const real t1884 = t1862 + t1883;
-    const real t1885 = t1884 * t883;
-    const real t1886 = t1858 + t1885;
-    const real t1887 = t1854 - t1886;
-    const real t1888 = t943 * t1887;
-    const real t1889 = H[4] * t1620;
-    const real t1890 = H[9] * t1630;
-    const real t1891 = t1889 + t1890;
-    const real t1892 = H[14] * t1644;
-    const real t1893 = t1891 + t1892;
-    const real t1894 = H[19] * t1661;
-    const real t1895 = t1893 + t1894;
-    const real t1896 = H[24] * t1681;
-    const real t1897 = t1895 + t1896;
-    const real t1898 = H[29] * t1704;
-    const real t1899 = t1897 + t1898;
-    const real t1900 = tau[4] - t1899;
-    const real t1901 = t1707 * t1008;
-    const real t1902 = t1900 - t1901;
-    const real t1903 = t988 * t1749;
-    const real t1904 = t1902 - t1903;
-    const real t1905 = t979 * t1800;
-    const real t1906 = t1904 - t1905;
-    const real t1907 = t948 * t1853;
-    const real t1908 = t1906 - t1907;
-    const real t1909 = t956 * t1908;
-    const real t1910 = t1884 * t863;
-    const real t1911 = t1857 * t883;
-    const real t1912 = t1910 - t1911;
-    const real t1913 = t1912 * t954;
-    const real t1914 = t1882 * t810;
-    const real t1915 = t1861 * t856;
-    const real t1916 = t1914 - t1915;
-    const real t1917 = t1916 * t1048;
-    const real t1918 = t1880 * t819;
-    const real t1919 = t1865 * t853;
-    const real t1920 = t1918 - t1919;
-    const real t1921 = t1920 * t1140;
-    const real t1922 = t1878 * t828;
-    const real t1923 = t1869 * t850;
-    const real t1924 = t1922 - t1923;
-    const real t1925 = t1924 * t1259;
-    const real t1926 = t1875 * t903;
-    const real t1927 = t1926 * t1579;
-    const real t1928 = t1927 * t1581;
-    const real t1929 = t1876 * t837;
-    const real t1930 = t1873 * t847;
-    const real t1931 = t1929 + t1930;
-    const real t1932 = t1931 * t1406;
-    const real t1933 = t1928 - t1932;
-    const real t1934 = t1933 * t1408;
-    const real t1935 = t1925 + t1934;
-    const real t1936 = t1935 * t1261;
-    const real t1937 = t1921 + t1936;
-    const real t1938 = t1937 * t1142;
-    const real t1939 = t1917 + t1938;
-    const real t1940 = t1939 * t1050;
-    const real t1941 = t1913 + t1940;
-    const real t1942 = t1909 - t1941;
-    const real t1943 = t956 * t1942;
-    const real t1944 = t948 * t1943;
-    const real t1945 = t1888 - t1944;
-    const real t1946 = t973 * t1945;
-    const real t1947 = t1835 - t1946;
-    const real t1948 = t979 * t1943;
-    const real t1949 = t1947 - t1948;
-    const real t1950 = t966 * t1949;
-    const real t1951 = t1784 - t1950;
-    const real t1952 = t938 * t1945;
-    const real t1953 = t1951 - t1952;
-    const real t1954 = t988 * t1943;
-    const real t1955 = t1953 - t1954;
-    const real t1956 = t933 * t1955;
-    const real t1957 = t1735 - t1956;
-    const real t1958 = t996 * t1949;
-    const real t1959 = t1957 - t1958;
-    const real t1960 = t1002 * t1945;
-    const real t1961 = t1959 - t1960;
-    const real t1962 = t1008 * t1943;
-    const real t1963 = t1961 - t1962;
-    g[0] = t1963;
-    g[1] = t1955;
-    g[2] = t1949;
-    g[3] = t1945;
-    g[4] = t1943;
-    const real t1964 = t949 * t1050;
-    const real t1965 = -t1964;
-    const real t1966 = t1965 < 0.0;
-    const real t1967 = t1966 != 0 ? (-1.0) : 1.0;
-    const real t1968 = t1964 * t1967;
-    const real t1969 = -t1968;
-    V[0] = t1969;
-    const real t1970 = t1049 * t954;
-    const real t1971 = t1054 * t1050;
-    const real t1972 = t1970 + t1971;
-    const real t1973 = t1972 * t1967;
-    V[1] = t1973;
-    const real t1974 = t1148 * t954;
-    const real t1975 = t1133 * t1050;
-    const real t1976 = t1974 - t1975;
-    const real t1977 = t1976 * t1967;
-    V[2] = t1977;
-    const real t1978 = t1269 * t954;
-    const real t1979 = t1248 * t1050;
-    const real t1980 = t1978 - t1979;
-    const real t1981 = t1980 * t1967;
-    V[3] = t1981;
-    const real t1982 = t1418 * t954;
-    const real t1983 = t1390 * t1050;
-    const real t1984 = t1982 - t1983;
-    const real t1985 = t1984 * t1967;
-    V[4] = t1985;
-    const real t1986 = t1593 * t954;
-    const real t1987 = t1560 * t1050;
-    const real t1988 = t1986 - t1987;
-    const real t1989 = t1988 * t1967;
-    V[5] = t1989;
-    const real t1990 = t1043 * t1142;
-    const real t1991 = -t1990;
-    const real t1992 = t1991 < 0.0;
-    const real t1993 = t1992 != 0 ? (-1.0) : 1.0;
-    const real t1994 = t1990 * t1993;
-    const real t1995 = -t1994;
-    V[6] = t1995;
-    const real t1996 = t1141 * t1048;
-    const real t1997 = t1146 * t1142;
-    const real t1998 = t1996 + t1997;
-    const real t1999 = t1998 * t1993;
-    V[7] = t1999;
-    const real t2000 = t1267 * t1048;
-    const real t2001 = t1252 * t1142;
-    const real t2002 = t2000 - t2001;
-    const real t2003 = t2002 * t1993;
-    V[8] = t2003;
-    const real t2004 = t1416 * t1048;
-    const real t2005 = t1394 * t1142;
-    const real t2006 = t2004 - t2005;
-    const real t2007 = t2006 * t1993;
-    V[9] = t2007;
-    const real t2008 = t1591 * t1048;
-    const real t2009 = t1564 * t1142;
-    const real t2010 = t2008 - t2009;
-    const real t2011 = t2010 * t1993;
-    V[10] = t2011;
-    const real t2012 = t1135 * t1261;
-    const real t2013 = -t2012;
-    const real t2014 = t2013 < 0.0;
-    const real t2015 = t2014 != 0 ? (-1.0) : 1.0;
-    const real t2016 = t2012 * t2015;
-    const real t2017 = -t2016;
-    V[11] = t2017;
-    const real t2018 = t1260 * t1140;
-    const real t2019 = t1265 * t1261;
-    const real t2020 = t2018 + t2019;
-    const real t2021 = t2020 * t2015;
-    V[12] = t2021;
-    const real t2022 = t1414 * t1140;
-    const real t2023 = t1398 * t1261;
-    const real t2024 = t2022 - t2023;
-    const real t2025 = t2024 * t2015;
-    V[13] = t2025;
-    const real t2026 = t1589 * t1140;
-    const real t2027 = t1568 * t1261;
-    const real t2028 = t2026 - t2027;
-    const real t2029 = t2028 * t2015;
-    V[14] = t2029;
-    const real t2030 = t1254 * t1408;
-    const real t2031 = -t2030;
-    const real t2032 = t2031 < 0.0;
-    const real t2033 = t2032 != 0 ? (-1.0) : 1.0;
-    const real t2034 = t2030 * t2033;
-    const real t2035 = -t2034;
-    V[15] = t2035;
-    const real t2036 = t1407 * t1259;
-    const real t2037 = t1412 * t1408;
-    const real t2038 = t2036 + t2037;
-    const real t2039 = t2038 * t2033;
-    V[16] = t2039;
-    const real t2040 = t1587 * t1259;
-    const real t2041 = t1572 * t1408;
-    const real t2042 = t2040 - t2041;
-    const real t2043 = t2042 * t2033;
-    V[17] = t2043;
-    const real t2044 = t1400 * t1581;
-    const real t2045 = -t2044;
-    const real t2046 = t2045 < 0.0;
-    const real t2047 = t2046 != 0 ? (-1.0) : 1.0;
-    const real t2048 = t2044 * t2047;
-    const real t2049 = -t2048;
-    V[18] = t2049;
-    const real t2050 = t1580 * t1406;
-    const real t2051 = t1585 * t1581;
-    const real t2052 = t2050 + t2051;
-    const real t2053 = t2052 * t2047;
-    V[19] = t2053;
-    const real t2054 = t906 * t1577;
-    const real t2055 = t1574 * t2054;
-    const real t2056 = -t2055;
-    const real t2057 = t2056 < 0.0;
-    const real t2058 = t2057 != 0 ? (-1.0) : 1.0;
-    const real t2059 = t2055 * t2058;
-    const real t2060 = -t2059;
-    V[20] = t2060;
-    const real t2061 = t1939 * t954;
-    const real t2062 = t1912 * t1050;
-    const real t2063 = t2061 - t2062;
-    const real t2064 = t2063 * t1967;
-    d_V[0] = t2064;
-    const real t2065 = t1937 * t1048;
-    const real t2066 = t1916 * t1142;
-    const real t2067 = t2065 - t2066;
-    const real t2068 = t2067 * t1993;
-    d_V[1] = t2068;
-    const real t2069 = t1935 * t1140;
-    const real t2070 = t1920 * t1261;
-    const real t2071 = t2069 - t2070;
-    const real t2072 = t2071 * t2015;
-    d_V[2] = t2072;
-    const real t2073 = t1933 * t1259;
-    const real t2074 = t1924 * t1408;
-    const real t2075 = t2073 - t2074;
-    const real t2076 = t2075 * t2033;
-    d_V[3] = t2076;
-    const real t2077 = t1927 * t1406;
-    const real t2078 = t1931 * t1581;
-    const real t2079 = t2077 + t2078;
-    const real t2080 = t2079 * t2047;
-    d_V[4] = t2080;
-    const real t2081 = t1926 * t2054;
-    const real t2082 = t2081 * t2058;
-    const real t2083 = -t2082;
-    d_V[5] = t2083;
-    const real t2084 = t1707 * t1010;
-    const real t2085 = t1747 * t990;
-    const real t2086 = t2084 + t2085;
-    const real t2087 = t1796 * t981;
-    const real t2088 = t2086 + t2087;
-    const real t2089 = t1847 * t959;
-    const real t2090 = t2088 - t2089;
-    const real t2091 = t1900 * t957;
-    const real t2092 = t2090 + t2091;
-    const real t2093 = t1620 + t2092;
-    e_Q[0] = t2093;
-    const real t2094 = t1707 * t1077;
-    const real t2095 = t1747 * t1069;
-    const real t2096 = t2094 + t2095;
-    const real t2097 = t1796 * t1063;
-    const real t2098 = t2096 + t2097;
-    const real t2099 = t1847 * t1059;
-    const real t2100 = t2098 + t2099;
-    const real t2101 = t1900 * t1057;
-    const real t2102 = t2100 + t2101;
-    const real t2103 = t1630 + t2102;
-    e_Q[1] = t2103;
-    const real t2104 = t1707 * t1171;
-    const real t2105 = t1747 * t1163;
-    const real t2106 = t2104 + t2105;
-    const real t2107 = t1796 * t1157;
-    const real t2108 = t2106 + t2107;
-    const real t2109 = t1847 * t1153;
-    const real t2110 = t2108 + t2109;
-    const real t2111 = t1900 * t1151;
-    const real t2112 = t2110 + t2111;
-    const real t2113 = t1644 + t2112;
-    e_Q[2] = t2113;
-    const real t2114 = t1707 * t1292;
-    const real t2115 = t1747 * t1284;
-    const real t2116 = t2114 + t2115;
-    const real t2117 = t1796 * t1278;
-    const real t2118 = t2116 + t2117;
-    const real t2119 = t1847 * t1274;
-    const real t2120 = t2118 + t2119;
-    const real t2121 = t1900 * t1272;
-    const real t2122 = t2120 + t2121;
-    const real t2123 = t1661 + t2122;
-    e_Q[3] = t2123;
-    const real t2124 = t1707 * t1441;
-    const real t2125 = t1747 * t1433;
-    const real t2126 = t2124 + t2125;
-    const real t2127 = t1796 * t1427;
-    const real t2128 = t2126 + t2127;
-    const real t2129 = t1847 * t1423;
-    const real t2130 = t2128 + t2129;
-    const real t2131 = t1900 * t1421;
-    const real t2132 = t2130 + t2131;
-    const real t2133 = t1681 + t2132;
-    e_Q[4] = t2133;
-    const real t2134 = t1707 * t1616;
-    const real t2135 = t1747 * t1608;
-    const real t2136 = t2134 + t2135;
-    const real t2137 = t1796 * t1602;
-    const real t2138 = t2136 + t2137;
-    const real t2139 = t1847 * t1598;
-    const real t2140 = t2138 + t2139;
-    const real t2141 = t1900 * t1596;
-    const real t2142 = t2140 + t2141;
-    const real t2143 = t1704 + t2142;
-    e_Q[5] = t2143;
-    return 0;
+  real t6 = U[11] * U[11];
+  real t7 = U[7] * U[7];
+  real t8 = U[6] * U[6];
+  real t9 = U[2] * U[2];
+  real t10 = U[0] * U[0];
+  real t11 = U[1] * U[1];
+  real t17 = ((real)1 / (real)300000000000000) * (t6 + (t7 + (t8 + (t9 + (t10 + t11)))));
+  real t18 = (0.0 < floor_[0]) ? floor_[0] : t17;
+  real t26 = U[20] * U[20];
+  real t27 = U[19] * U[19];
+  real t28 = U[18] * U[18];
+  real t29 = U[17] * U[17];
+  real t30 = U[16] * U[16];
+  real t31 = U[15] * U[15];
+  real t32 = U[14] * U[14];
+  real t33 = U[13] * U[13];
+  real t34 = U[12] * U[12];
+  real t35 = U[10] * U[10];
+  real t36 = U[9] * U[9];
+  real t37 = U[8] * U[8];
+  real t38 = U[5] * U[5];
+  real t39 = U[3] * U[3];
+  real t40 = U[4] * U[4];
+  real t55 = ((real)1 / (real)300000000000000) * (t26 + (t27 + (t28 + (t29 + (t30 + (t31 + (t32 +
+    (t33 + (t34 + (t35 + (t36 + (t37 + (t38 + (t39 + t40))))))))))))));
+  real t56 = (0.0 < floor_[1]) ? floor_[1] : t55;
+  real t59 = H[25] * U[20];
+  real t60 = t59 * t59;
+  real t63 = H[20] * U[18] + H[25] * U[19];
+  real t64 = t63 * t63;
+  real t69 = H[15] * U[15] + H[20] * U[16] + H[25] * U[17];
+  real t70 = t69 * t69;
+  real t77 = H[10] * U[11] + H[15] * U[12] + H[20] * U[13] + H[25] * U[14];
+  real t78 = t77 * t77;
+  real t87 = H[5] * U[6] + H[10] * U[7] + H[15] * U[8] + H[20] * U[9] + H[25] * U[10];
+  real t88 = t87 * t87;
+  real t99 = H[0] * U[0] + H[5] * U[1] + H[10] * U[2] + H[15] * U[3] + H[20] * U[4] + H[25] * U[5];
+  real t100 = t99 * t99;
+  real t106 = t60 + (t64 + (t70 + (t78 + (t88 + (J[0] + t100)))));
+  if (!(((H[10] * H[10] + (H[0] * H[0] + H[5] * H[5])) * t18 + (H[25] * H[25] + (H[15] * H[15] + H[20] * H[20])) * t56 < t106))) return 1; /* speed 1 of 5 moves no inertia: its acceleration is undetermined */
+  real t121 = H[26] * U[20];
+  real t125 = H[21] * U[18] + H[26] * U[19];
+  real t131 = H[16] * U[15] + H[21] * U[16] + H[26] * U[17];
+  real t139 = H[11] * U[11] + H[16] * U[12] + H[21] * U[13] + H[26] * U[14];
+  real t149 = H[6] * U[6] + H[11] * U[7] + H[16] * U[8] + H[21] * U[9] + H[26] * U[10];
+  real t161 = H[1] * U[0] + H[6] * U[1] + H[11] * U[2] + H[16] * U[3] + H[21] * U[4] + H[26] * U[5];
+  real t168 = t121 * t121 + (t125 * t125 + (t131 * t131 + (t139 * t139 + (t149 * t149 + (J[1] + t161
+    * t161)))));
+  if (!((t18 * (H[11] * H[11] + (H[1] * H[1] + H[6] * H[6])) + t56 * (H[26] * H[26] + (H[16] * H[16] + H[21] * H[21])) < t168))) return 1; /* speed 2 of 5 moves no inertia: its acceleration is undetermined */
+  real t183 = H[27] * U[20];
+  real t187 = H[22] * U[18] + H[27] * U[19];
+  real t193 = H[17] * U[15] + H[22] * U[16] + H[27] * U[17];
+  real t201 = H[12] * U[11] + H[17] * U[12] + H[22] * U[13] + H[27] * U[14];
+  real t211 = H[7] * U[6] + H[12] * U[7] + H[17] * U[8] + H[22] * U[9] + H[27] * U[10];
+  real t223 = H[2] * U[0] + H[7] * U[1] + H[12] * U[2] + H[17] * U[3] + H[22] * U[4] + H[27] * U[5];
+  real t230 = t183 * t183 + (t187 * t187 + (t193 * t193 + (t201 * t201 + (t211 * t211 + (J[2] + t223
+    * t223)))));
+  if (!((t18 * (H[12] * H[12] + (H[2] * H[2] + H[7] * H[7])) + t56 * (H[27] * H[27] + (H[17] * H[17] + H[22] * H[22])) < t230))) return 1; /* speed 3 of 5 moves no inertia: its acceleration is undetermined */
+  real t245 = H[28] * U[20];
+  real t249 = H[23] * U[18] + H[28] * U[19];
+  real t255 = H[18] * U[15] + H[23] * U[16] + H[28] * U[17];
+  real t263 = H[13] * U[11] + H[18] * U[12] + H[23] * U[13] + H[28] * U[14];
+  real t273 = H[8] * U[6] + H[13] * U[7] + H[18] * U[8] + H[23] * U[9] + H[28] * U[10];
+  real t285 = H[3] * U[0] + H[8] * U[1] + H[13] * U[2] + H[18] * U[3] + H[23] * U[4] + H[28] * U[5];
+  real t292 = t245 * t245 + (t249 * t249 + (t255 * t255 + (t263 * t263 + (t273 * t273 + (J[3] + t285
+    * t285)))));
+  if (!((t18 * (H[13] * H[13] + (H[3] * H[3] + H[8] * H[8])) + t56 * (H[28] * H[28] + (H[18] * H[18] + H[23] * H[23])) < t292))) return 1; /* speed 4 of 5 moves no inertia: its acceleration is undetermined */
+  real t307 = H[29] * U[20];
+  real t311 = H[24] * U[18] + H[29] * U[19];
+  real t317 = H[19] * U[15] + H[24] * U[16] + H[29] * U[17];
+  real t325 = H[14] * U[11] + H[19] * U[12] + H[24] * U[13] + H[29] * U[14];
+  real t335 = H[9] * U[6] + H[14] * U[7] + H[19] * U[8] + H[24] * U[9] + H[29] * U[10];
+  real t347 = H[4] * U[0] + H[9] * U[1] + H[14] * U[2] + H[19] * U[3] + H[24] * U[4] + H[29] * U[5];
+  real t354 = t307 * t307 + (t311 * t311 + (t317 * t317 + (t325 * t325 + (t335 * t335 + (J[4] + t347
+    * t347)))));
+  if (!((t18 * (H[14] * H[14] + (H[4] * H[4] + H[9] * H[9])) + t56 * (H[29] * H[29] + (H[19] * H[19] + H[24] * H[24])) < t354))) return 1; /* speed 5 of 5 moves no inertia: its acceleration is undetermined */
+  real t357 = sqrt(J[0]);
+  real t360 = sqrt(t60 + t357 * t357);
+  real t363 = sqrt(t64 + t360 * t360);
+  real t366 = sqrt(t70 + t363 * t363);
+  real t369 = sqrt(t78 + t366 * t366);
+  real t372 = sqrt(t88 + t369 * t369);
+  real t375 = sqrt(t100 + t372 * t372);
+  if (!((1e-26 * t106 < t375 * t375))) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+  real t379 = 0.0 < t372;
+  real t381 = 1.0 / (t379 != 0 ? t372 : 1.0);
+  real t382 = t87 * t381;
+  real t383 = t379 != 0 ? t382 : 1.0;
+  real t385 = 0.0 < t369;
+  real t387 = 1.0 / (t385 != 0 ? t369 : 1.0);
+  real t388 = t77 * t387;
+  real t389 = t385 != 0 ? t388 : 1.0;
+  real t391 = 0.0 < t366;
+  real t393 = 1.0 / (t391 != 0 ? t366 : 1.0);
+  real t394 = t69 * t393;
+  real t395 = t391 != 0 ? t394 : 1.0;
+  real t397 = 0.0 < t363;
+  real t399 = 1.0 / (t397 != 0 ? t363 : 1.0);
+  real t400 = t63 * t399;
+  real t401 = t397 != 0 ? t400 : 1.0;
+  real t403 = 0.0 < t360;
+  real t405 = 1.0 / (t403 != 0 ? t360 : 1.0);
+  real t406 = t59 * t405;
+  real t407 = t403 != 0 ? t406 : 1.0;
+  real t408 = t121 * t407;
+  real t409 = t360 * t399;
+  real t411 = t125 * t401 + t408 * t409;
+  real t412 = t363 * t393;
+  real t414 = t131 * t395 + t411 * t412;
+  real t415 = t366 * t387;
+  real t417 = t139 * t389 + t414 * t415;
+  real t418 = t369 * t381;
+  real t420 = t149 * t383 + t417 * t418;
+  real t421 = 0.0 < t375;
+  real t423 = 1.0 / (t421 != 0 ? t375 : 1.0);
+  real t424 = t99 * t423;
+  real t425 = t421 != 0 ? t424 : 1.0;
+  real t427 = t372 * t423;
+  real t429 = t420 * t425 - t161 * t427;
+  real t433 = t417 * t383 - t149 * t418;
+  real t437 = t414 * t389 - t139 * t415;
+  real t441 = t411 * t395 - t131 * t412;
+  real t445 = t408 * t401 - t125 * t409;
+  real t447 = t357 * t405;
+  real t448 = t121 * t447;
+  real t450 = sqrt(J[1]);
+  real t453 = sqrt(t448 * t448 + t450 * t450);
+  real t456 = sqrt(t445 * t445 + t453 * t453);
+  real t459 = sqrt(t441 * t441 + t456 * t456);
+  real t462 = sqrt(t437 * t437 + t459 * t459);
+  real t465 = sqrt(t433 * t433 + t462 * t462);
+  real t468 = sqrt(t429 * t429 + t465 * t465);
+  if (!((1e-26 * t168 < t468 * t468))) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+  real t475 = t183 * t407;
+  real t477 = t187 * t401 + t475 * t409;
+  real t479 = t193 * t395 + t477 * t412;
+  real t481 = t201 * t389 + t479 * t415;
+  real t484 = t481 * t383 - t211 * t418;
+  real t485 = 0.0 < t465;
+  real t487 = 1.0 / (t485 != 0 ? t465 : 1.0);
+  real t488 = t433 * t487;
+  real t489 = t485 != 0 ? t488 : 1.0;
+  real t493 = t479 * t389 - t201 * t415;
+  real t494 = 0.0 < t462;
+  real t496 = 1.0 / (t494 != 0 ? t462 : 1.0);
+  real t497 = t437 * t496;
+  real t498 = t494 != 0 ? t497 : 1.0;
+  real t502 = t477 * t395 - t193 * t412;
+  real t503 = 0.0 < t459;
+  real t505 = 1.0 / (t503 != 0 ? t459 : 1.0);
+  real t506 = t441 * t505;
+  real t507 = t503 != 0 ? t506 : 1.0;
+  real t511 = t475 * t401 - t187 * t409;
+  real t512 = 0.0 < t456;
+  real t514 = 1.0 / (t512 != 0 ? t456 : 1.0);
+  real t515 = t445 * t514;
+  real t516 = t512 != 0 ? t515 : 1.0;
+  real t518 = t183 * t447;
+  real t519 = 0.0 < t453;
+  real t521 = 1.0 / (t519 != 0 ? t453 : 1.0);
+  real t523 = -(t448 * t521);
+  real t524 = t519 != 0 ? t523 : 1.0;
+  real t525 = t518 * t524;
+  real t526 = t453 * t514;
+  real t528 = t511 * t516 - t525 * t526;
+  real t529 = t456 * t505;
+  real t531 = t502 * t507 + t528 * t529;
+  real t532 = t459 * t496;
+  real t534 = t493 * t498 + t531 * t532;
+  real t535 = t462 * t487;
+  real t537 = t484 * t489 + t534 * t535;
+  real t538 = 0.0 < t468;
+  real t540 = 1.0 / (t538 != 0 ? t468 : 1.0);
+  real t541 = t429 * t540;
+  real t542 = t538 != 0 ? t541 : 1.0;
+  real t546 = t211 * t383 + t481 * t418;
+  real t549 = t546 * t425 - t223 * t427;
+  real t550 = t465 * t540;
+  real t552 = t537 * t542 - t549 * t550;
+  real t556 = t534 * t489 - t484 * t535;
+  real t560 = t531 * t498 - t493 * t532;
+  real t564 = t528 * t507 - t502 * t529;
+  real t568 = t525 * t516 + t511 * t526;
+  real t570 = t450 * t521;
+  real t571 = t518 * t570;
+  real t573 = sqrt(J[2]);
+  real t576 = sqrt(t571 * t571 + t573 * t573);
+  real t579 = sqrt(t568 * t568 + t576 * t576);
+  real t582 = sqrt(t564 * t564 + t579 * t579);
+  real t585 = sqrt(t560 * t560 + t582 * t582);
+  real t588 = sqrt(t556 * t556 + t585 * t585);
+  real t591 = sqrt(t552 * t552 + t588 * t588);
+  if (!((1e-26 * t230 < t591 * t591))) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+  real t597 = t245 * t407;
+  real t599 = t249 * t401 + t597 * t409;
+  real t601 = t255 * t395 + t599 * t412;
+  real t604 = t601 * t389 - t263 * t415;
+  real t608 = t599 * t395 - t255 * t412;
+  real t612 = t597 * t401 - t249 * t409;
+  real t614 = t245 * t447;
+  real t615 = t614 * t524;
+  real t617 = t612 * t516 - t615 * t526;
+  real t619 = t608 * t507 + t617 * t529;
+  real t621 = t604 * t498 + t619 * t532;
+  real t625 = t263 * t389 + t601 * t415;
+  real t628 = t625 * t383 - t273 * t418;
+  real t630 = t621 * t489 - t628 * t535;
+  real t631 = 0.0 < t588;
+  real t633 = 1.0 / (t631 != 0 ? t588 : 1.0);
+  real t634 = t556 * t633;
+  real t635 = t631 != 0 ? t634 : 1.0;
+  real t639 = t619 * t498 - t604 * t532;
+  real t640 = 0.0 < t585;
+  real t642 = 1.0 / (t640 != 0 ? t585 : 1.0);
+  real t643 = t560 * t642;
+  real t644 = t640 != 0 ? t643 : 1.0;
+  real t648 = t617 * t507 - t608 * t529;
+  real t649 = 0.0 < t582;
+  real t651 = 1.0 / (t649 != 0 ? t582 : 1.0);
+  real t652 = t564 * t651;
+  real t653 = t649 != 0 ? t652 : 1.0;
+  real t655 = t614 * t570;
+  real t656 = 0.0 < t576;
+  real t658 = 1.0 / (t656 != 0 ? t576 : 1.0);
+  real t659 = t571 * t658;
+  real t660 = t656 != 0 ? t659 : 1.0;
+  real t661 = t655 * t660;
+  real t662 = 0.0 < t579;
+  real t664 = 1.0 / (t662 != 0 ? t579 : 1.0);
+  real t665 = t576 * t664;
+  real t669 = t615 * t516 + t612 * t526;
+  real t671 = -(t568 * t664);
+  real t672 = t662 != 0 ? t671 : 1.0;
+  real t674 = t661 * t665 - t669 * t672;
+  real t675 = t579 * t651;
+  real t677 = t648 * t653 + t674 * t675;
+  real t678 = t582 * t642;
+  real t680 = t639 * t644 + t677 * t678;
+  real t681 = t585 * t633;
+  real t683 = t630 * t635 + t680 * t681;
+  real t684 = 0.0 < t591;
+  real t686 = 1.0 / (t684 != 0 ? t591 : 1.0);
+  real t687 = t552 * t686;
+  real t688 = t684 != 0 ? t687 : 1.0;
+  real t692 = t628 * t489 + t621 * t535;
+  real t696 = t273 * t383 + t625 * t418;
+  real t699 = t696 * t425 - t285 * t427;
+  real t701 = t692 * t542 - t699 * t550;
+  real t702 = t588 * t686;
+  real t704 = t683 * t688 - t701 * t702;
+  real t708 = t680 * t635 - t630 * t681;
+  real t712 = t677 * t644 - t639 * t678;
+  real t716 = t674 * t653 - t648 * t675;
+  real t720 = t661 * t672 + t669 * t665;
+  real t722 = t573 * t658;
+  real t723 = t655 * t722;
+  real t725 = sqrt(J[3]);
+  real t728 = sqrt(t723 * t723 + t725 * t725);
+  real t731 = sqrt(t720 * t720 + t728 * t728);
+  real t734 = sqrt(t716 * t716 + t731 * t731);
+  real t737 = sqrt(t712 * t712 + t734 * t734);
+  real t740 = sqrt(t708 * t708 + t737 * t737);
+  real t743 = sqrt(t704 * t704 + t740 * t740);
+  if (!((1e-26 * t292 < t743 * t743))) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+  real t748 = t307 * t407;
+  real t750 = t311 * t401 + t748 * t409;
+  real t753 = t750 * t395 - t317 * t412;
+  real t757 = t748 * t401 - t311 * t409;
+  real t759 = t307 * t447;
+  real t760 = t759 * t524;
+  real t762 = t757 * t516 - t760 * t526;
+  real t764 = t753 * t507 + t762 * t529;
+  real t768 = t317 * t395 + t750 * t412;
+  real t771 = t768 * t389 - t325 * t415;
+  real t773 = t764 * t498 - t771 * t532;
+  real t777 = t762 * t507 - t753 * t529;
+  real t779 = t759 * t570;
+  real t780 = t779 * t660;
+  real t784 = t760 * t516 + t757 * t526;
+  real t786 = t780 * t665 - t784 * t672;
+  real t788 = t777 * t653 + t786 * t675;
+  real t790 = t773 * t644 + t788 * t678;
+  real t794 = t771 * t498 + t764 * t532;
+  real t798 = t325 * t389 + t768 * t415;
+  real t801 = t798 * t383 - t335 * t418;
+  real t803 = t794 * t489 - t801 * t535;
+  real t805 = t790 * t635 - t803 * t681;
+  real t806 = 0.0 < t740;
+  real t808 = 1.0 / (t806 != 0 ? t740 : 1.0);
+  real t809 = t708 * t808;
+  real t810 = t806 != 0 ? t809 : 1.0;
+  real t814 = t788 * t644 - t773 * t678;
+  real t815 = 0.0 < t737;
+  real t817 = 1.0 / (t815 != 0 ? t737 : 1.0);
+  real t818 = t712 * t817;
+  real t819 = t815 != 0 ? t818 : 1.0;
+  real t823 = t786 * t653 - t777 * t675;
+  real t824 = 0.0 < t734;
+  real t826 = 1.0 / (t824 != 0 ? t734 : 1.0);
+  real t827 = t716 * t826;
+  real t828 = t824 != 0 ? t827 : 1.0;
+  real t832 = t780 * t672 + t784 * t665;
+  real t833 = 0.0 < t731;
+  real t835 = 1.0 / (t833 != 0 ? t731 : 1.0);
+  real t836 = t720 * t835;
+  real t837 = t833 != 0 ? t836 : 1.0;
+  real t839 = t779 * t722;
+  real t840 = 0.0 < t728;
+  real t842 = 1.0 / (t840 != 0 ? t728 : 1.0);
+  real t844 = -(t723 * t842);
+  real t845 = t840 != 0 ? t844 : 1.0;
+  real t846 = t839 * t845;
+  real t847 = t728 * t835;
+  real t849 = t832 * t837 - t846 * t847;
+  real t850 = t731 * t826;
+  real t852 = t823 * t828 + t849 * t850;
+  real t853 = t734 * t817;
+  real t855 = t814 * t819 + t852 * t853;
+  real t856 = t737 * t808;
+  real t858 = t805 * t810 + t855 * t856;
+  real t859 = 0.0 < t743;
+  real t861 = 1.0 / (t859 != 0 ? t743 : 1.0);
+  real t862 = t704 * t861;
+  real t863 = t859 != 0 ? t862 : 1.0;
+  real t867 = t803 * t635 + t790 * t681;
+  real t871 = t801 * t489 + t794 * t535;
+  real t875 = t335 * t383 + t798 * t418;
+  real t878 = t875 * t425 - t347 * t427;
+  real t880 = t871 * t542 - t878 * t550;
+  real t882 = t867 * t688 - t880 * t702;
+  real t883 = t740 * t861;
+  real t885 = t858 * t863 - t882 * t883;
+  real t889 = t855 * t810 - t805 * t856;
+  real t893 = t852 * t819 - t814 * t853;
+  real t897 = t849 * t828 - t823 * t850;
+  real t901 = t846 * t837 + t832 * t847;
+  real t903 = t725 * t842;
+  real t904 = t839 * t903;
+  real t906 = sqrt(J[4]);
+  real t909 = sqrt(t904 * t904 + t906 * t906);
+  real t912 = sqrt(t901 * t901 + t909 * t909);
+  real t915 = sqrt(t897 * t897 + t912 * t912);
+  real t918 = sqrt(t893 * t893 + t915 * t915);
+  real t921 = sqrt(t889 * t889 + t918 * t918);
+  real t924 = sqrt(t885 * t885 + t921 * t921);
+  if (!((1e-26 * t354 < t924 * t924))) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+  real t928 = 1.0 / t375;
+  real t933 = (t161 * t425 + t420 * t427) * t928;
+  real t937 = 1.0 / t468;
+  real t938 = (t699 * t542 + t692 * t550) * t937;
+  real t939 = U[0] * t427;
+  real t940 = t939 * t550;
+  real t941 = t940 * t702;
+  real t943 = 1.0 / t743;
+  real t948 = (t882 * t863 + t858 * t883) * t943;
+  real t949 = t941 * t883;
+  real t950 = 0.0 < t924;
+  real t952 = 1.0 / (t950 != 0 ? t924 : 1.0);
+  real t953 = t885 * t952;
+  real t954 = t950 != 0 ? t953 : 1.0;
+  real t956 = 1.0 / t924;
+  real t957 = t949 * t954 * t956;
+  real t959 = t941 * t863 * t943 + t948 * t957;
+  real t966 = (t549 * t542 + t537 * t550) * t937;
+  real t968 = 1.0 / t591;
+  real t973 = (t701 * t688 + t683 * t702) * t968;
+  real t979 = (t880 * t688 + t867 * t702) * t968;
+  real t981 = t940 * t688 * t968 + t973 * t959 - t979 * t957;
+  real t988 = (t878 * t542 + t871 * t550) * t937;
+  real t990 = t938 * t959 - (t939 * t542 * t937 + t966 * t981) - t988 * t957;
+  real t996 = (t223 * t425 + t546 * t427) * t928;
+  real t1002 = (t285 * t425 + t696 * t427) * t928;
+  real t1008 = (t347 * t425 + t875 * t427) * t928;
+  real t1010 = U[0] * t425 * t928 - t933 * t990 - t996 * t981 + t1002 * t959 - t1008 * t957;
+  G[0] = t1010;
+  real t1012 = U[6] * t383;
+  real t1018 = t1012 * t425 - U[1] * t427;
+  real t1020 = U[6] * t418;
+  real t1021 = t1020 * t489;
+  real t1025 = t1020 * t535;
+  real t1026 = t1025 * t635;
+  real t1030 = t1021 * t542 + t1018 * t550;
+  real t1036 = t1026 * t688 + t1030 * t702;
+  real t1038 = t1025 * t681;
+  real t1039 = t1038 * t810;
+  real t1043 = t1038 * t856;
+  real t1044 = 0.0 < t921;
+  real t1046 = 1.0 / (t1044 != 0 ? t921 : 1.0);
+  real t1047 = t889 * t1046;
+  real t1048 = t1044 != 0 ? t1047 : 1.0;
+  real t1049 = t1043 * t1048;
+  real t1050 = t921 * t952;
+  real t1054 = t1039 * t863 + t1036 * t883;
+  real t1057 = (t1049 * t1050 - t1054 * t954) * t956;
+  real t1059 = (t1036 * t863 - t1039 * t883) * t943 - t948 * t1057;
+  real t1063 = (t1026 * t702 - t1030 * t688) * t968 - t973 * t1059 - t979 * t1057;
+  real t1069 = (t1018 * t542 - t1021 * t550) * t937 - t966 * t1063 - t938 * t1059 - t988 * t1057;
+  real t1077 = (U[1] * t425 + t1012 * t427) * t928 - t933 * t1069 - t996 * t1063 - t1002 * t1059 -
+    t1008 * t1057;
+  G[1] = t1077;
+  real t1080 = U[11] * t389;
+  real t1082 = U[7] * t383 + t1080 * t418;
+  real t1088 = t1082 * t425 - U[2] * t427;
+  real t1092 = t1080 * t383 - U[7] * t418;
+  real t1094 = U[11] * t415;
+  real t1095 = t1094 * t498;
+  real t1097 = t1092 * t489 - t1095 * t535;
+  real t1103 = t1097 * t542 - t1088 * t550;
+  real t1105 = t1094 * t532;
+  real t1106 = t1105 * t644;
+  real t1110 = t1095 * t489 + t1092 * t535;
+  real t1112 = t1106 * t681 - t1110 * t635;
+  real t1118 = t1112 * t688 - t1103 * t702;
+  real t1122 = t1106 * t635 + t1110 * t681;
+  real t1124 = t1105 * t678;
+  real t1125 = t1124 * t819;
+  real t1127 = t1122 * t810 - t1125 * t856;
+  real t1133 = t1127 * t863 - t1118 * t883;
+  real t1135 = t1124 * t853;
+  real t1136 = 0.0 < t918;
+  real t1138 = 1.0 / (t1136 != 0 ? t918 : 1.0);
+  real t1139 = t893 * t1138;
+  real t1140 = t1136 != 0 ? t1139 : 1.0;
+  real t1141 = t1135 * t1140;
+  real t1142 = t918 * t1046;
+  real t1146 = t1125 * t810 + t1122 * t856;
+  real t1148 = t1141 * t1142 - t1146 * t1048;
+  real t1151 = (t1133 * t954 + t1148 * t1050) * t956;
+  real t1153 = (t1118 * t863 + t1127 * t883) * t943 - t948 * t1151;
+  real t1157 = (t1103 * t688 + t1112 * t702) * t968 - t973 * t1153 - t979 * t1151;
+  real t1163 = (t1088 * t542 + t1097 * t550) * t937 - t966 * t1157 - t938 * t1153 - t988 * t1151;
+  real t1171 = (U[2] * t425 + t1082 * t427) * t928 - t933 * t1163 - t996 * t1157 - t1002 * t1153 -
+    t1008 * t1151;
+  G[2] = t1171;
+  real t1175 = U[15] * t395;
+  real t1177 = U[12] * t389 + t1175 * t415;
+  real t1179 = U[8] * t383 + t1177 * t418;
+  real t1185 = t1179 * t425 - U[3] * t427;
+  real t1189 = t1177 * t383 - U[8] * t418;
+  real t1193 = t1175 * t389 - U[12] * t415;
+  real t1195 = U[15] * t412;
+  real t1196 = t1195 * t507;
+  real t1198 = t1193 * t498 - t1196 * t532;
+  real t1200 = t1189 * t489 + t1198 * t535;
+  real t1206 = t1200 * t542 - t1185 * t550;
+  real t1210 = t1198 * t489 - t1189 * t535;
+  real t1212 = t1195 * t529;
+  real t1213 = t1212 * t653;
+  real t1217 = t1196 * t498 + t1193 * t532;
+  real t1219 = t1213 * t678 - t1217 * t644;
+  real t1221 = t1210 * t635 + t1219 * t681;
+  real t1227 = t1221 * t688 - t1206 * t702;
+  real t1231 = t1219 * t635 - t1210 * t681;
+  real t1235 = t1213 * t644 + t1217 * t678;
+  real t1237 = t1212 * t675;
+  real t1238 = t1237 * t828;
+  real t1240 = t1235 * t819 - t1238 * t853;
+  real t1242 = t1231 * t810 + t1240 * t856;
+  real t1248 = t1242 * t863 - t1227 * t883;
+  real t1252 = t1240 * t810 - t1231 * t856;
+  real t1254 = t1237 * t850;
+  real t1255 = 0.0 < t915;
+  real t1257 = 1.0 / (t1255 != 0 ? t915 : 1.0);
+  real t1258 = t897 * t1257;
+  real t1259 = t1255 != 0 ? t1258 : 1.0;
+  real t1260 = t1254 * t1259;
+  real t1261 = t915 * t1138;
+  real t1265 = t1238 * t819 + t1235 * t853;
+  real t1267 = t1260 * t1261 - t1265 * t1140;
+  real t1269 = t1252 * t1048 + t1267 * t1142;
+  real t1272 = (t1248 * t954 + t1269 * t1050) * t956;
+  real t1274 = (t1227 * t863 + t1242 * t883) * t943 - t948 * t1272;
+  real t1278 = (t1206 * t688 + t1221 * t702) * t968 - t973 * t1274 - t979 * t1272;
+  real t1284 = (t1185 * t542 + t1200 * t550) * t937 - t966 * t1278 - t938 * t1274 - t988 * t1272;
+  real t1292 = (U[3] * t425 + t1179 * t427) * t928 - t933 * t1284 - t996 * t1278 - t1002 * t1274 -
+    t1008 * t1272;
+  G[3] = t1292;
+  real t1297 = U[18] * t401;
+  real t1299 = U[16] * t395 + t1297 * t412;
+  real t1301 = U[13] * t389 + t1299 * t415;
+  real t1303 = U[9] * t383 + t1301 * t418;
+  real t1309 = t1303 * t425 - U[4] * t427;
+  real t1313 = t1301 * t383 - U[9] * t418;
+  real t1317 = t1299 * t389 - U[13] * t415;
+  real t1321 = t1297 * t395 - U[16] * t412;
+  real t1323 = U[18] * t409;
+  real t1324 = t1323 * t516;
+  real t1326 = t1321 * t507 - t1324 * t529;
+  real t1328 = t1317 * t498 + t1326 * t532;
+  real t1330 = t1313 * t489 + t1328 * t535;
+  real t1336 = t1330 * t542 - t1309 * t550;
+  real t1340 = t1328 * t489 - t1313 * t535;
+  real t1344 = t1326 * t498 - t1317 * t532;
+  real t1346 = t1323 * t526;
+  real t1347 = t1346 * t672;
+  real t1351 = t1324 * t507 + t1321 * t529;
+  real t1353 = t1347 * t675 - t1351 * t653;
+  real t1355 = t1344 * t644 + t1353 * t678;
+  real t1357 = t1340 * t635 + t1355 * t681;
+  real t1363 = t1357 * t688 - t1336 * t702;
+  real t1367 = t1355 * t635 - t1340 * t681;
+  real t1371 = t1353 * t644 - t1344 * t678;
+  real t1375 = t1347 * t653 + t1351 * t675;
+  real t1377 = t1346 * t665;
+  real t1378 = t1377 * t837;
+  real t1380 = t1375 * t828 - t1378 * t850;
+  real t1382 = t1371 * t819 + t1380 * t853;
+  real t1384 = t1367 * t810 + t1382 * t856;
+  real t1390 = t1384 * t863 - t1363 * t883;
+  real t1394 = t1382 * t810 - t1367 * t856;
+  real t1398 = t1380 * t819 - t1371 * t853;
+  real t1400 = t1377 * t847;
+  real t1401 = 0.0 < t912;
+  real t1403 = 1.0 / (t1401 != 0 ? t912 : 1.0);
+  real t1405 = -(t901 * t1403);
+  real t1406 = t1401 != 0 ? t1405 : 1.0;
+  real t1407 = t1400 * t1406;
+  real t1408 = t912 * t1257;
+  real t1412 = t1378 * t828 + t1375 * t850;
+  real t1414 = t1407 * t1408 - t1412 * t1259;
+  real t1416 = t1398 * t1140 + t1414 * t1261;
+  real t1418 = t1394 * t1048 + t1416 * t1142;
+  real t1421 = (t1390 * t954 + t1418 * t1050) * t956;
+  real t1423 = (t1363 * t863 + t1384 * t883) * t943 - t948 * t1421;
+  real t1427 = (t1336 * t688 + t1357 * t702) * t968 - t973 * t1423 - t979 * t1421;
+  real t1433 = (t1309 * t542 + t1330 * t550) * t937 - t966 * t1427 - t938 * t1423 - t988 * t1421;
+  real t1441 = (U[4] * t425 + t1303 * t427) * t928 - t933 * t1433 - t996 * t1427 - t1002 * t1423 -
+    t1008 * t1421;
+  G[4] = t1441;
+  real t1447 = U[20] * t407;
+  real t1449 = U[19] * t401 + t1447 * t409;
+  real t1451 = U[17] * t395 + t1449 * t412;
+  real t1453 = U[14] * t389 + t1451 * t415;
+  real t1455 = U[10] * t383 + t1453 * t418;
+  real t1461 = t1455 * t425 - U[5] * t427;
+  real t1465 = t1453 * t383 - U[10] * t418;
+  real t1469 = t1451 * t389 - U[14] * t415;
+  real t1473 = t1449 * t395 - U[17] * t412;
+  real t1477 = t1447 * t401 - U[19] * t409;
+  real t1479 = U[20] * t447;
+  real t1480 = t1479 * t524;
+  real t1482 = t1477 * t516 - t1480 * t526;
+  real t1484 = t1473 * t507 + t1482 * t529;
+  real t1486 = t1469 * t498 + t1484 * t532;
+  real t1488 = t1465 * t489 + t1486 * t535;
+  real t1494 = t1488 * t542 - t1461 * t550;
+  real t1498 = t1486 * t489 - t1465 * t535;
+  real t1502 = t1484 * t498 - t1469 * t532;
+  real t1506 = t1482 * t507 - t1473 * t529;
+  real t1508 = t1479 * t570;
+  real t1509 = t1508 * t660;
+  real t1513 = t1480 * t516 + t1477 * t526;
+  real t1515 = t1509 * t665 - t1513 * t672;
+  real t1517 = t1506 * t653 + t1515 * t675;
+  real t1519 = t1502 * t644 + t1517 * t678;
+  real t1521 = t1498 * t635 + t1519 * t681;
+  real t1527 = t1521 * t688 - t1494 * t702;
+  real t1531 = t1519 * t635 - t1498 * t681;
+  real t1535 = t1517 * t644 - t1502 * t678;
+  real t1539 = t1515 * t653 - t1506 * t675;
+  real t1543 = t1509 * t672 + t1513 * t665;
+  real t1545 = t1508 * t722;
+  real t1546 = t1545 * t845;
+  real t1548 = t1543 * t837 - t1546 * t847;
+  real t1550 = t1539 * t828 + t1548 * t850;
+  real t1552 = t1535 * t819 + t1550 * t853;
+  real t1554 = t1531 * t810 + t1552 * t856;
+  real t1560 = t1554 * t863 - t1527 * t883;
+  real t1564 = t1552 * t810 - t1531 * t856;
+  real t1568 = t1550 * t819 - t1535 * t853;
+  real t1572 = t1548 * t828 - t1539 * t850;
+  real t1574 = t1545 * t903;
+  real t1575 = 0.0 < t909;
+  real t1577 = 1.0 / (t1575 != 0 ? t909 : 1.0);
+  real t1578 = t904 * t1577;
+  real t1579 = t1575 != 0 ? t1578 : 1.0;
+  real t1580 = t1574 * t1579;
+  real t1581 = t909 * t1403;
+  real t1585 = t1546 * t837 + t1543 * t847;
+  real t1587 = t1580 * t1581 - t1585 * t1406;
+  real t1589 = t1572 * t1259 + t1587 * t1408;
+  real t1591 = t1568 * t1140 + t1589 * t1261;
+  real t1593 = t1564 * t1048 + t1591 * t1142;
+  real t1596 = (t1560 * t954 + t1593 * t1050) * t956;
+  real t1598 = (t1527 * t863 + t1554 * t883) * t943 - t948 * t1596;
+  real t1602 = (t1494 * t688 + t1521 * t702) * t968 - t973 * t1598 - t979 * t1596;
+  real t1608 = (t1461 * t542 + t1488 * t550) * t937 - t966 * t1602 - t938 * t1598 - t988 * t1596;
+  real t1616 = (U[5] * t425 + t1455 * t427) * t928 - t933 * t1608 - t996 * t1602 - t1002 * t1598 -
+    t1008 * t1596;
+  G[5] = t1616;
+  G[6] = t990;
+  G[7] = t1069;
+  G[8] = t1163;
+  G[9] = t1284;
+  G[10] = t1433;
+  G[11] = t1608;
+  G[12] = t981;
+  G[13] = t1063;
+  G[14] = t1157;
+  G[15] = t1278;
+  G[16] = t1427;
+  G[17] = t1602;
+  G[18] = -t959;
+  G[19] = t1059;
+  G[20] = t1153;
+  G[21] = t1274;
+  G[22] = t1423;
+  G[23] = t1598;
+  G[24] = t957;
+  G[25] = t1057;
+  G[26] = t1151;
+  G[27] = t1272;
+  G[28] = t1421;
+  G[29] = t1596;
+  real t1619 = t10 * 1e-26 < t10;
+  real t1620 = t1619 != 0 ? 0.0 : e[0];
+  real t1624 = 1e-26 * (t8 + t11) < t8;
+  real t1626 = e[0] * (1.0 / U[0]);
+  real t1627 = t1619 != 0 ? t1626 : 0.0;
+  real t1629 = e[1] - U[1] * t1627;
+  real t1630 = t1624 != 0 ? 0.0 : t1629;
+  real t1636 = 1e-26 * (t6 + (t9 + t7)) < t6;
+  real t1639 = t1629 * (1.0 / U[6]);
+  real t1640 = t1624 != 0 ? t1639 : 0.0;
+  real t1643 = e[2] - (U[2] * t1627 + U[7] * t1640);
+  real t1644 = t1636 != 0 ? 0.0 : t1643;
+  real t1651 = 1e-26 * (t31 + (t34 + (t39 + t37))) < t31;
+  real t1653 = t1643 * (1.0 / U[11]);
+  real t1654 = t1636 != 0 ? t1653 : 0.0;
+  real t1660 = e[3] - (U[12] * t1654 + (U[3] * t1627 + U[8] * t1640));
+  real t1661 = t1651 != 0 ? 0.0 : t1660;
+  real t1669 = 1e-26 * (t28 + (t30 + (t33 + (t40 + t36)))) < t28;
+  real t1671 = t1660 * (1.0 / U[15]);
+  real t1672 = t1651 != 0 ? t1671 : 0.0;
+  real t1680 = e[4] - (U[16] * t1672 + (U[13] * t1654 + (U[4] * t1627 + U[9] * t1640)));
+  real t1681 = t1669 != 0 ? 0.0 : t1680;
+  real t1690 = 1e-26 * (t26 + (t27 + (t29 + (t32 + (t38 + t35))))) < t26;
+  real t1692 = t1680 * (1.0 / U[18]);
+  real t1693 = t1669 != 0 ? t1692 : 0.0;
+  real t1703 = e[5] - (U[19] * t1693 + (U[17] * t1672 + (U[14] * t1654 + (U[5] * t1627 + U[10] *
+    t1640))));
+  real t1704 = t1690 != 0 ? 0.0 : t1703;
+  real t1707 = tau[0] - (H[0] * t1620 + H[5] * t1630 + H[10] * t1644 + H[15] * t1661 + H[20] * t1681
+    + H[25] * t1704);
+  real t1709 = d[0] + t1627;
+  real t1711 = d[1] + t1640;
+  real t1713 = d[2] + t1654;
+  real t1715 = d[3] + t1672;
+  real t1717 = d[4] + t1693;
+  real t1720 = t1703 * (1.0 / U[20]);
+  real t1722 = d[5] + (t1690 != 0 ? t1720 : 0.0);
+  real t1723 = t1722 * t407;
+  real t1725 = t1717 * t401 + t1723 * t409;
+  real t1727 = t1715 * t395 + t1725 * t412;
+  real t1729 = t1713 * t389 + t1727 * t415;
+  real t1731 = t1711 * t383 + t1729 * t418;
+  real t1747 = tau[1] - (H[1] * t1620 + H[6] * t1630 + H[11] * t1644 + H[16] * t1661 + H[21] * t1681
+    + H[26] * t1704);
+  real t1749 = t1747 - t1707 * t933;
+  real t1753 = t1731 * t425 - t1709 * t427;
+  real t1757 = t1729 * t383 - t1711 * t418;
+  real t1761 = t1727 * t389 - t1713 * t415;
+  real t1765 = t1725 * t395 - t1715 * t412;
+  real t1769 = t1723 * t401 - t1717 * t409;
+  real t1771 = t1722 * t447;
+  real t1772 = t1771 * t524;
+  real t1774 = t1769 * t516 - t1772 * t526;
+  real t1776 = t1765 * t507 + t1774 * t529;
+  real t1778 = t1761 * t498 + t1776 * t532;
+  real t1780 = t1757 * t489 + t1778 * t535;
+  real t1796 = tau[2] - (H[2] * t1620 + H[7] * t1630 + H[12] * t1644 + H[17] * t1661 + H[22] * t1681
+    + H[27] * t1704);
+  real t1800 = t1796 - t1707 * t996 - t966 * t1749;
+  real t1804 = t1780 * t542 - t1753 * t550;
+  real t1808 = t1778 * t489 - t1757 * t535;
+  real t1812 = t1776 * t498 - t1761 * t532;
+  real t1816 = t1774 * t507 - t1765 * t529;
+  real t1818 = t1771 * t570;
+  real t1819 = t1818 * t660;
+  real t1823 = t1772 * t516 + t1769 * t526;
+  real t1825 = t1819 * t665 - t1823 * t672;
+  real t1827 = t1816 * t653 + t1825 * t675;
+  real t1829 = t1812 * t644 + t1827 * t678;
+  real t1831 = t1808 * t635 + t1829 * t681;
+  real t1847 = tau[3] - (H[3] * t1620 + H[8] * t1630 + H[13] * t1644 + H[18] * t1661 + H[23] * t1681
+    + H[28] * t1704);
+  real t1853 = t1847 - t1707 * t1002 - t938 * t1749 - t973 * t1800;
+  real t1857 = t1831 * t688 - t1804 * t702;
+  real t1861 = t1829 * t635 - t1808 * t681;
+  real t1865 = t1827 * t644 - t1812 * t678;
+  real t1869 = t1825 * t653 - t1816 * t675;
+  real t1873 = t1819 * t672 + t1823 * t665;
+  real t1875 = t1818 * t722;
+  real t1876 = t1875 * t845;
+  real t1878 = t1873 * t837 - t1876 * t847;
+  real t1880 = t1869 * t828 + t1878 * t850;
+  real t1882 = t1865 * t819 + t1880 * t853;
+  real t1884 = t1861 * t810 + t1882 * t856;
+  real t1900 = tau[4] - (H[4] * t1620 + H[9] * t1630 + H[14] * t1644 + H[19] * t1661 + H[24] * t1681
+    + H[29] * t1704);
+  real t1912 = t1884 * t863 - t1857 * t883;
+  real t1916 = t1882 * t810 - t1861 * t856;
+  real t1920 = t1880 * t819 - t1865 * t853;
+  real t1924 = t1878 * t828 - t1869 * t850;
+  real t1926 = t1875 * t903;
+  real t1927 = t1926 * t1579;
+  real t1931 = t1876 * t837 + t1873 * t847;
+  real t1933 = t1927 * t1581 - t1931 * t1406;
+  real t1935 = t1924 * t1259 + t1933 * t1408;
+  real t1937 = t1920 * t1140 + t1935 * t1261;
+  real t1939 = t1916 * t1048 + t1937 * t1142;
+  real t1943 = t956 * (t956 * (t1900 - t1707 * t1008 - t988 * t1749 - t979 * t1800 - t948 * t1853) -
+    (t1912 * t954 + t1939 * t1050));
+  real t1945 = t943 * (t943 * t1853 - (t1857 * t863 + t1884 * t883)) - t948 * t1943;
+  real t1949 = t968 * (t968 * t1800 - (t1804 * t688 + t1831 * t702)) - t973 * t1945 - t979 * t1943;
+  real t1955 = t937 * (t937 * t1749 - (t1753 * t542 + t1780 * t550)) - t966 * t1949 - t938 * t1945 -
+    t988 * t1943;
+  g[0] = t928 * (t1707 * t928 - (t1709 * t425 + t1731 * t427)) - t933 * t1955 - t996 * t1949 - t1002
+    * t1945 - t1008 * t1943;
+  g[1] = t1955;
+  g[2] = t1949;
+  g[3] = t1945;
+  g[4] = t1943;
+  real t1964 = t949 * t1050;
+  real t1967 = (-t1964 < 0.0) ? (-1.0) : 1.0;
+  V[0] = -(t1964 * t1967);
+  V[1] = (t1049 * t954 + t1054 * t1050) * t1967;
+  V[2] = (t1148 * t954 - t1133 * t1050) * t1967;
+  V[3] = (t1269 * t954 - t1248 * t1050) * t1967;
+  V[4] = (t1418 * t954 - t1390 * t1050) * t1967;
+  V[5] = (t1593 * t954 - t1560 * t1050) * t1967;
+  real t1990 = t1043 * t1142;
+  real t1993 = (-t1990 < 0.0) ? (-1.0) : 1.0;
+  V[6] = -(t1990 * t1993);
+  V[7] = (t1141 * t1048 + t1146 * t1142) * t1993;
+  V[8] = (t1267 * t1048 - t1252 * t1142) * t1993;
+  V[9] = (t1416 * t1048 - t1394 * t1142) * t1993;
+  V[10] = (t1591 * t1048 - t1564 * t1142) * t1993;
+  real t2012 = t1135 * t1261;
+  real t2015 = (-t2012 < 0.0) ? (-1.0) : 1.0;
+  V[11] = -(t2012 * t2015);
+  V[12] = (t1260 * t1140 + t1265 * t1261) * t2015;
+  V[13] = (t1414 * t1140 - t1398 * t1261) * t2015;
+  V[14] = (t1589 * t1140 - t1568 * t1261) * t2015;
+  real t2030 = t1254 * t1408;
+  real t2033 = (-t2030 < 0.0) ? (-1.0) : 1.0;
+  V[15] = -(t2030 * t2033);
+  V[16] = (t1407 * t1259 + t1412 * t1408) * t2033;
+  V[17] = (t1587 * t1259 - t1572 * t1408) * t2033;
+  real t2044 = t1400 * t1581;
+  real t2047 = (-t2044 < 0.0) ? (-1.0) : 1.0;
+  V[18] = -(t2044 * t2047);
+  V[19] = (t1580 * t1406 + t1585 * t1581) * t2047;
+  real t2054 = t906 * t1577;
+  real t2055 = t1574 * t2054;
+  real t2058 = (-t2055 < 0.0) ? (-1.0) : 1.0;
+  V[20] = -(t2055 * t2058);
+  d_V[0] = (t1939 * t954 - t1912 * t1050) * t1967;
+  d_V[1] = (t1937 * t1048 - t1916 * t1142) * t1993;
+  d_V[2] = (t1935 * t1140 - t1920 * t1261) * t2015;
+  d_V[3] = (t1933 * t1259 - t1924 * t1408) * t2033;
+  d_V[4] = (t1927 * t1406 + t1931 * t1581) * t2047;
+  d_V[5] = -(t1926 * t2054 * t2058);
+  e_Q[0] = t1620 + (t1707 * t1010 + t1747 * t990 + t1796 * t981 - t1847 * t959 + t1900 * t957);
+  e_Q[1] = t1630 + (t1707 * t1077 + t1747 * t1069 + t1796 * t1063 + t1847 * t1059 + t1900 * t1057);
+  e_Q[2] = t1644 + (t1707 * t1171 + t1747 * t1163 + t1796 * t1157 + t1847 * t1153 + t1900 * t1151);
+  e_Q[3] = t1661 + (t1707 * t1292 + t1747 * t1284 + t1796 * t1278 + t1847 * t1274 + t1900 * t1272);
+  e_Q[4] = t1681 + (t1707 * t1441 + t1747 * t1433 + t1796 * t1427 + t1847 * t1423 + t1900 * t1421);
+  e_Q[5] = t1704 + (t1707 * t1616 + t1747 * t1608 + t1796 * t1602 + t1847 * t1598 + t1900 * t1596);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_qr_eliminate_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"J", 5, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 5, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_qr_eliminate_outputs[] = {
-    {"G", 30, "", 0, 0},
-    {"g", 5, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic5_qr_eliminate_guards[] = {
-    {1, "speed 1 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 5 moves no inertia: its acceleration is undetermined"},
-    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic5_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 5 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7413,139 +1881,31 @@ static const mstmm_guard mstmm_sweep_generic5_qr_eliminate_guards[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic5_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic5_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = H[15] * s[0];
-    const real t7 = H[16] * s[1];
-    const real t8 = t6 + t7;
-    const real t9 = H[17] * s[2];
-    const real t10 = t8 + t9;
-    const real t11 = H[18] * s[3];
-    const real t12 = t10 + t11;
-    const real t13 = H[19] * s[4];
-    const real t14 = t12 + t13;
-    const real t15 = c[3] + t14;
-    const real t16 = t5 - t15;
-    const real t17 = motion[3] + t16;
-    Q[3] = t17;
-    const real t18 = w[2] * t0;
-    const real t19 = w[0] * t2;
-    const real t20 = t18 - t19;
-    const real t21 = H[20] * s[0];
-    const real t22 = H[21] * s[1];
-    const real t23 = t21 + t22;
-    const real t24 = H[22] * s[2];
-    const real t25 = t23 + t24;
-    const real t26 = H[23] * s[3];
-    const real t27 = t25 + t26;
-    const real t28 = H[24] * s[4];
-    const real t29 = t27 + t28;
-    const real t30 = c[4] + t29;
-    const real t31 = t20 - t30;
-    const real t32 = motion[4] + t31;
-    Q[4] = t32;
-    const real t33 = w[0] * t1;
-    const real t34 = w[1] * t0;
-    const real t35 = t33 - t34;
-    const real t36 = H[25] * s[0];
-    const real t37 = H[26] * s[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[27] * s[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[28] * s[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[29] * s[4];
-    const real t44 = t42 + t43;
-    const real t45 = c[5] + t44;
-    const real t46 = t35 - t45;
-    const real t47 = motion[5] + t46;
-    Q[5] = t47;
-    const real t48 = v[1] * t2;
-    const real t49 = t48 * 2.0;
-    const real t50 = v[2] * t1;
-    const real t51 = 2.0 * t50;
-    const real t52 = t49 - t51;
-    const real t53 = H[0] * s[0];
-    const real t54 = H[1] * s[1];
-    const real t55 = t53 + t54;
-    const real t56 = H[2] * s[2];
-    const real t57 = t55 + t56;
-    const real t58 = H[3] * s[3];
-    const real t59 = t57 + t58;
-    const real t60 = H[4] * s[4];
-    const real t61 = t59 + t60;
-    const real t62 = c[0] + t61;
-    const real t63 = t52 - t62;
-    const real t64 = motion[6] + t63;
-    Q[6] = t64;
-    const real t65 = v[2] * t0;
-    const real t66 = 2.0 * t65;
-    const real t67 = v[0] * t2;
-    const real t68 = 2.0 * t67;
-    const real t69 = t66 - t68;
-    const real t70 = H[5] * s[0];
-    const real t71 = H[6] * s[1];
-    const real t72 = t70 + t71;
-    const real t73 = H[7] * s[2];
-    const real t74 = t72 + t73;
-    const real t75 = H[8] * s[3];
-    const real t76 = t74 + t75;
-    const real t77 = H[9] * s[4];
-    const real t78 = t76 + t77;
-    const real t79 = c[1] + t78;
-    const real t80 = t69 - t79;
-    const real t81 = motion[7] + t80;
-    Q[7] = t81;
-    const real t82 = v[0] * t1;
-    const real t83 = 2.0 * t82;
-    const real t84 = v[1] * t0;
-    const real t85 = 2.0 * t84;
-    const real t86 = t83 - t85;
-    const real t87 = H[10] * s[0];
-    const real t88 = H[11] * s[1];
-    const real t89 = t87 + t88;
-    const real t90 = H[12] * s[2];
-    const real t91 = t89 + t90;
-    const real t92 = H[13] * s[3];
-    const real t93 = t91 + t92;
-    const real t94 = H[14] * s[4];
-    const real t95 = t93 + t94;
-    const real t96 = c[2] + t95;
-    const real t97 = t86 - t96;
-    const real t98 = motion[8] + t97;
-    Q[8] = t98;
-    return 0;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - (c[3] + (H[15] * s[0] + H[16] * s[1] + H[17] * s[2] +
+    H[18] * s[3] + H[19] * s[4])));
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - (c[4] + (H[20] * s[0] + H[21] * s[1] + H[22] * s[2] +
+    H[23] * s[3] + H[24] * s[4])));
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - (c[5] + (H[25] * s[0] + H[26] * s[1] + H[27] * s[2] +
+    H[28] * s[3] + H[29] * s[4])));
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - (c[0] + (H[0] * s[0] + H[1] * s[1] +
+    H[2] * s[2] + H[3] * s[3] + H[4] * s[4])));
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - (c[1] + (H[5] * s[0] + H[6] * s[1] +
+    H[7] * s[2] + H[8] * s[3] + H[9] * s[4])));
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - (c[2] + (H[10] * s[0] + H[11] * s[1] +
+    H[12] * s[2] + H[13] * s[3] + H[14] * s[4])));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_carrier_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"s", 5, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 5 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7569,411 +1929,66 @@ static const mstmm_port mstmm_sweep_generic5_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic5_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic5_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = H[15] * d_s[0];
-    const real t16 = H[16] * d_s[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[17] * d_s[2];
-    const real t19 = t17 + t18;
-    const real t20 = H[18] * d_s[3];
-    const real t21 = t19 + t20;
-    const real t22 = H[19] * d_s[4];
-    const real t23 = t21 + t22;
-    const real t24 = s[0] * d_H[15];
-    const real t25 = s[1] * d_H[16];
-    const real t26 = t24 + t25;
-    const real t27 = s[2] * d_H[17];
-    const real t28 = t26 + t27;
-    const real t29 = s[3] * d_H[18];
-    const real t30 = t28 + t29;
-    const real t31 = s[4] * d_H[19];
-    const real t32 = t30 + t31;
-    const real t33 = t23 + t32;
-    const real t34 = d_c[3] + t33;
-    const real t35 = theta[2] * Q[4];
-    const real t36 = Q[1] * d_w[2];
-    const real t37 = Q[2] * d_w[1];
-    const real t38 = t36 - t37;
-    const real t39 = t35 + t38;
-    const real t40 = theta[1] * Q[5];
-    const real t41 = t39 - t40;
-    const real t42 = t34 + t41;
-    const real t43 = t14 + t42;
-    B[3] = t43;
-    const real t44 = w[0] * t10;
-    const real t45 = w[2] * t2;
-    const real t46 = t44 - t45;
-    const real t47 = H[20] * d_s[0];
-    const real t48 = H[21] * d_s[1];
-    const real t49 = t47 + t48;
-    const real t50 = H[22] * d_s[2];
-    const real t51 = t49 + t50;
-    const real t52 = H[23] * d_s[3];
-    const real t53 = t51 + t52;
-    const real t54 = H[24] * d_s[4];
-    const real t55 = t53 + t54;
-    const real t56 = s[0] * d_H[20];
-    const real t57 = s[1] * d_H[21];
-    const real t58 = t56 + t57;
-    const real t59 = s[2] * d_H[22];
-    const real t60 = t58 + t59;
-    const real t61 = s[3] * d_H[23];
-    const real t62 = t60 + t61;
-    const real t63 = s[4] * d_H[24];
-    const real t64 = t62 + t63;
-    const real t65 = t55 + t64;
-    const real t66 = d_c[4] + t65;
-    const real t67 = theta[0] * Q[5];
-    const real t68 = Q[2] * d_w[0];
-    const real t69 = Q[0] * d_w[2];
-    const real t70 = t68 - t69;
-    const real t71 = theta[2] * Q[3];
-    const real t72 = t70 - t71;
-    const real t73 = t67 + t72;
-    const real t74 = t66 + t73;
-    const real t75 = t46 + t74;
-    B[4] = t75;
-    const real t76 = w[1] * t2;
-    const real t77 = w[0] * t6;
-    const real t78 = t76 - t77;
-    const real t79 = H[25] * d_s[0];
-    const real t80 = H[26] * d_s[1];
-    const real t81 = t79 + t80;
-    const real t82 = H[27] * d_s[2];
-    const real t83 = t81 + t82;
-    const real t84 = H[28] * d_s[3];
-    const real t85 = t83 + t84;
-    const real t86 = H[29] * d_s[4];
-    const real t87 = t85 + t86;
-    const real t88 = s[0] * d_H[25];
-    const real t89 = s[1] * d_H[26];
-    const real t90 = t88 + t89;
-    const real t91 = s[2] * d_H[27];
-    const real t92 = t90 + t91;
-    const real t93 = s[3] * d_H[28];
-    const real t94 = t92 + t93;
-    const real t95 = s[4] * d_H[29];
-    const real t96 = t94 + t95;
-    const real t97 = t87 + t96;
-    const real t98 = d_c[5] + t97;
-    const real t99 = theta[1] * Q[3];
-    const real t100 = Q[0] * d_w[1];
-    const real t101 = Q[1] * d_w[0];
-    const real t102 = t100 - t101;
-    const real t103 = t99 + t102;
-    const real t104 = theta[0] * Q[4];
-    const real t105 = t103 - t104;
-    const real t106 = t98 + t105;
-    const real t107 = t78 + t106;
-    B[5] = t107;
-    const real t108 = v[2] * 2.0;
-    const real t109 = t6 * t108;
-    const real t110 = v[1] * 2.0;
-    const real t111 = t10 * t110;
-    const real t112 = t109 - t111;
-    const real t113 = H[0] * d_s[0];
-    const real t114 = H[1] * d_s[1];
-    const real t115 = t113 + t114;
-    const real t116 = H[2] * d_s[2];
-    const real t117 = t115 + t116;
-    const real t118 = H[3] * d_s[3];
-    const real t119 = t117 + t118;
-    const real t120 = H[4] * d_s[4];
-    const real t121 = t119 + t120;
-    const real t122 = s[0] * d_H[0];
-    const real t123 = s[1] * d_H[1];
-    const real t124 = t122 + t123;
-    const real t125 = s[2] * d_H[2];
-    const real t126 = t124 + t125;
-    const real t127 = s[3] * d_H[3];
-    const real t128 = t126 + t127;
-    const real t129 = s[4] * d_H[4];
-    const real t130 = t128 + t129;
-    const real t131 = t121 + t130;
-    const real t132 = d_c[0] + t131;
-    const real t133 = theta[2] * Q[7];
-    const real t134 = x[2] * Q[4];
-    const real t135 = Q[1] * d_v[2];
-    const real t136 = 2.0 * t135;
-    const real t137 = x[1] * Q[0];
-    const real t138 = x[0] * Q[1];
-    const real t139 = t137 - t138;
-    const real t140 = Q[1] * t139;
-    const real t141 = x[0] * Q[2];
-    const real t142 = x[2] * Q[0];
-    const real t143 = t141 - t142;
-    const real t144 = Q[2] * t143;
-    const real t145 = t140 - t144;
-    const real t146 = t136 + t145;
-    const real t147 = Q[2] * d_v[1];
-    const real t148 = 2.0 * t147;
-    const real t149 = t146 - t148;
-    const real t150 = t134 + t149;
-    const real t151 = x[1] * Q[5];
-    const real t152 = t150 - t151;
-    const real t153 = t133 + t152;
-    const real t154 = theta[1] * Q[8];
-    const real t155 = t153 - t154;
-    const real t156 = t132 + t155;
-    const real t157 = t112 + t156;
-    B[6] = t157;
-    const real t158 = v[0] * 2.0;
-    const real t159 = t10 * t158;
-    const real t160 = t2 * t108;
-    const real t161 = t159 - t160;
-    const real t162 = H[5] * d_s[0];
-    const real t163 = H[6] * d_s[1];
-    const real t164 = t162 + t163;
-    const real t165 = H[7] * d_s[2];
-    const real t166 = t164 + t165;
-    const real t167 = H[8] * d_s[3];
-    const real t168 = t166 + t167;
-    const real t169 = H[9] * d_s[4];
-    const real t170 = t168 + t169;
-    const real t171 = s[0] * d_H[5];
-    const real t172 = s[1] * d_H[6];
-    const real t173 = t171 + t172;
-    const real t174 = s[2] * d_H[7];
-    const real t175 = t173 + t174;
-    const real t176 = s[3] * d_H[8];
-    const real t177 = t175 + t176;
-    const real t178 = s[4] * d_H[9];
-    const real t179 = t177 + t178;
-    const real t180 = t170 + t179;
-    const real t181 = d_c[1] + t180;
-    const real t182 = theta[0] * Q[8];
-    const real t183 = x[0] * Q[5];
-    const real t184 = Q[2] * d_v[0];
-    const real t185 = 2.0 * t184;
-    const real t186 = x[2] * Q[1];
-    const real t187 = x[1] * Q[2];
-    const real t188 = t186 - t187;
-    const real t189 = Q[2] * t188;
-    const real t190 = Q[0] * t139;
-    const real t191 = t189 - t190;
-    const real t192 = Q[0] * d_v[2];
-    const real t193 = 2.0 * t192;
-    const real t194 = t191 - t193;
-    const real t195 = t185 + t194;
-    const real t196 = x[2] * Q[3];
-    const real t197 = t195 - t196;
-    const real t198 = t183 + t197;
-    const real t199 = theta[2] * Q[6];
-    const real t200 = t198 - t199;
-    const real t201 = t182 + t200;
-    const real t202 = t181 + t201;
-    const real t203 = t161 + t202;
-    B[7] = t203;
-    const real t204 = t2 * t110;
-    const real t205 = t6 * t158;
-    const real t206 = t204 - t205;
-    const real t207 = H[10] * d_s[0];
-    const real t208 = H[11] * d_s[1];
-    const real t209 = t207 + t208;
-    const real t210 = H[12] * d_s[2];
-    const real t211 = t209 + t210;
-    const real t212 = H[13] * d_s[3];
-    const real t213 = t211 + t212;
-    const real t214 = H[14] * d_s[4];
-    const real t215 = t213 + t214;
-    const real t216 = s[0] * d_H[10];
-    const real t217 = s[1] * d_H[11];
-    const real t218 = t216 + t217;
-    const real t219 = s[2] * d_H[12];
-    const real t220 = t218 + t219;
-    const real t221 = s[3] * d_H[13];
-    const real t222 = t220 + t221;
-    const real t223 = s[4] * d_H[14];
-    const real t224 = t222 + t223;
-    const real t225 = t215 + t224;
-    const real t226 = d_c[2] + t225;
-    const real t227 = theta[1] * Q[6];
-    const real t228 = x[1] * Q[3];
-    const real t229 = Q[0] * d_v[1];
-    const real t230 = 2.0 * t229;
-    const real t231 = Q[0] * t143;
-    const real t232 = Q[1] * t188;
-    const real t233 = t231 - t232;
-    const real t234 = t230 + t233;
-    const real t235 = Q[1] * d_v[0];
-    const real t236 = 2.0 * t235;
-    const real t237 = t234 - t236;
-    const real t238 = t228 + t237;
-    const real t239 = x[0] * Q[4];
-    const real t240 = t238 - t239;
-    const real t241 = t227 + t240;
-    const real t242 = theta[0] * Q[7];
-    const real t243 = t241 - t242;
-    const real t244 = t226 + t243;
-    const real t245 = t206 + t244;
-    B[8] = t245;
-    const real t246 = theta[1] * f[2];
-    const real t247 = theta[2] * f[1];
-    const real t248 = t246 - t247;
-    G[0] = t248;
-    const real t249 = theta[2] * f[0];
-    const real t250 = theta[0] * f[2];
-    const real t251 = t249 - t250;
-    G[1] = t251;
-    const real t252 = theta[0] * f[1];
-    const real t253 = theta[1] * f[0];
-    const real t254 = t252 - t253;
-    G[2] = t254;
-    const real t255 = theta[1] * f[5];
-    const real t256 = x[1] * f[2];
-    const real t257 = x[2] * f[1];
-    const real t258 = t256 - t257;
-    const real t259 = theta[2] * f[4];
-    const real t260 = t258 - t259;
-    const real t261 = t255 + t260;
-    G[3] = t261;
-    const real t262 = theta[2] * f[3];
-    const real t263 = x[2] * f[0];
-    const real t264 = x[0] * f[2];
-    const real t265 = t263 - t264;
-    const real t266 = t262 + t265;
-    const real t267 = theta[0] * f[5];
-    const real t268 = t266 - t267;
-    G[4] = t268;
-    const real t269 = theta[0] * f[4];
-    const real t270 = x[0] * f[1];
-    const real t271 = x[1] * f[0];
-    const real t272 = t270 - t271;
-    const real t273 = theta[1] * f[3];
-    const real t274 = t272 - t273;
-    const real t275 = t269 + t274;
-    G[5] = t275;
-    const real t276 = d_s[0] * J[0];
-    const real t277 = f[0] * d_H[0];
-    const real t278 = f[1] * d_H[5];
-    const real t279 = t277 + t278;
-    const real t280 = f[2] * d_H[10];
-    const real t281 = t279 + t280;
-    const real t282 = f[3] * d_H[15];
-    const real t283 = t281 + t282;
-    const real t284 = f[4] * d_H[20];
-    const real t285 = t283 + t284;
-    const real t286 = f[5] * d_H[25];
-    const real t287 = t285 + t286;
-    const real t288 = t287 - laws[0];
-    const real t289 = t276 + t288;
-    row[0] = t289;
-    const real t290 = d_s[1] * J[1];
-    const real t291 = f[0] * d_H[1];
-    const real t292 = f[1] * d_H[6];
-    const real t293 = t291 + t292;
-    const real t294 = f[2] * d_H[11];
-    const real t295 = t293 + t294;
-    const real t296 = f[3] * d_H[16];
-    const real t297 = t295 + t296;
-    const real t298 = f[4] * d_H[21];
-    const real t299 = t297 + t298;
-    const real t300 = f[5] * d_H[26];
-    const real t301 = t299 + t300;
-    const real t302 = t301 - laws[1];
-    const real t303 = t290 + t302;
-    row[1] = t303;
-    const real t304 = d_s[2] * J[2];
-    const real t305 = f[0] * d_H[2];
-    const real t306 = f[1] * d_H[7];
-    const real t307 = t305 + t306;
-    const real t308 = f[2] * d_H[12];
-    const real t309 = t307 + t308;
-    const real t310 = f[3] * d_H[17];
-    const real t311 = t309 + t310;
-    const real t312 = f[4] * d_H[22];
-    const real t313 = t311 + t312;
-    const real t314 = f[5] * d_H[27];
-    const real t315 = t313 + t314;
-    const real t316 = t315 - laws[2];
-    const real t317 = t304 + t316;
-    row[2] = t317;
-    const real t318 = d_s[3] * J[3];
-    const real t319 = f[0] * d_H[3];
-    const real t320 = f[1] * d_H[8];
-    const real t321 = t319 + t320;
-    const real t322 = f[2] * d_H[13];
-    const real t323 = t321 + t322;
-    const real t324 = f[3] * d_H[18];
-    const real t325 = t323 + t324;
-    const real t326 = f[4] * d_H[23];
-    const real t327 = t325 + t326;
-    const real t328 = f[5] * d_H[28];
-    const real t329 = t327 + t328;
-    const real t330 = t329 - laws[3];
-    const real t331 = t318 + t330;
-    row[3] = t331;
-    const real t332 = d_s[4] * J[4];
-    const real t333 = f[0] * d_H[4];
-    const real t334 = f[1] * d_H[9];
-    const real t335 = t333 + t334;
-    const real t336 = f[2] * d_H[14];
-    const real t337 = t335 + t336;
-    const real t338 = f[3] * d_H[19];
-    const real t339 = t337 + t338;
-    const real t340 = f[4] * d_H[24];
-    const real t341 = t339 + t340;
-    const real t342 = f[5] * d_H[29];
-    const real t343 = t341 + t342;
-    const real t344 = t343 - laws[4];
-    const real t345 = t332 + t344;
-    row[4] = t345;
-    return 0;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (H[15] * d_s[0] + H[16] * d_s[1] + H[17] * d_s[2] +
+    H[18] * d_s[3] + H[19] * d_s[4] + (s[0] * d_H[15] + s[1] * d_H[16] + s[2] * d_H[17] + s[3] *
+    d_H[18] + s[4] * d_H[19])) + (theta[2] * Q[4] + (Q[1] * d_w[2] - Q[2] * d_w[1]) - theta[1] *
+    Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (H[20] * d_s[0] + H[21] * d_s[1] + H[22] * d_s[2] +
+    H[23] * d_s[3] + H[24] * d_s[4] + (s[0] * d_H[20] + s[1] * d_H[21] + s[2] * d_H[22] + s[3] *
+    d_H[23] + s[4] * d_H[24])) + (theta[0] * Q[5] + (Q[2] * d_w[0] - Q[0] * d_w[2] - theta[2] *
+    Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (H[25] * d_s[0] + H[26] * d_s[1] + H[27] * d_s[2] + H[28]
+    * d_s[3] + H[29] * d_s[4] + (s[0] * d_H[25] + s[1] * d_H[26] + s[2] * d_H[27] + s[3] * d_H[28] +
+    s[4] * d_H[29])) + (theta[1] * Q[3] + (Q[0] * d_w[1] - Q[1] * d_w[0]) - theta[0] * Q[4]));
+  real t108 = v[2] * 2.0;
+  real t110 = v[1] * 2.0;
+  real t139 = x[1] * Q[0] - x[0] * Q[1];
+  real t143 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t108 - t10 * t110 + (d_c[0] + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + H[3] *
+    d_s[3] + H[4] * d_s[4] + (s[0] * d_H[0] + s[1] * d_H[1] + s[2] * d_H[2] + s[3] * d_H[3] + s[4] *
+    d_H[4])) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * d_v[2]) + (Q[1] * t139 - Q[2] *
+    t143) - 2.0 * (Q[2] * d_v[1])) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t158 = v[0] * 2.0;
+  real t188 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t158 - t2 * t108 + (d_c[1] + (H[5] * d_s[0] + H[6] * d_s[1] + H[7] * d_s[2] + H[8] *
+    d_s[3] + H[9] * d_s[4] + (s[0] * d_H[5] + s[1] * d_H[6] + s[2] * d_H[7] + s[3] * d_H[8] + s[4] *
+    d_H[9])) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * d_v[0]) + (Q[2] * t188 - Q[0] * t139
+    - 2.0 * (Q[0] * d_v[2])) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t2 * t110 - t6 * t158 + (d_c[2] + (H[10] * d_s[0] + H[11] * d_s[1] + H[12] * d_s[2] + H[13]
+    * d_s[3] + H[14] * d_s[4] + (s[0] * d_H[10] + s[1] * d_H[11] + s[2] * d_H[12] + s[3] * d_H[13] +
+    s[4] * d_H[14])) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * d_v[1]) + (Q[0] * t143 -
+    Q[1] * t188) - 2.0 * (Q[1] * d_v[0])) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] + (f[0] * d_H[0] + f[1] * d_H[5] + f[2] * d_H[10] + f[3] * d_H[15] + f[4] *
+    d_H[20] + f[5] * d_H[25] - laws[0]);
+  row[1] = d_s[1] * J[1] + (f[0] * d_H[1] + f[1] * d_H[6] + f[2] * d_H[11] + f[3] * d_H[16] + f[4] *
+    d_H[21] + f[5] * d_H[26] - laws[1]);
+  row[2] = d_s[2] * J[2] + (f[0] * d_H[2] + f[1] * d_H[7] + f[2] * d_H[12] + f[3] * d_H[17] + f[4] *
+    d_H[22] + f[5] * d_H[27] - laws[2]);
+  row[3] = d_s[3] * J[3] + (f[0] * d_H[3] + f[1] * d_H[8] + f[2] * d_H[13] + f[3] * d_H[18] + f[4] *
+    d_H[23] + f[5] * d_H[28] - laws[3]);
+  row[4] = d_s[4] * J[4] + (f[0] * d_H[4] + f[1] * d_H[9] + f[2] * d_H[14] + f[3] * d_H[19] + f[4] *
+    d_H[24] + f[5] * d_H[29] - laws[4]);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"s", 5, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 30, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 5, "", 0, 0},
-    {"J", 5, "kg*m2 or kg", 0, 0},
-    {"laws", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 5, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* rotation and displacement along coordinates of a hinge with 5 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -7983,87 +1998,18 @@ static const mstmm_port mstmm_sweep_generic5_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic5_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x)
+int mstmm_sweep_generic5_tangent_coordinate_change(in_t H, in_t d_q, out_t theta, out_t x)
 {
-    const real t0 = H[15] * d_q[0];
-    const real t1 = H[16] * d_q[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[17] * d_q[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * d_q[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[19] * d_q[4];
-    const real t8 = t6 + t7;
-    theta[0] = t8;
-    const real t9 = H[20] * d_q[0];
-    const real t10 = H[21] * d_q[1];
-    const real t11 = t9 + t10;
-    const real t12 = H[22] * d_q[2];
-    const real t13 = t11 + t12;
-    const real t14 = H[23] * d_q[3];
-    const real t15 = t13 + t14;
-    const real t16 = H[24] * d_q[4];
-    const real t17 = t15 + t16;
-    theta[1] = t17;
-    const real t18 = H[25] * d_q[0];
-    const real t19 = H[26] * d_q[1];
-    const real t20 = t18 + t19;
-    const real t21 = H[27] * d_q[2];
-    const real t22 = t20 + t21;
-    const real t23 = H[28] * d_q[3];
-    const real t24 = t22 + t23;
-    const real t25 = H[29] * d_q[4];
-    const real t26 = t24 + t25;
-    theta[2] = t26;
-    const real t27 = H[0] * d_q[0];
-    const real t28 = H[1] * d_q[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[2] * d_q[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[3] * d_q[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[4] * d_q[4];
-    const real t35 = t33 + t34;
-    x[0] = t35;
-    const real t36 = H[5] * d_q[0];
-    const real t37 = H[6] * d_q[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[7] * d_q[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[8] * d_q[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[9] * d_q[4];
-    const real t44 = t42 + t43;
-    x[1] = t44;
-    const real t45 = H[10] * d_q[0];
-    const real t46 = H[11] * d_q[1];
-    const real t47 = t45 + t46;
-    const real t48 = H[12] * d_q[2];
-    const real t49 = t47 + t48;
-    const real t50 = H[13] * d_q[3];
-    const real t51 = t49 + t50;
-    const real t52 = H[14] * d_q[4];
-    const real t53 = t51 + t52;
-    x[2] = t53;
-    return 0;
+  theta[0] = H[15] * d_q[0] + H[16] * d_q[1] + H[17] * d_q[2] + H[18] * d_q[3] + H[19] * d_q[4];
+  theta[1] = H[20] * d_q[0] + H[21] * d_q[1] + H[22] * d_q[2] + H[23] * d_q[3] + H[24] * d_q[4];
+  theta[2] = H[25] * d_q[0] + H[26] * d_q[1] + H[27] * d_q[2] + H[28] * d_q[3] + H[29] * d_q[4];
+  x[0] = H[0] * d_q[0] + H[1] * d_q[1] + H[2] * d_q[2] + H[3] * d_q[3] + H[4] * d_q[4];
+  x[1] = H[5] * d_q[0] + H[6] * d_q[1] + H[7] * d_q[2] + H[8] * d_q[3] + H[9] * d_q[4];
+  x[2] = H[10] * d_q[0] + H[11] * d_q[1] + H[12] * d_q[2] + H[13] * d_q[3] + H[14] * d_q[4];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_coordinate_change_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"d_q", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_coordinate_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_coordinate_change, (in[0], in[1], out[0], out[1]))
 
 /* a direction of a hinge with 5 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -8083,358 +2029,61 @@ static const mstmm_port mstmm_sweep_generic5_tangent_coordinate_change_outputs[]
  * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic5_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row)
+int mstmm_sweep_generic5_tangent_steady(in_t theta, in_t x, in_t H, in_t v, in_t w, in_t Q, in_t f,
+    in_t d_u, in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[15] * d_u[0];
-    const real t1 = H[16] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[17] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * d_u[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[19] * d_u[4];
-    const real t8 = t6 + t7;
-    const real t9 = theta[2] * Q[1];
-    const real t10 = theta[1] * Q[2];
-    const real t11 = t9 - t10;
-    const real t12 = t8 + t11;
-    B[0] = t12;
-    const real t13 = H[20] * d_u[0];
-    const real t14 = H[21] * d_u[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[22] * d_u[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[23] * d_u[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[24] * d_u[4];
-    const real t21 = t19 + t20;
-    const real t22 = theta[0] * Q[2];
-    const real t23 = theta[2] * Q[0];
-    const real t24 = t22 - t23;
-    const real t25 = t21 + t24;
-    B[1] = t25;
-    const real t26 = H[25] * d_u[0];
-    const real t27 = H[26] * d_u[1];
-    const real t28 = t26 + t27;
-    const real t29 = H[27] * d_u[2];
-    const real t30 = t28 + t29;
-    const real t31 = H[28] * d_u[3];
-    const real t32 = t30 + t31;
-    const real t33 = H[29] * d_u[4];
-    const real t34 = t32 + t33;
-    const real t35 = theta[1] * Q[0];
-    const real t36 = theta[0] * Q[1];
-    const real t37 = t35 - t36;
-    const real t38 = t34 + t37;
-    B[2] = t38;
-    const real t39 = w[2] * t24;
-    const real t40 = w[1] * t37;
-    const real t41 = t39 - t40;
-    const real t42 = H[15] * d_s[0];
-    const real t43 = H[16] * d_s[1];
-    const real t44 = t42 + t43;
-    const real t45 = H[17] * d_s[2];
-    const real t46 = t44 + t45;
-    const real t47 = H[18] * d_s[3];
-    const real t48 = t46 + t47;
-    const real t49 = H[19] * d_s[4];
-    const real t50 = t48 + t49;
-    const real t51 = theta[2] * Q[4];
-    const real t52 = Q[1] * t34;
-    const real t53 = Q[2] * t21;
-    const real t54 = t52 - t53;
-    const real t55 = t51 + t54;
-    const real t56 = theta[1] * Q[5];
-    const real t57 = t55 - t56;
-    const real t58 = t50 + t57;
-    const real t59 = t41 + t58;
-    B[3] = t59;
-    const real t60 = w[0] * t37;
-    const real t61 = w[2] * t11;
-    const real t62 = t60 - t61;
-    const real t63 = H[20] * d_s[0];
-    const real t64 = H[21] * d_s[1];
-    const real t65 = t63 + t64;
-    const real t66 = H[22] * d_s[2];
-    const real t67 = t65 + t66;
-    const real t68 = H[23] * d_s[3];
-    const real t69 = t67 + t68;
-    const real t70 = H[24] * d_s[4];
-    const real t71 = t69 + t70;
-    const real t72 = theta[0] * Q[5];
-    const real t73 = Q[2] * t8;
-    const real t74 = Q[0] * t34;
-    const real t75 = t73 - t74;
-    const real t76 = theta[2] * Q[3];
-    const real t77 = t75 - t76;
-    const real t78 = t72 + t77;
-    const real t79 = t71 + t78;
-    const real t80 = t62 + t79;
-    B[4] = t80;
-    const real t81 = w[1] * t11;
-    const real t82 = w[0] * t24;
-    const real t83 = t81 - t82;
-    const real t84 = H[25] * d_s[0];
-    const real t85 = H[26] * d_s[1];
-    const real t86 = t84 + t85;
-    const real t87 = H[27] * d_s[2];
-    const real t88 = t86 + t87;
-    const real t89 = H[28] * d_s[3];
-    const real t90 = t88 + t89;
-    const real t91 = H[29] * d_s[4];
-    const real t92 = t90 + t91;
-    const real t93 = theta[1] * Q[3];
-    const real t94 = Q[0] * t21;
-    const real t95 = Q[1] * t8;
-    const real t96 = t94 - t95;
-    const real t97 = t93 + t96;
-    const real t98 = theta[0] * Q[4];
-    const real t99 = t97 - t98;
-    const real t100 = t92 + t99;
-    const real t101 = t83 + t100;
-    B[5] = t101;
-    const real t102 = v[2] * 2.0;
-    const real t103 = t24 * t102;
-    const real t104 = v[1] * 2.0;
-    const real t105 = t37 * t104;
-    const real t106 = t103 - t105;
-    const real t107 = H[0] * d_s[0];
-    const real t108 = H[1] * d_s[1];
-    const real t109 = t107 + t108;
-    const real t110 = H[2] * d_s[2];
-    const real t111 = t109 + t110;
-    const real t112 = H[3] * d_s[3];
-    const real t113 = t111 + t112;
-    const real t114 = H[4] * d_s[4];
-    const real t115 = t113 + t114;
-    const real t116 = v[2] * t21;
-    const real t117 = H[10] * d_u[0];
-    const real t118 = H[11] * d_u[1];
-    const real t119 = t117 + t118;
-    const real t120 = H[12] * d_u[2];
-    const real t121 = t119 + t120;
-    const real t122 = H[13] * d_u[3];
-    const real t123 = t121 + t122;
-    const real t124 = H[14] * d_u[4];
-    const real t125 = t123 + t124;
-    const real t126 = w[1] * t125;
-    const real t127 = H[5] * d_u[0];
-    const real t128 = H[6] * d_u[1];
-    const real t129 = t127 + t128;
-    const real t130 = H[7] * d_u[2];
-    const real t131 = t129 + t130;
-    const real t132 = H[8] * d_u[3];
-    const real t133 = t131 + t132;
-    const real t134 = H[9] * d_u[4];
-    const real t135 = t133 + t134;
-    const real t136 = w[2] * t135;
-    const real t137 = t126 - t136;
-    const real t138 = t116 + t137;
-    const real t139 = v[1] * t34;
-    const real t140 = t138 - t139;
-    const real t141 = t115 + t140;
-    const real t142 = theta[2] * Q[7];
-    const real t143 = x[2] * Q[4];
-    const real t144 = Q[1] * t125;
-    const real t145 = 2.0 * t144;
-    const real t146 = x[1] * Q[0];
-    const real t147 = x[0] * Q[1];
-    const real t148 = t146 - t147;
-    const real t149 = Q[1] * t148;
-    const real t150 = x[0] * Q[2];
-    const real t151 = x[2] * Q[0];
-    const real t152 = t150 - t151;
-    const real t153 = Q[2] * t152;
-    const real t154 = t149 - t153;
-    const real t155 = t145 + t154;
-    const real t156 = Q[2] * t135;
-    const real t157 = 2.0 * t156;
-    const real t158 = t155 - t157;
-    const real t159 = t143 + t158;
-    const real t160 = x[1] * Q[5];
-    const real t161 = t159 - t160;
-    const real t162 = t142 + t161;
-    const real t163 = theta[1] * Q[8];
-    const real t164 = t162 - t163;
-    const real t165 = t141 + t164;
-    const real t166 = t106 + t165;
-    B[6] = t166;
-    const real t167 = v[0] * 2.0;
-    const real t168 = t37 * t167;
-    const real t169 = t11 * t102;
-    const real t170 = t168 - t169;
-    const real t171 = H[5] * d_s[0];
-    const real t172 = H[6] * d_s[1];
-    const real t173 = t171 + t172;
-    const real t174 = H[7] * d_s[2];
-    const real t175 = t173 + t174;
-    const real t176 = H[8] * d_s[3];
-    const real t177 = t175 + t176;
-    const real t178 = H[9] * d_s[4];
-    const real t179 = t177 + t178;
-    const real t180 = v[0] * t34;
-    const real t181 = H[0] * d_u[0];
-    const real t182 = H[1] * d_u[1];
-    const real t183 = t181 + t182;
-    const real t184 = H[2] * d_u[2];
-    const real t185 = t183 + t184;
-    const real t186 = H[3] * d_u[3];
-    const real t187 = t185 + t186;
-    const real t188 = H[4] * d_u[4];
-    const real t189 = t187 + t188;
-    const real t190 = w[2] * t189;
-    const real t191 = w[0] * t125;
-    const real t192 = t190 - t191;
-    const real t193 = v[2] * t8;
-    const real t194 = t192 - t193;
-    const real t195 = t180 + t194;
-    const real t196 = t179 + t195;
-    const real t197 = theta[0] * Q[8];
-    const real t198 = x[0] * Q[5];
-    const real t199 = Q[2] * t189;
-    const real t200 = 2.0 * t199;
-    const real t201 = x[2] * Q[1];
-    const real t202 = x[1] * Q[2];
-    const real t203 = t201 - t202;
-    const real t204 = Q[2] * t203;
-    const real t205 = Q[0] * t148;
-    const real t206 = t204 - t205;
-    const real t207 = Q[0] * t125;
-    const real t208 = 2.0 * t207;
-    const real t209 = t206 - t208;
-    const real t210 = t200 + t209;
-    const real t211 = x[2] * Q[3];
-    const real t212 = t210 - t211;
-    const real t213 = t198 + t212;
-    const real t214 = theta[2] * Q[6];
-    const real t215 = t213 - t214;
-    const real t216 = t197 + t215;
-    const real t217 = t196 + t216;
-    const real t218 = t170 + t217;
-    B[7] = t218;
-    const real t219 = t11 * t104;
-    const real t220 = t24 * t167;
-    const real t221 = t219 - t220;
-    const real t222 = H[10] * d_s[0];
-    const real t223 = H[11] * d_s[1];
-    const real t224 = t222 + t223;
-    const real t225 = H[12] * d_s[2];
-    const real t226 = t224 + t225;
-    const real t227 = H[13] * d_s[3];
-    const real t228 = t226 + t227;
-    const real t229 = H[14] * d_s[4];
-    const real t230 = t228 + t229;
-    const real t231 = v[1] * t8;
-    const real t232 = w[0] * t135;
-    const real t233 = w[1] * t189;
-    const real t234 = t232 - t233;
-    const real t235 = t231 + t234;
-    const real t236 = v[0] * t21;
-    const real t237 = t235 - t236;
-    const real t238 = t230 + t237;
-    const real t239 = theta[1] * Q[6];
-    const real t240 = x[1] * Q[3];
-    const real t241 = Q[0] * t135;
-    const real t242 = 2.0 * t241;
-    const real t243 = Q[0] * t152;
-    const real t244 = Q[1] * t203;
-    const real t245 = t243 - t244;
-    const real t246 = t242 + t245;
-    const real t247 = Q[1] * t189;
-    const real t248 = 2.0 * t247;
-    const real t249 = t246 - t248;
-    const real t250 = t240 + t249;
-    const real t251 = x[0] * Q[4];
-    const real t252 = t250 - t251;
-    const real t253 = t239 + t252;
-    const real t254 = theta[0] * Q[7];
-    const real t255 = t253 - t254;
-    const real t256 = t238 + t255;
-    const real t257 = t221 + t256;
-    B[8] = t257;
-    const real t258 = theta[1] * f[2];
-    const real t259 = theta[2] * f[1];
-    const real t260 = t258 - t259;
-    G[0] = t260;
-    const real t261 = theta[2] * f[0];
-    const real t262 = theta[0] * f[2];
-    const real t263 = t261 - t262;
-    G[1] = t263;
-    const real t264 = theta[0] * f[1];
-    const real t265 = theta[1] * f[0];
-    const real t266 = t264 - t265;
-    G[2] = t266;
-    const real t267 = theta[1] * f[5];
-    const real t268 = x[1] * f[2];
-    const real t269 = x[2] * f[1];
-    const real t270 = t268 - t269;
-    const real t271 = theta[2] * f[4];
-    const real t272 = t270 - t271;
-    const real t273 = t267 + t272;
-    G[3] = t273;
-    const real t274 = theta[2] * f[3];
-    const real t275 = x[2] * f[0];
-    const real t276 = x[0] * f[2];
-    const real t277 = t275 - t276;
-    const real t278 = t274 + t277;
-    const real t279 = theta[0] * f[5];
-    const real t280 = t278 - t279;
-    G[4] = t280;
-    const real t281 = theta[0] * f[4];
-    const real t282 = x[0] * f[1];
-    const real t283 = x[1] * f[0];
-    const real t284 = t282 - t283;
-    const real t285 = theta[1] * f[3];
-    const real t286 = t284 - t285;
-    const real t287 = t281 + t286;
-    G[5] = t287;
-    const real t288 = d_s[0] * J[0];
-    const real t289 = t288 - laws[0];
-    row[0] = t289;
-    const real t290 = d_s[1] * J[1];
-    const real t291 = t290 - laws[1];
-    row[1] = t291;
-    const real t292 = d_s[2] * J[2];
-    const real t293 = t292 - laws[2];
-    row[2] = t293;
-    const real t294 = d_s[3] * J[3];
-    const real t295 = t294 - laws[3];
-    row[3] = t295;
-    const real t296 = d_s[4] * J[4];
-    const real t297 = t296 - laws[4];
-    row[4] = t297;
-    return 0;
+  real t8 = H[15] * d_u[0] + H[16] * d_u[1] + H[17] * d_u[2] + H[18] * d_u[3] + H[19] * d_u[4];
+  real t11 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t8 + t11;
+  real t21 = H[20] * d_u[0] + H[21] * d_u[1] + H[22] * d_u[2] + H[23] * d_u[3] + H[24] * d_u[4];
+  real t24 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t21 + t24;
+  real t34 = H[25] * d_u[0] + H[26] * d_u[1] + H[27] * d_u[2] + H[28] * d_u[3] + H[29] * d_u[4];
+  real t37 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t34 + t37;
+  B[3] = w[2] * t24 - w[1] * t37 + (H[15] * d_s[0] + H[16] * d_s[1] + H[17] * d_s[2] + H[18] *
+    d_s[3] + H[19] * d_s[4] + (theta[2] * Q[4] + (Q[1] * t34 - Q[2] * t21) - theta[1] * Q[5]));
+  B[4] = w[0] * t37 - w[2] * t11 + (H[20] * d_s[0] + H[21] * d_s[1] + H[22] * d_s[2] + H[23] *
+    d_s[3] + H[24] * d_s[4] + (theta[0] * Q[5] + (Q[2] * t8 - Q[0] * t34 - theta[2] * Q[3])));
+  B[5] = w[1] * t11 - w[0] * t24 + (H[25] * d_s[0] + H[26] * d_s[1] + H[27] * d_s[2] + H[28] *
+    d_s[3] + H[29] * d_s[4] + (theta[1] * Q[3] + (Q[0] * t21 - Q[1] * t8) - theta[0] * Q[4]));
+  real t102 = v[2] * 2.0;
+  real t104 = v[1] * 2.0;
+  real t125 = H[10] * d_u[0] + H[11] * d_u[1] + H[12] * d_u[2] + H[13] * d_u[3] + H[14] * d_u[4];
+  real t135 = H[5] * d_u[0] + H[6] * d_u[1] + H[7] * d_u[2] + H[8] * d_u[3] + H[9] * d_u[4];
+  real t148 = x[1] * Q[0] - x[0] * Q[1];
+  real t152 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t24 * t102 - t37 * t104 + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + H[3] * d_s[3] +
+    H[4] * d_s[4] + (v[2] * t21 + (w[1] * t125 - w[2] * t135) - v[1] * t34) + (theta[2] * Q[7] +
+    (x[2] * Q[4] + (2.0 * (Q[1] * t125) + (Q[1] * t148 - Q[2] * t152) - 2.0 * (Q[2] * t135)) - x[1]
+    * Q[5]) - theta[1] * Q[8]));
+  real t167 = v[0] * 2.0;
+  real t189 = H[0] * d_u[0] + H[1] * d_u[1] + H[2] * d_u[2] + H[3] * d_u[3] + H[4] * d_u[4];
+  real t203 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t37 * t167 - t11 * t102 + (H[5] * d_s[0] + H[6] * d_s[1] + H[7] * d_s[2] + H[8] * d_s[3] +
+    H[9] * d_s[4] + (v[0] * t34 + (w[2] * t189 - w[0] * t125 - v[2] * t8)) + (theta[0] * Q[8] +
+    (x[0] * Q[5] + (2.0 * (Q[2] * t189) + (Q[2] * t203 - Q[0] * t148 - 2.0 * (Q[0] * t125)) - x[2] *
+    Q[3]) - theta[2] * Q[6])));
+  B[8] = t11 * t104 - t24 * t167 + (H[10] * d_s[0] + H[11] * d_s[1] + H[12] * d_s[2] + H[13] *
+    d_s[3] + H[14] * d_s[4] + (v[1] * t8 + (w[0] * t135 - w[1] * t189) - v[0] * t21) + (theta[1] *
+    Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * t135) + (Q[0] * t152 - Q[1] * t203) - 2.0 * (Q[1] * t189))
+    - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  row[3] = d_s[3] * J[3] - laws[3];
+  row[4] = d_s[4] * J[4] - laws[4];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_steady_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_steady_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 5, "", 0, 0},
-    {"d_s", 5, "", 0, 0},
-    {"J", 5, "kg*m2 or kg", 0, 0},
-    {"laws", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_steady_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 5, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_steady, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], out[0], out[1], out[2]))
 
 /* a direction of a hinge with 5 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -8452,196 +2101,43 @@ static const mstmm_port mstmm_sweep_generic5_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[5] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic5_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+int mstmm_sweep_generic5_tangent_rotational(in_t theta, in_t H, in_t w, in_t Q, in_t f, in_t d_u,
+    in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[15] * d_u[0];
-    const real t1 = H[16] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[17] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * d_u[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[19] * d_u[4];
-    const real t8 = t6 + t7;
-    const real t9 = theta[2] * Q[1];
-    const real t10 = theta[1] * Q[2];
-    const real t11 = t9 - t10;
-    const real t12 = t8 + t11;
-    B[0] = t12;
-    const real t13 = H[20] * d_u[0];
-    const real t14 = H[21] * d_u[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[22] * d_u[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[23] * d_u[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[24] * d_u[4];
-    const real t21 = t19 + t20;
-    const real t22 = theta[0] * Q[2];
-    const real t23 = theta[2] * Q[0];
-    const real t24 = t22 - t23;
-    const real t25 = t21 + t24;
-    B[1] = t25;
-    const real t26 = H[25] * d_u[0];
-    const real t27 = H[26] * d_u[1];
-    const real t28 = t26 + t27;
-    const real t29 = H[27] * d_u[2];
-    const real t30 = t28 + t29;
-    const real t31 = H[28] * d_u[3];
-    const real t32 = t30 + t31;
-    const real t33 = H[29] * d_u[4];
-    const real t34 = t32 + t33;
-    const real t35 = theta[1] * Q[0];
-    const real t36 = theta[0] * Q[1];
-    const real t37 = t35 - t36;
-    const real t38 = t34 + t37;
-    B[2] = t38;
-    const real t39 = w[2] * t24;
-    const real t40 = w[1] * t37;
-    const real t41 = t39 - t40;
-    const real t42 = H[15] * d_s[0];
-    const real t43 = H[16] * d_s[1];
-    const real t44 = t42 + t43;
-    const real t45 = H[17] * d_s[2];
-    const real t46 = t44 + t45;
-    const real t47 = H[18] * d_s[3];
-    const real t48 = t46 + t47;
-    const real t49 = H[19] * d_s[4];
-    const real t50 = t48 + t49;
-    const real t51 = theta[2] * Q[4];
-    const real t52 = Q[1] * t34;
-    const real t53 = Q[2] * t21;
-    const real t54 = t52 - t53;
-    const real t55 = t51 + t54;
-    const real t56 = theta[1] * Q[5];
-    const real t57 = t55 - t56;
-    const real t58 = t50 + t57;
-    const real t59 = t41 + t58;
-    B[3] = t59;
-    const real t60 = w[0] * t37;
-    const real t61 = w[2] * t11;
-    const real t62 = t60 - t61;
-    const real t63 = H[20] * d_s[0];
-    const real t64 = H[21] * d_s[1];
-    const real t65 = t63 + t64;
-    const real t66 = H[22] * d_s[2];
-    const real t67 = t65 + t66;
-    const real t68 = H[23] * d_s[3];
-    const real t69 = t67 + t68;
-    const real t70 = H[24] * d_s[4];
-    const real t71 = t69 + t70;
-    const real t72 = theta[0] * Q[5];
-    const real t73 = Q[2] * t8;
-    const real t74 = Q[0] * t34;
-    const real t75 = t73 - t74;
-    const real t76 = theta[2] * Q[3];
-    const real t77 = t75 - t76;
-    const real t78 = t72 + t77;
-    const real t79 = t71 + t78;
-    const real t80 = t62 + t79;
-    B[4] = t80;
-    const real t81 = w[1] * t11;
-    const real t82 = w[0] * t24;
-    const real t83 = t81 - t82;
-    const real t84 = H[25] * d_s[0];
-    const real t85 = H[26] * d_s[1];
-    const real t86 = t84 + t85;
-    const real t87 = H[27] * d_s[2];
-    const real t88 = t86 + t87;
-    const real t89 = H[28] * d_s[3];
-    const real t90 = t88 + t89;
-    const real t91 = H[29] * d_s[4];
-    const real t92 = t90 + t91;
-    const real t93 = theta[1] * Q[3];
-    const real t94 = Q[0] * t21;
-    const real t95 = Q[1] * t8;
-    const real t96 = t94 - t95;
-    const real t97 = t93 + t96;
-    const real t98 = theta[0] * Q[4];
-    const real t99 = t97 - t98;
-    const real t100 = t92 + t99;
-    const real t101 = t83 + t100;
-    B[5] = t101;
-    const real t102 = theta[2] * Q[7];
-    const real t103 = theta[1] * Q[8];
-    const real t104 = t102 - t103;
-    B[6] = t104;
-    const real t105 = theta[0] * Q[8];
-    const real t106 = theta[2] * Q[6];
-    const real t107 = t105 - t106;
-    B[7] = t107;
-    const real t108 = theta[1] * Q[6];
-    const real t109 = theta[0] * Q[7];
-    const real t110 = t108 - t109;
-    B[8] = t110;
-    const real t111 = theta[1] * f[2];
-    const real t112 = theta[2] * f[1];
-    const real t113 = t111 - t112;
-    G[0] = t113;
-    const real t114 = theta[2] * f[0];
-    const real t115 = theta[0] * f[2];
-    const real t116 = t114 - t115;
-    G[1] = t116;
-    const real t117 = theta[0] * f[1];
-    const real t118 = theta[1] * f[0];
-    const real t119 = t117 - t118;
-    G[2] = t119;
-    const real t120 = theta[1] * f[5];
-    const real t121 = theta[2] * f[4];
-    const real t122 = t120 - t121;
-    G[3] = t122;
-    const real t123 = theta[2] * f[3];
-    const real t124 = theta[0] * f[5];
-    const real t125 = t123 - t124;
-    G[4] = t125;
-    const real t126 = theta[0] * f[4];
-    const real t127 = theta[1] * f[3];
-    const real t128 = t126 - t127;
-    G[5] = t128;
-    const real t129 = d_s[0] * J[0];
-    const real t130 = t129 - laws[0];
-    row[0] = t130;
-    const real t131 = d_s[1] * J[1];
-    const real t132 = t131 - laws[1];
-    row[1] = t132;
-    const real t133 = d_s[2] * J[2];
-    const real t134 = t133 - laws[2];
-    row[2] = t134;
-    const real t135 = d_s[3] * J[3];
-    const real t136 = t135 - laws[3];
-    row[3] = t136;
-    const real t137 = d_s[4] * J[4];
-    const real t138 = t137 - laws[4];
-    row[4] = t138;
-    return 0;
+  real t8 = H[15] * d_u[0] + H[16] * d_u[1] + H[17] * d_u[2] + H[18] * d_u[3] + H[19] * d_u[4];
+  real t11 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t8 + t11;
+  real t21 = H[20] * d_u[0] + H[21] * d_u[1] + H[22] * d_u[2] + H[23] * d_u[3] + H[24] * d_u[4];
+  real t24 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t21 + t24;
+  real t34 = H[25] * d_u[0] + H[26] * d_u[1] + H[27] * d_u[2] + H[28] * d_u[3] + H[29] * d_u[4];
+  real t37 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t34 + t37;
+  B[3] = w[2] * t24 - w[1] * t37 + (H[15] * d_s[0] + H[16] * d_s[1] + H[17] * d_s[2] + H[18] *
+    d_s[3] + H[19] * d_s[4] + (theta[2] * Q[4] + (Q[1] * t34 - Q[2] * t21) - theta[1] * Q[5]));
+  B[4] = w[0] * t37 - w[2] * t11 + (H[20] * d_s[0] + H[21] * d_s[1] + H[22] * d_s[2] + H[23] *
+    d_s[3] + H[24] * d_s[4] + (theta[0] * Q[5] + (Q[2] * t8 - Q[0] * t34 - theta[2] * Q[3])));
+  B[5] = w[1] * t11 - w[0] * t24 + (H[25] * d_s[0] + H[26] * d_s[1] + H[27] * d_s[2] + H[28] *
+    d_s[3] + H[29] * d_s[4] + (theta[1] * Q[3] + (Q[0] * t21 - Q[1] * t8) - theta[0] * Q[4]));
+  B[6] = theta[2] * Q[7] - theta[1] * Q[8];
+  B[7] = theta[0] * Q[8] - theta[2] * Q[6];
+  B[8] = theta[1] * Q[6] - theta[0] * Q[7];
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] - theta[2] * f[4];
+  G[4] = theta[2] * f[3] - theta[0] * f[5];
+  G[5] = theta[0] * f[4] - theta[1] * f[3];
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  row[3] = d_s[3] * J[3] - laws[3];
+  row[4] = d_s[4] * J[4] - laws[4];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_rotational_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_rotational_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 5, "", 0, 0},
-    {"d_s", 5, "", 0, 0},
-    {"J", 5, "kg*m2 or kg", 0, 0},
-    {"laws", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_rotational_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 5, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_rotational, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2]))
 
 /* rows of a hinge with 5 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -8655,551 +2151,283 @@ static const mstmm_port mstmm_sweep_generic5_tangent_rotational_outputs[] = {
  * out D[5][5] rows by unknowns
  * out one[5][5] unit matrix
  */
-int mstmm_sweep_generic5_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one)
+int mstmm_sweep_generic5_tangent_rows(in_t H, in_t B, in_t W, in_t S, out_t K, out_t right, out_t D,
+    out_t one)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = B[0] * v0;
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = B[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = B[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = B[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = B[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = B[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = B[6] * v17;
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = B[7] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = B[8] * v23;
-        const two_t v25 = v22 + v24;
-        const two_t v26 = B[9] * v0;
-        const two_t v27 = B[10] * v2;
-        const two_t v28 = v26 + v27;
-        const two_t v29 = B[11] * v5;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = B[12] * v8;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = B[13] * v11;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = B[14] * v14;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = B[15] * v17;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = B[16] * v20;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = B[17] * v23;
-        const two_t v42 = v40 + v41;
-        const two_t v43 = B[18] * v0;
-        const two_t v44 = B[19] * v2;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = B[20] * v5;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = B[21] * v8;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = B[22] * v11;
-        const two_t v51 = v49 + v50;
-        const two_t v52 = B[23] * v14;
-        const two_t v53 = v51 + v52;
-        const two_t v54 = B[24] * v17;
-        const two_t v55 = v53 + v54;
-        const two_t v56 = B[25] * v20;
-        const two_t v57 = v55 + v56;
-        const two_t v58 = B[26] * v23;
-        const two_t v59 = v57 + v58;
-        const two_t v60 = B[27] * v0;
-        const two_t v61 = B[28] * v2;
-        const two_t v62 = v60 + v61;
-        const two_t v63 = B[29] * v5;
-        const two_t v64 = v62 + v63;
-        const two_t v65 = B[30] * v8;
-        const two_t v66 = v64 + v65;
-        const two_t v67 = B[31] * v11;
-        const two_t v68 = v66 + v67;
-        const two_t v69 = B[32] * v14;
-        const two_t v70 = v68 + v69;
-        const two_t v71 = B[33] * v17;
-        const two_t v72 = v70 + v71;
-        const two_t v73 = B[34] * v20;
-        const two_t v74 = v72 + v73;
-        const two_t v75 = B[35] * v23;
-        const two_t v76 = v74 + v75;
-        const two_t v77 = B[36] * v0;
-        const two_t v78 = B[37] * v2;
-        const two_t v79 = v77 + v78;
-        const two_t v80 = B[38] * v5;
-        const two_t v81 = v79 + v80;
-        const two_t v82 = B[39] * v8;
-        const two_t v83 = v81 + v82;
-        const two_t v84 = B[40] * v11;
-        const two_t v85 = v83 + v84;
-        const two_t v86 = B[41] * v14;
-        const two_t v87 = v85 + v86;
-        const two_t v88 = B[42] * v17;
-        const two_t v89 = v87 + v88;
-        const two_t v90 = B[43] * v20;
-        const two_t v91 = v89 + v90;
-        const two_t v92 = B[44] * v23;
-        const two_t v93 = v91 + v92;
-        *(two_free_t *)(K + 0 + k) = v25;
-        *(two_free_t *)(K + 6 + k) = v42;
-        *(two_free_t *)(K + 12 + k) = v59;
-        *(two_free_t *)(K + 18 + k) = v76;
-        *(two_free_t *)(K + 24 + k) = v93;
-    }
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
-        const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
-        const two_t v3 = H[5] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
-        const two_t v6 = H[10] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
-        const two_t v9 = H[15] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
-        const two_t v12 = H[20] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
-        const two_t v15 = H[25] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = H[1] * v0;
-        const two_t v18 = H[6] * v2;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = H[11] * v5;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = H[16] * v8;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = H[21] * v11;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = H[26] * v14;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = H[2] * v0;
-        const two_t v29 = H[7] * v2;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = H[12] * v5;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = H[17] * v8;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = H[22] * v11;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = H[27] * v14;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = H[3] * v0;
-        const two_t v40 = H[8] * v2;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = H[13] * v5;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = H[18] * v8;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = H[23] * v11;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = H[28] * v14;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = H[4] * v0;
-        const two_t v51 = H[9] * v2;
-        const two_t v52 = v50 + v51;
-        const two_t v53 = H[14] * v5;
-        const two_t v54 = v52 + v53;
-        const two_t v55 = H[19] * v8;
-        const two_t v56 = v54 + v55;
-        const two_t v57 = H[24] * v11;
-        const two_t v58 = v56 + v57;
-        const two_t v59 = H[29] * v14;
-        const two_t v60 = v58 + v59;
-        *(two_free_t *)(right + 0 + k) = v16;
-        *(two_free_t *)(right + 9 + k) = v27;
-        *(two_free_t *)(right + 18 + k) = v38;
-        *(two_free_t *)(right + 27 + k) = v49;
-        *(two_free_t *)(right + 36 + k) = v60;
-    }
-    const real t1005 = H[0] * K[0];
-    const real t1006 = H[5] * K[1];
-    const real t1007 = t1005 + t1006;
-    const real t1008 = H[10] * K[2];
-    const real t1009 = t1007 + t1008;
-    const real t1010 = H[15] * K[3];
-    const real t1011 = t1009 + t1010;
-    const real t1012 = H[20] * K[4];
-    const real t1013 = t1011 + t1012;
-    const real t1014 = H[25] * K[5];
-    const real t1015 = t1013 + t1014;
-    const real t1016 = W[0] + t1015;
-    D[0] = t1016;
-    const real t1017 = H[0] * K[6];
-    const real t1018 = H[5] * K[7];
-    const real t1019 = t1017 + t1018;
-    const real t1020 = H[10] * K[8];
-    const real t1021 = t1019 + t1020;
-    const real t1022 = H[15] * K[9];
-    const real t1023 = t1021 + t1022;
-    const real t1024 = H[20] * K[10];
-    const real t1025 = t1023 + t1024;
-    const real t1026 = H[25] * K[11];
-    const real t1027 = t1025 + t1026;
-    const real t1028 = W[5] + t1027;
-    D[1] = t1028;
-    const real t1029 = H[0] * K[12];
-    const real t1030 = H[5] * K[13];
-    const real t1031 = t1029 + t1030;
-    const real t1032 = H[10] * K[14];
-    const real t1033 = t1031 + t1032;
-    const real t1034 = H[15] * K[15];
-    const real t1035 = t1033 + t1034;
-    const real t1036 = H[20] * K[16];
-    const real t1037 = t1035 + t1036;
-    const real t1038 = H[25] * K[17];
-    const real t1039 = t1037 + t1038;
-    const real t1040 = W[10] + t1039;
-    D[2] = t1040;
-    const real t1041 = H[0] * K[18];
-    const real t1042 = H[5] * K[19];
-    const real t1043 = t1041 + t1042;
-    const real t1044 = H[10] * K[20];
-    const real t1045 = t1043 + t1044;
-    const real t1046 = H[15] * K[21];
-    const real t1047 = t1045 + t1046;
-    const real t1048 = H[20] * K[22];
-    const real t1049 = t1047 + t1048;
-    const real t1050 = H[25] * K[23];
-    const real t1051 = t1049 + t1050;
-    const real t1052 = W[15] + t1051;
-    D[3] = t1052;
-    const real t1053 = H[0] * K[24];
-    const real t1054 = H[5] * K[25];
-    const real t1055 = t1053 + t1054;
-    const real t1056 = H[10] * K[26];
-    const real t1057 = t1055 + t1056;
-    const real t1058 = H[15] * K[27];
-    const real t1059 = t1057 + t1058;
-    const real t1060 = H[20] * K[28];
-    const real t1061 = t1059 + t1060;
-    const real t1062 = H[25] * K[29];
-    const real t1063 = t1061 + t1062;
-    const real t1064 = W[20] + t1063;
-    D[4] = t1064;
-    const real t1065 = H[1] * K[0];
-    const real t1066 = H[6] * K[1];
-    const real t1067 = t1065 + t1066;
-    const real t1068 = H[11] * K[2];
-    const real t1069 = t1067 + t1068;
-    const real t1070 = H[16] * K[3];
-    const real t1071 = t1069 + t1070;
-    const real t1072 = H[21] * K[4];
-    const real t1073 = t1071 + t1072;
-    const real t1074 = H[26] * K[5];
-    const real t1075 = t1073 + t1074;
-    const real t1076 = W[1] + t1075;
-    D[5] = t1076;
-    const real t1077 = H[1] * K[6];
-    const real t1078 = H[6] * K[7];
-    const real t1079 = t1077 + t1078;
-    const real t1080 = H[11] * K[8];
-    const real t1081 = t1079 + t1080;
-    const real t1082 = H[16] * K[9];
-    const real t1083 = t1081 + t1082;
-    const real t1084 = H[21] * K[10];
-    const real t1085 = t1083 + t1084;
-    const real t1086 = H[26] * K[11];
-    const real t1087 = t1085 + t1086;
-    const real t1088 = W[6] + t1087;
-    D[6] = t1088;
-    const real t1089 = H[1] * K[12];
-    const real t1090 = H[6] * K[13];
-    const real t1091 = t1089 + t1090;
-    const real t1092 = H[11] * K[14];
-    const real t1093 = t1091 + t1092;
-    const real t1094 = H[16] * K[15];
-    const real t1095 = t1093 + t1094;
-    const real t1096 = H[21] * K[16];
-    const real t1097 = t1095 + t1096;
-    const real t1098 = H[26] * K[17];
-    const real t1099 = t1097 + t1098;
-    const real t1100 = W[11] + t1099;
-    D[7] = t1100;
-    const real t1101 = H[1] * K[18];
-    const real t1102 = H[6] * K[19];
-    const real t1103 = t1101 + t1102;
-    const real t1104 = H[11] * K[20];
-    const real t1105 = t1103 + t1104;
-    const real t1106 = H[16] * K[21];
-    const real t1107 = t1105 + t1106;
-    const real t1108 = H[21] * K[22];
-    const real t1109 = t1107 + t1108;
-    const real t1110 = H[26] * K[23];
-    const real t1111 = t1109 + t1110;
-    const real t1112 = W[16] + t1111;
-    D[8] = t1112;
-    const real t1113 = H[1] * K[24];
-    const real t1114 = H[6] * K[25];
-    const real t1115 = t1113 + t1114;
-    const real t1116 = H[11] * K[26];
-    const real t1117 = t1115 + t1116;
-    const real t1118 = H[16] * K[27];
-    const real t1119 = t1117 + t1118;
-    const real t1120 = H[21] * K[28];
-    const real t1121 = t1119 + t1120;
-    const real t1122 = H[26] * K[29];
-    const real t1123 = t1121 + t1122;
-    const real t1124 = W[21] + t1123;
-    D[9] = t1124;
-    const real t1125 = H[2] * K[0];
-    const real t1126 = H[7] * K[1];
-    const real t1127 = t1125 + t1126;
-    const real t1128 = H[12] * K[2];
-    const real t1129 = t1127 + t1128;
-    const real t1130 = H[17] * K[3];
-    const real t1131 = t1129 + t1130;
-    const real t1132 = H[22] * K[4];
-    const real t1133 = t1131 + t1132;
-    const real t1134 = H[27] * K[5];
-    const real t1135 = t1133 + t1134;
-    const real t1136 = W[2] + t1135;
-    D[10] = t1136;
-    const real t1137 = H[2] * K[6];
-    const real t1138 = H[7] * K[7];
-    const real t1139 = t1137 + t1138;
-    const real t1140 = H[12] * K[8];
-    const real t1141 = t1139 + t1140;
-    const real t1142 = H[17] * K[9];
-    const real t1143 = t1141 + t1142;
-    const real t1144 = H[22] * K[10];
-    const real t1145 = t1143 + t1144;
-    const real t1146 = H[27] * K[11];
-    const real t1147 = t1145 + t1146;
-    const real t1148 = W[7] + t1147;
-    D[11] = t1148;
-    const real t1149 = H[2] * K[12];
-    const real t1150 = H[7] * K[13];
-    const real t1151 = t1149 + t1150;
-    const real t1152 = H[12] * K[14];
-    const real t1153 = t1151 + t1152;
-    const real t1154 = H[17] * K[15];
-    const real t1155 = t1153 + t1154;
-    const real t1156 = H[22] * K[16];
-    const real t1157 = t1155 + t1156;
-    const real t1158 = H[27] * K[17];
-    const real t1159 = t1157 + t1158;
-    const real t1160 = W[12] + t1159;
-    D[12] = t1160;
-    const real t1161 = H[2] * K[18];
-    const real t1162 = H[7] * K[19];
-    const real t1163 = t1161 + t1162;
-    const real t1164 = H[12] * K[20];
-    const real t1165 = t1163 + t1164;
-    const real t1166 = H[17] * K[21];
-    const real t1167 = t1165 + t1166;
-    const real t1168 = H[22] * K[22];
-    const real t1169 = t1167 + t1168;
-    const real t1170 = H[27] * K[23];
-    const real t1171 = t1169 + t1170;
-    const real t1172 = W[17] + t1171;
-    D[13] = t1172;
-    const real t1173 = H[2] * K[24];
-    const real t1174 = H[7] * K[25];
-    const real t1175 = t1173 + t1174;
-    const real t1176 = H[12] * K[26];
-    const real t1177 = t1175 + t1176;
-    const real t1178 = H[17] * K[27];
-    const real t1179 = t1177 + t1178;
-    const real t1180 = H[22] * K[28];
-    const real t1181 = t1179 + t1180;
-    const real t1182 = H[27] * K[29];
-    const real t1183 = t1181 + t1182;
-    const real t1184 = W[22] + t1183;
-    D[14] = t1184;
-    const real t1185 = H[3] * K[0];
-    const real t1186 = H[8] * K[1];
-    const real t1187 = t1185 + t1186;
-    const real t1188 = H[13] * K[2];
-    const real t1189 = t1187 + t1188;
-    const real t1190 = H[18] * K[3];
-    const real t1191 = t1189 + t1190;
-    const real t1192 = H[23] * K[4];
-    const real t1193 = t1191 + t1192;
-    const real t1194 = H[28] * K[5];
-    const real t1195 = t1193 + t1194;
-    const real t1196 = W[3] + t1195;
-    D[15] = t1196;
-    const real t1197 = H[3] * K[6];
-    const real t1198 = H[8] * K[7];
-    const real t1199 = t1197 + t1198;
-    const real t1200 = H[13] * K[8];
-    const real t1201 = t1199 + t1200;
-    const real t1202 = H[18] * K[9];
-    const real t1203 = t1201 + t1202;
-    const real t1204 = H[23] * K[10];
-    const real t1205 = t1203 + t1204;
-    const real t1206 = H[28] * K[11];
-    const real t1207 = t1205 + t1206;
-    const real t1208 = W[8] + t1207;
-    D[16] = t1208;
-    const real t1209 = H[3] * K[12];
-    const real t1210 = H[8] * K[13];
-    const real t1211 = t1209 + t1210;
-    const real t1212 = H[13] * K[14];
-    const real t1213 = t1211 + t1212;
-    const real t1214 = H[18] * K[15];
-    const real t1215 = t1213 + t1214;
-    const real t1216 = H[23] * K[16];
-    const real t1217 = t1215 + t1216;
-    const real t1218 = H[28] * K[17];
-    const real t1219 = t1217 + t1218;
-    const real t1220 = W[13] + t1219;
-    D[17] = t1220;
-    const real t1221 = H[3] * K[18];
-    const real t1222 = H[8] * K[19];
-    const real t1223 = t1221 + t1222;
-    const real t1224 = H[13] * K[20];
-    const real t1225 = t1223 + t1224;
-    const real t1226 = H[18] * K[21];
-    const real t1227 = t1225 + t1226;
-    const real t1228 = H[23] * K[22];
-    const real t1229 = t1227 + t1228;
-    const real t1230 = H[28] * K[23];
-    const real t1231 = t1229 + t1230;
-    const real t1232 = W[18] + t1231;
-    D[18] = t1232;
-    const real t1233 = H[3] * K[24];
-    const real t1234 = H[8] * K[25];
-    const real t1235 = t1233 + t1234;
-    const real t1236 = H[13] * K[26];
-    const real t1237 = t1235 + t1236;
-    const real t1238 = H[18] * K[27];
-    const real t1239 = t1237 + t1238;
-    const real t1240 = H[23] * K[28];
-    const real t1241 = t1239 + t1240;
-    const real t1242 = H[28] * K[29];
-    const real t1243 = t1241 + t1242;
-    const real t1244 = W[23] + t1243;
-    D[19] = t1244;
-    const real t1245 = H[4] * K[0];
-    const real t1246 = H[9] * K[1];
-    const real t1247 = t1245 + t1246;
-    const real t1248 = H[14] * K[2];
-    const real t1249 = t1247 + t1248;
-    const real t1250 = H[19] * K[3];
-    const real t1251 = t1249 + t1250;
-    const real t1252 = H[24] * K[4];
-    const real t1253 = t1251 + t1252;
-    const real t1254 = H[29] * K[5];
-    const real t1255 = t1253 + t1254;
-    const real t1256 = W[4] + t1255;
-    D[20] = t1256;
-    const real t1257 = H[4] * K[6];
-    const real t1258 = H[9] * K[7];
-    const real t1259 = t1257 + t1258;
-    const real t1260 = H[14] * K[8];
-    const real t1261 = t1259 + t1260;
-    const real t1262 = H[19] * K[9];
-    const real t1263 = t1261 + t1262;
-    const real t1264 = H[24] * K[10];
-    const real t1265 = t1263 + t1264;
-    const real t1266 = H[29] * K[11];
-    const real t1267 = t1265 + t1266;
-    const real t1268 = W[9] + t1267;
-    D[21] = t1268;
-    const real t1269 = H[4] * K[12];
-    const real t1270 = H[9] * K[13];
-    const real t1271 = t1269 + t1270;
-    const real t1272 = H[14] * K[14];
-    const real t1273 = t1271 + t1272;
-    const real t1274 = H[19] * K[15];
-    const real t1275 = t1273 + t1274;
-    const real t1276 = H[24] * K[16];
-    const real t1277 = t1275 + t1276;
-    const real t1278 = H[29] * K[17];
-    const real t1279 = t1277 + t1278;
-    const real t1280 = W[14] + t1279;
-    D[22] = t1280;
-    const real t1281 = H[4] * K[18];
-    const real t1282 = H[9] * K[19];
-    const real t1283 = t1281 + t1282;
-    const real t1284 = H[14] * K[20];
-    const real t1285 = t1283 + t1284;
-    const real t1286 = H[19] * K[21];
-    const real t1287 = t1285 + t1286;
-    const real t1288 = H[24] * K[22];
-    const real t1289 = t1287 + t1288;
-    const real t1290 = H[29] * K[23];
-    const real t1291 = t1289 + t1290;
-    const real t1292 = W[19] + t1291;
-    D[23] = t1292;
-    const real t1293 = H[4] * K[24];
-    const real t1294 = H[9] * K[25];
-    const real t1295 = t1293 + t1294;
-    const real t1296 = H[14] * K[26];
-    const real t1297 = t1295 + t1296;
-    const real t1298 = H[19] * K[27];
-    const real t1299 = t1297 + t1298;
-    const real t1300 = H[24] * K[28];
-    const real t1301 = t1299 + t1300;
-    const real t1302 = H[29] * K[29];
-    const real t1303 = t1301 + t1302;
-    const real t1304 = W[24] + t1303;
-    D[24] = t1304;
-    one[0] = 1.0;
-    one[1] = 0.0;
-    one[2] = 0.0;
-    one[3] = 0.0;
-    one[4] = 0.0;
-    one[5] = 0.0;
-    one[6] = 1.0;
-    one[7] = 0.0;
-    one[8] = 0.0;
-    one[9] = 0.0;
-    one[10] = 0.0;
-    one[11] = 0.0;
-    one[12] = 1.0;
-    one[13] = 0.0;
-    one[14] = 0.0;
-    one[15] = 0.0;
-    one[16] = 0.0;
-    one[17] = 0.0;
-    one[18] = 1.0;
-    one[19] = 0.0;
-    one[20] = 0.0;
-    one[21] = 0.0;
-    one[22] = 0.0;
-    one[23] = 0.0;
-    one[24] = 1.0;
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = B[0] * v0;
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = B[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = B[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = B[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = B[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = B[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = B[6] * v17;
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = B[7] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = B[8] * v23;
+    const two_t v25 = v22 + v24;
+    const two_t v26 = B[9] * v0;
+    const two_t v27 = B[10] * v2;
+    const two_t v28 = v26 + v27;
+    const two_t v29 = B[11] * v5;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = B[12] * v8;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = B[13] * v11;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = B[14] * v14;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = B[15] * v17;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = B[16] * v20;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = B[17] * v23;
+    const two_t v42 = v40 + v41;
+    const two_t v43 = B[18] * v0;
+    const two_t v44 = B[19] * v2;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = B[20] * v5;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = B[21] * v8;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = B[22] * v11;
+    const two_t v51 = v49 + v50;
+    const two_t v52 = B[23] * v14;
+    const two_t v53 = v51 + v52;
+    const two_t v54 = B[24] * v17;
+    const two_t v55 = v53 + v54;
+    const two_t v56 = B[25] * v20;
+    const two_t v57 = v55 + v56;
+    const two_t v58 = B[26] * v23;
+    const two_t v59 = v57 + v58;
+    const two_t v60 = B[27] * v0;
+    const two_t v61 = B[28] * v2;
+    const two_t v62 = v60 + v61;
+    const two_t v63 = B[29] * v5;
+    const two_t v64 = v62 + v63;
+    const two_t v65 = B[30] * v8;
+    const two_t v66 = v64 + v65;
+    const two_t v67 = B[31] * v11;
+    const two_t v68 = v66 + v67;
+    const two_t v69 = B[32] * v14;
+    const two_t v70 = v68 + v69;
+    const two_t v71 = B[33] * v17;
+    const two_t v72 = v70 + v71;
+    const two_t v73 = B[34] * v20;
+    const two_t v74 = v72 + v73;
+    const two_t v75 = B[35] * v23;
+    const two_t v76 = v74 + v75;
+    const two_t v77 = B[36] * v0;
+    const two_t v78 = B[37] * v2;
+    const two_t v79 = v77 + v78;
+    const two_t v80 = B[38] * v5;
+    const two_t v81 = v79 + v80;
+    const two_t v82 = B[39] * v8;
+    const two_t v83 = v81 + v82;
+    const two_t v84 = B[40] * v11;
+    const two_t v85 = v83 + v84;
+    const two_t v86 = B[41] * v14;
+    const two_t v87 = v85 + v86;
+    const two_t v88 = B[42] * v17;
+    const two_t v89 = v87 + v88;
+    const two_t v90 = B[43] * v20;
+    const two_t v91 = v89 + v90;
+    const two_t v92 = B[44] * v23;
+    const two_t v93 = v91 + v92;
+    *(two_free_t *)(K + 0 + k) = v25;
+    *(two_free_t *)(K + 6 + k) = v42;
+    *(two_free_t *)(K + 12 + k) = v59;
+    *(two_free_t *)(K + 18 + k) = v76;
+    *(two_free_t *)(K + 24 + k) = v93;
+  }
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
+    const two_t v1 = H[0] * v0;
+    const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
+    const two_t v3 = H[5] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
+    const two_t v6 = H[10] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
+    const two_t v9 = H[15] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
+    const two_t v12 = H[20] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
+    const two_t v15 = H[25] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = H[1] * v0;
+    const two_t v18 = H[6] * v2;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = H[11] * v5;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = H[16] * v8;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = H[21] * v11;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = H[26] * v14;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = H[2] * v0;
+    const two_t v29 = H[7] * v2;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = H[12] * v5;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = H[17] * v8;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = H[22] * v11;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = H[27] * v14;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = H[3] * v0;
+    const two_t v40 = H[8] * v2;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = H[13] * v5;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = H[18] * v8;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = H[23] * v11;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = H[28] * v14;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = H[4] * v0;
+    const two_t v51 = H[9] * v2;
+    const two_t v52 = v50 + v51;
+    const two_t v53 = H[14] * v5;
+    const two_t v54 = v52 + v53;
+    const two_t v55 = H[19] * v8;
+    const two_t v56 = v54 + v55;
+    const two_t v57 = H[24] * v11;
+    const two_t v58 = v56 + v57;
+    const two_t v59 = H[29] * v14;
+    const two_t v60 = v58 + v59;
+    *(two_free_t *)(right + 0 + k) = v16;
+    *(two_free_t *)(right + 9 + k) = v27;
+    *(two_free_t *)(right + 18 + k) = v38;
+    *(two_free_t *)(right + 27 + k) = v49;
+    *(two_free_t *)(right + 36 + k) = v60;
+  }
+  real t1016 = W[0] + (H[0] * K[0] + H[5] * K[1] + H[10] * K[2] + H[15] * K[3] + H[20] * K[4] +
+    H[25] * K[5]);
+  D[0] = t1016;
+  real t1028 = W[5] + (H[0] * K[6] + H[5] * K[7] + H[10] * K[8] + H[15] * K[9] + H[20] * K[10] +
+    H[25] * K[11]);
+  D[1] = t1028;
+  real t1040 = W[10] + (H[0] * K[12] + H[5] * K[13] + H[10] * K[14] + H[15] * K[15] + H[20] * K[16]
+    + H[25] * K[17]);
+  D[2] = t1040;
+  real t1052 = W[15] + (H[0] * K[18] + H[5] * K[19] + H[10] * K[20] + H[15] * K[21] + H[20] * K[22]
+    + H[25] * K[23]);
+  D[3] = t1052;
+  real t1064 = W[20] + (H[0] * K[24] + H[5] * K[25] + H[10] * K[26] + H[15] * K[27] + H[20] * K[28]
+    + H[25] * K[29]);
+  D[4] = t1064;
+  real t1076 = W[1] + (H[1] * K[0] + H[6] * K[1] + H[11] * K[2] + H[16] * K[3] + H[21] * K[4] +
+    H[26] * K[5]);
+  D[5] = t1076;
+  real t1088 = W[6] + (H[1] * K[6] + H[6] * K[7] + H[11] * K[8] + H[16] * K[9] + H[21] * K[10] +
+    H[26] * K[11]);
+  D[6] = t1088;
+  real t1100 = W[11] + (H[1] * K[12] + H[6] * K[13] + H[11] * K[14] + H[16] * K[15] + H[21] * K[16]
+    + H[26] * K[17]);
+  D[7] = t1100;
+  real t1112 = W[16] + (H[1] * K[18] + H[6] * K[19] + H[11] * K[20] + H[16] * K[21] + H[21] * K[22]
+    + H[26] * K[23]);
+  D[8] = t1112;
+  real t1124 = W[21] + (H[1] * K[24] + H[6] * K[25] + H[11] * K[26] + H[16] * K[27] + H[21] * K[28]
+    + H[26] * K[29]);
+  D[9] = t1124;
+  real t1136 = W[2] + (H[2] * K[0] + H[7] * K[1] + H[12] * K[2] + H[17] * K[3] + H[22] * K[4] +
+    H[27] * K[5]);
+  D[10] = t1136;
+  real t1148 = W[7] + (H[2] * K[6] + H[7] * K[7] + H[12] * K[8] + H[17] * K[9] + H[22] * K[10] +
+    H[27] * K[11]);
+  D[11] = t1148;
+  real t1160 = W[12] + (H[2] * K[12] + H[7] * K[13] + H[12] * K[14] + H[17] * K[15] + H[22] * K[16]
+    + H[27] * K[17]);
+  D[12] = t1160;
+  real t1172 = W[17] + (H[2] * K[18] + H[7] * K[19] + H[12] * K[20] + H[17] * K[21] + H[22] * K[22]
+    + H[27] * K[23]);
+  D[13] = t1172;
+  real t1184 = W[22] + (H[2] * K[24] + H[7] * K[25] + H[12] * K[26] + H[17] * K[27] + H[22] * K[28]
+    + H[27] * K[29]);
+  D[14] = t1184;
+  real t1196 = W[3] + (H[3] * K[0] + H[8] * K[1] + H[13] * K[2] + H[18] * K[3] + H[23] * K[4] +
+    H[28] * K[5]);
+  D[15] = t1196;
+  real t1208 = W[8] + (H[3] * K[6] + H[8] * K[7] + H[13] * K[8] + H[18] * K[9] + H[23] * K[10] +
+    H[28] * K[11]);
+  D[16] = t1208;
+  real t1220 = W[13] + (H[3] * K[12] + H[8] * K[13] + H[13] * K[14] + H[18] * K[15] + H[23] * K[16]
+    + H[28] * K[17]);
+  D[17] = t1220;
+  real t1232 = W[18] + (H[3] * K[18] + H[8] * K[19] + H[13] * K[20] + H[18] * K[21] + H[23] * K[22]
+    + H[28] * K[23]);
+  D[18] = t1232;
+  real t1244 = W[23] + (H[3] * K[24] + H[8] * K[25] + H[13] * K[26] + H[18] * K[27] + H[23] * K[28]
+    + H[28] * K[29]);
+  D[19] = t1244;
+  real t1256 = W[4] + (H[4] * K[0] + H[9] * K[1] + H[14] * K[2] + H[19] * K[3] + H[24] * K[4] +
+    H[29] * K[5]);
+  D[20] = t1256;
+  real t1268 = W[9] + (H[4] * K[6] + H[9] * K[7] + H[14] * K[8] + H[19] * K[9] + H[24] * K[10] +
+    H[29] * K[11]);
+  D[21] = t1268;
+  real t1280 = W[14] + (H[4] * K[12] + H[9] * K[13] + H[14] * K[14] + H[19] * K[15] + H[24] * K[16]
+    + H[29] * K[17]);
+  D[22] = t1280;
+  real t1292 = W[19] + (H[4] * K[18] + H[9] * K[19] + H[14] * K[20] + H[19] * K[21] + H[24] * K[22]
+    + H[29] * K[23]);
+  D[23] = t1292;
+  real t1304 = W[24] + (H[4] * K[24] + H[9] * K[25] + H[14] * K[26] + H[19] * K[27] + H[24] * K[28]
+    + H[29] * K[29]);
+  D[24] = t1304;
+  one[0] = 1.0;
+  one[1] = 0.0;
+  one[2] = 0.0;
+  one[3] = 0.0;
+  one[4] = 0.0;
+  one[5] = 0.0;
+  one[6] = 1.0;
+  one[7] = 0.0;
+  one[8] = 0.0;
+  one[9] = 0.0;
+  one[10] = 0.0;
+  one[11] = 0.0;
+  one[12] = 1.0;
+  one[13] = 0.0;
+  one[14] = 0.0;
+  one[15] = 0.0;
+  one[16] = 0.0;
+  one[17] = 0.0;
+  one[18] = 1.0;
+  one[19] = 0.0;
+  one[20] = 0.0;
+  one[21] = 0.0;
+  one[22] = 0.0;
+  one[23] = 0.0;
+  one[24] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_rows_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_rows_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"B", 45, "", 0, 0},
-    {"W", 25, "", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_rows_outputs[] = {
-    {"K", 30, "", 0, 0},
-    {"right", 45, "", 0, 0},
-    {"D", 25, "", 0, 0},
-    {"one", 25, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_rows, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3]))
 
 /* S without the unknowns of a hinge with 5 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9212,207 +2440,190 @@ static const mstmm_port mstmm_sweep_generic5_tangent_rows_outputs[] = {
  * out V[5][6] K + G, one row per direction
  * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
-int mstmm_sweep_generic5_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S)
+int mstmm_sweep_generic5_tangent_reduce(in_t inverse, in_t right, in_t K, in_t G, out_t gain,
+    out_t V, out_t S)
 {
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_beside(right + 0 + k);
-        const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_beside(right + 9 + k);
-        const two_t v3 = inverse[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(right + 18 + k);
-        const two_t v6 = inverse[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(right + 27 + k);
-        const two_t v9 = inverse[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(right + 36 + k);
-        const two_t v12 = inverse[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = inverse[5] * v0;
-        const two_t v15 = inverse[6] * v2;
-        const two_t v16 = v14 + v15;
-        const two_t v17 = inverse[7] * v5;
-        const two_t v18 = v16 + v17;
-        const two_t v19 = inverse[8] * v8;
-        const two_t v20 = v18 + v19;
-        const two_t v21 = inverse[9] * v11;
-        const two_t v22 = v20 + v21;
-        const two_t v23 = inverse[10] * v0;
-        const two_t v24 = inverse[11] * v2;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = inverse[12] * v5;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = inverse[13] * v8;
-        const two_t v29 = v27 + v28;
-        const two_t v30 = inverse[14] * v11;
-        const two_t v31 = v29 + v30;
-        const two_t v32 = inverse[15] * v0;
-        const two_t v33 = inverse[16] * v2;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = inverse[17] * v5;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = inverse[18] * v8;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = inverse[19] * v11;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = inverse[20] * v0;
-        const two_t v42 = inverse[21] * v2;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = inverse[22] * v5;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = inverse[23] * v8;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = inverse[24] * v11;
-        const two_t v49 = v47 + v48;
-        *(two_free_t *)(gain + 0 + k) = v13;
-        *(two_free_t *)(gain + 9 + k) = v22;
-        *(two_free_t *)(gain + 18 + k) = v31;
-        *(two_free_t *)(gain + 27 + k) = v40;
-        *(two_free_t *)(gain + 36 + k) = v49;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(K + 0 + k);
-        const two_t v1 = mstmm_beside(G + 0 + k);
-        const two_t v2 = v0 + v1;
-        const two_t v3 = mstmm_beside(K + 6 + k);
-        const two_t v4 = mstmm_beside(G + 6 + k);
-        const two_t v5 = v3 + v4;
-        const two_t v6 = mstmm_beside(K + 12 + k);
-        const two_t v7 = mstmm_beside(G + 12 + k);
-        const two_t v8 = v6 + v7;
-        const two_t v9 = mstmm_beside(K + 18 + k);
-        const two_t v10 = mstmm_beside(G + 18 + k);
-        const two_t v11 = v9 + v10;
-        const two_t v12 = mstmm_beside(K + 24 + k);
-        const two_t v13 = mstmm_beside(G + 24 + k);
-        const two_t v14 = v12 + v13;
-        *(two_free_t *)(V + 0 + k) = v2;
-        *(two_free_t *)(V + 6 + k) = v5;
-        *(two_free_t *)(V + 12 + k) = v8;
-        *(two_free_t *)(V + 18 + k) = v11;
-        *(two_free_t *)(V + 24 + k) = v14;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(V + 0 + k);
-        const two_t v1 = gain[0] * v0;
-        const two_t v2 = mstmm_beside(V + 6 + k);
-        const two_t v3 = gain[9] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(V + 12 + k);
-        const two_t v6 = gain[18] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(V + 18 + k);
-        const two_t v9 = gain[27] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(V + 24 + k);
-        const two_t v12 = gain[36] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v15 = gain[1] * v0;
-        const two_t v16 = gain[10] * v2;
-        const two_t v17 = v15 + v16;
-        const two_t v18 = gain[19] * v5;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = gain[28] * v8;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = gain[37] * v11;
-        const two_t v23 = v21 + v22;
-        const two_t v25 = gain[2] * v0;
-        const two_t v26 = gain[11] * v2;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = gain[20] * v5;
-        const two_t v29 = v27 + v28;
-        const two_t v30 = gain[29] * v8;
-        const two_t v31 = v29 + v30;
-        const two_t v32 = gain[38] * v11;
-        const two_t v33 = v31 + v32;
-        const two_t v35 = gain[3] * v0;
-        const two_t v36 = gain[12] * v2;
-        const two_t v37 = v35 + v36;
-        const two_t v38 = gain[21] * v5;
-        const two_t v39 = v37 + v38;
-        const two_t v40 = gain[30] * v8;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = gain[39] * v11;
-        const two_t v43 = v41 + v42;
-        const two_t v45 = gain[4] * v0;
-        const two_t v46 = gain[13] * v2;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = gain[22] * v5;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = gain[31] * v8;
-        const two_t v51 = v49 + v50;
-        const two_t v52 = gain[40] * v11;
-        const two_t v53 = v51 + v52;
-        const two_t v55 = gain[5] * v0;
-        const two_t v56 = gain[14] * v2;
-        const two_t v57 = v55 + v56;
-        const two_t v58 = gain[23] * v5;
-        const two_t v59 = v57 + v58;
-        const two_t v60 = gain[32] * v8;
-        const two_t v61 = v59 + v60;
-        const two_t v62 = gain[41] * v11;
-        const two_t v63 = v61 + v62;
-        const two_t v65 = gain[6] * v0;
-        const two_t v66 = gain[15] * v2;
-        const two_t v67 = v65 + v66;
-        const two_t v68 = gain[24] * v5;
-        const two_t v69 = v67 + v68;
-        const two_t v70 = gain[33] * v8;
-        const two_t v71 = v69 + v70;
-        const two_t v72 = gain[42] * v11;
-        const two_t v73 = v71 + v72;
-        const two_t v75 = gain[7] * v0;
-        const two_t v76 = gain[16] * v2;
-        const two_t v77 = v75 + v76;
-        const two_t v78 = gain[25] * v5;
-        const two_t v79 = v77 + v78;
-        const two_t v80 = gain[34] * v8;
-        const two_t v81 = v79 + v80;
-        const two_t v82 = gain[43] * v11;
-        const two_t v83 = v81 + v82;
-        const two_t v85 = gain[8] * v0;
-        const two_t v86 = gain[17] * v2;
-        const two_t v87 = v85 + v86;
-        const two_t v88 = gain[26] * v5;
-        const two_t v89 = v87 + v88;
-        const two_t v90 = gain[35] * v8;
-        const two_t v91 = v89 + v90;
-        const two_t v92 = gain[44] * v11;
-        const two_t v93 = v91 + v92;
-        *(two_free_t *)(S + 0 + k) -= v13;
-        *(two_free_t *)(S + 6 + k) -= v23;
-        *(two_free_t *)(S + 12 + k) -= v33;
-        *(two_free_t *)(S + 18 + k) -= v43;
-        *(two_free_t *)(S + 24 + k) -= v53;
-        *(two_free_t *)(S + 30 + k) -= v63;
-        *(two_free_t *)(S + 36 + k) -= v73;
-        *(two_free_t *)(S + 42 + k) -= v83;
-        *(two_free_t *)(S + 48 + k) -= v93;
-    }
-    return 0;
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_beside(right + 0 + k);
+    const two_t v1 = inverse[0] * v0;
+    const two_t v2 = mstmm_beside(right + 9 + k);
+    const two_t v3 = inverse[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(right + 18 + k);
+    const two_t v6 = inverse[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(right + 27 + k);
+    const two_t v9 = inverse[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(right + 36 + k);
+    const two_t v12 = inverse[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = inverse[5] * v0;
+    const two_t v15 = inverse[6] * v2;
+    const two_t v16 = v14 + v15;
+    const two_t v17 = inverse[7] * v5;
+    const two_t v18 = v16 + v17;
+    const two_t v19 = inverse[8] * v8;
+    const two_t v20 = v18 + v19;
+    const two_t v21 = inverse[9] * v11;
+    const two_t v22 = v20 + v21;
+    const two_t v23 = inverse[10] * v0;
+    const two_t v24 = inverse[11] * v2;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = inverse[12] * v5;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = inverse[13] * v8;
+    const two_t v29 = v27 + v28;
+    const two_t v30 = inverse[14] * v11;
+    const two_t v31 = v29 + v30;
+    const two_t v32 = inverse[15] * v0;
+    const two_t v33 = inverse[16] * v2;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = inverse[17] * v5;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = inverse[18] * v8;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = inverse[19] * v11;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = inverse[20] * v0;
+    const two_t v42 = inverse[21] * v2;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = inverse[22] * v5;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = inverse[23] * v8;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = inverse[24] * v11;
+    const two_t v49 = v47 + v48;
+    *(two_free_t *)(gain + 0 + k) = v13;
+    *(two_free_t *)(gain + 9 + k) = v22;
+    *(two_free_t *)(gain + 18 + k) = v31;
+    *(two_free_t *)(gain + 27 + k) = v40;
+    *(two_free_t *)(gain + 36 + k) = v49;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(K + 0 + k);
+    const two_t v1 = mstmm_beside(G + 0 + k);
+    const two_t v2 = v0 + v1;
+    const two_t v3 = mstmm_beside(K + 6 + k);
+    const two_t v4 = mstmm_beside(G + 6 + k);
+    const two_t v5 = v3 + v4;
+    const two_t v6 = mstmm_beside(K + 12 + k);
+    const two_t v7 = mstmm_beside(G + 12 + k);
+    const two_t v8 = v6 + v7;
+    const two_t v9 = mstmm_beside(K + 18 + k);
+    const two_t v10 = mstmm_beside(G + 18 + k);
+    const two_t v11 = v9 + v10;
+    const two_t v12 = mstmm_beside(K + 24 + k);
+    const two_t v13 = mstmm_beside(G + 24 + k);
+    const two_t v14 = v12 + v13;
+    *(two_free_t *)(V + 0 + k) = v2;
+    *(two_free_t *)(V + 6 + k) = v5;
+    *(two_free_t *)(V + 12 + k) = v8;
+    *(two_free_t *)(V + 18 + k) = v11;
+    *(two_free_t *)(V + 24 + k) = v14;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(V + 0 + k);
+    const two_t v1 = gain[0] * v0;
+    const two_t v2 = mstmm_beside(V + 6 + k);
+    const two_t v3 = gain[9] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(V + 12 + k);
+    const two_t v6 = gain[18] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(V + 18 + k);
+    const two_t v9 = gain[27] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(V + 24 + k);
+    const two_t v12 = gain[36] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v15 = gain[1] * v0;
+    const two_t v16 = gain[10] * v2;
+    const two_t v17 = v15 + v16;
+    const two_t v18 = gain[19] * v5;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = gain[28] * v8;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = gain[37] * v11;
+    const two_t v23 = v21 + v22;
+    const two_t v25 = gain[2] * v0;
+    const two_t v26 = gain[11] * v2;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = gain[20] * v5;
+    const two_t v29 = v27 + v28;
+    const two_t v30 = gain[29] * v8;
+    const two_t v31 = v29 + v30;
+    const two_t v32 = gain[38] * v11;
+    const two_t v33 = v31 + v32;
+    const two_t v35 = gain[3] * v0;
+    const two_t v36 = gain[12] * v2;
+    const two_t v37 = v35 + v36;
+    const two_t v38 = gain[21] * v5;
+    const two_t v39 = v37 + v38;
+    const two_t v40 = gain[30] * v8;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = gain[39] * v11;
+    const two_t v43 = v41 + v42;
+    const two_t v45 = gain[4] * v0;
+    const two_t v46 = gain[13] * v2;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = gain[22] * v5;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = gain[31] * v8;
+    const two_t v51 = v49 + v50;
+    const two_t v52 = gain[40] * v11;
+    const two_t v53 = v51 + v52;
+    const two_t v55 = gain[5] * v0;
+    const two_t v56 = gain[14] * v2;
+    const two_t v57 = v55 + v56;
+    const two_t v58 = gain[23] * v5;
+    const two_t v59 = v57 + v58;
+    const two_t v60 = gain[32] * v8;
+    const two_t v61 = v59 + v60;
+    const two_t v62 = gain[41] * v11;
+    const two_t v63 = v61 + v62;
+    const two_t v65 = gain[6] * v0;
+    const two_t v66 = gain[15] * v2;
+    const two_t v67 = v65 + v66;
+    const two_t v68 = gain[24] * v5;
+    const two_t v69 = v67 + v68;
+    const two_t v70 = gain[33] * v8;
+    const two_t v71 = v69 + v70;
+    const two_t v72 = gain[42] * v11;
+    const two_t v73 = v71 + v72;
+    const two_t v75 = gain[7] * v0;
+    const two_t v76 = gain[16] * v2;
+    const two_t v77 = v75 + v76;
+    const two_t v78 = gain[25] * v5;
+    const two_t v79 = v77 + v78;
+    const two_t v80 = gain[34] * v8;
+    const two_t v81 = v79 + v80;
+    const two_t v82 = gain[43] * v11;
+    const two_t v83 = v81 + v82;
+    const two_t v85 = gain[8] * v0;
+    const two_t v86 = gain[17] * v2;
+    const two_t v87 = v85 + v86;
+    const two_t v88 = gain[26] * v5;
+    const two_t v89 = v87 + v88;
+    const two_t v90 = gain[35] * v8;
+    const two_t v91 = v89 + v90;
+    const two_t v92 = gain[44] * v11;
+    const two_t v93 = v91 + v92;
+    *(two_free_t *)(S + 0 + k) -= v13;
+    *(two_free_t *)(S + 6 + k) -= v23;
+    *(two_free_t *)(S + 12 + k) -= v33;
+    *(two_free_t *)(S + 18 + k) -= v43;
+    *(two_free_t *)(S + 24 + k) -= v53;
+    *(two_free_t *)(S + 30 + k) -= v63;
+    *(two_free_t *)(S + 36 + k) -= v73;
+    *(two_free_t *)(S + 42 + k) -= v83;
+    *(two_free_t *)(S + 48 + k) -= v93;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_reduce_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_reduce_inputs[] = {
-    {"inverse", 25, "", 0, 0},
-    {"right", 45, "", 0, 0},
-    {"K", 30, "", 0, 0},
-    {"G", 30, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_reduce_outputs[] = {
-    {"gain", 45, "", 0, 0},
-    {"V", 30, "", 0, 0},
-    {"S", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_reduce, (in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* a right-hand side carried across a hinge with 5 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9427,289 +2638,54 @@ static const mstmm_port mstmm_sweep_generic5_tangent_reduce_outputs[] = {
  * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic5_tangent_load(in_t Rc, in_t r, in_t H, in_t V, in_t inverse, in_t e,
+    in_t e_f, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[5] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[6] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[11] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[16] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[21] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[26] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[7] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[12] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[17] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[22] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[27] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = H[3] * e[0];
-    const real t42 = H[8] * e[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[13] * e[2];
-    const real t45 = t43 + t44;
-    const real t46 = H[18] * e[3];
-    const real t47 = t45 + t46;
-    const real t48 = H[23] * e[4];
-    const real t49 = t47 + t48;
-    const real t50 = H[28] * e[5];
-    const real t51 = t49 + t50;
-    const real t52 = e_f[3] + t51;
-    const real t53 = inverse[3] * t52;
-    const real t54 = t40 + t53;
-    const real t55 = H[4] * e[0];
-    const real t56 = H[9] * e[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[14] * e[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[19] * e[3];
-    const real t61 = t59 + t60;
-    const real t62 = H[24] * e[4];
-    const real t63 = t61 + t62;
-    const real t64 = H[29] * e[5];
-    const real t65 = t63 + t64;
-    const real t66 = e_f[4] + t65;
-    const real t67 = inverse[4] * t66;
-    const real t68 = t54 + t67;
-    const real t69 = -t68;
-    y[0] = t69;
-    const real t70 = inverse[5] * t11;
-    const real t71 = inverse[6] * t24;
-    const real t72 = t70 + t71;
-    const real t73 = inverse[7] * t38;
-    const real t74 = t72 + t73;
-    const real t75 = inverse[8] * t52;
-    const real t76 = t74 + t75;
-    const real t77 = inverse[9] * t66;
-    const real t78 = t76 + t77;
-    const real t79 = -t78;
-    y[1] = t79;
-    const real t80 = inverse[10] * t11;
-    const real t81 = inverse[11] * t24;
-    const real t82 = t80 + t81;
-    const real t83 = inverse[12] * t38;
-    const real t84 = t82 + t83;
-    const real t85 = inverse[13] * t52;
-    const real t86 = t84 + t85;
-    const real t87 = inverse[14] * t66;
-    const real t88 = t86 + t87;
-    const real t89 = -t88;
-    y[2] = t89;
-    const real t90 = inverse[15] * t11;
-    const real t91 = inverse[16] * t24;
-    const real t92 = t90 + t91;
-    const real t93 = inverse[17] * t38;
-    const real t94 = t92 + t93;
-    const real t95 = inverse[18] * t52;
-    const real t96 = t94 + t95;
-    const real t97 = inverse[19] * t66;
-    const real t98 = t96 + t97;
-    const real t99 = -t98;
-    y[3] = t99;
-    const real t100 = inverse[20] * t11;
-    const real t101 = inverse[21] * t24;
-    const real t102 = t100 + t101;
-    const real t103 = inverse[22] * t38;
-    const real t104 = t102 + t103;
-    const real t105 = inverse[23] * t52;
-    const real t106 = t104 + t105;
-    const real t107 = inverse[24] * t66;
-    const real t108 = t106 + t107;
-    const real t109 = -t108;
-    y[4] = t109;
-    const real t110 = V[0] * t68;
-    const real t111 = V[6] * t78;
-    const real t112 = t110 + t111;
-    const real t113 = V[12] * t88;
-    const real t114 = t112 + t113;
-    const real t115 = V[18] * t98;
-    const real t116 = t114 + t115;
-    const real t117 = V[24] * t108;
-    const real t118 = t116 + t117;
-    const real t119 = e[0] - t118;
-    const real t120 = Rc[0] * t119;
-    const real t121 = V[1] * t68;
-    const real t122 = V[7] * t78;
-    const real t123 = t121 + t122;
-    const real t124 = V[13] * t88;
-    const real t125 = t123 + t124;
-    const real t126 = V[19] * t98;
-    const real t127 = t125 + t126;
-    const real t128 = V[25] * t108;
-    const real t129 = t127 + t128;
-    const real t130 = e[1] - t129;
-    const real t131 = Rc[1] * t130;
-    const real t132 = t120 + t131;
-    const real t133 = V[2] * t68;
-    const real t134 = V[8] * t78;
-    const real t135 = t133 + t134;
-    const real t136 = V[14] * t88;
-    const real t137 = t135 + t136;
-    const real t138 = V[20] * t98;
-    const real t139 = t137 + t138;
-    const real t140 = V[26] * t108;
-    const real t141 = t139 + t140;
-    const real t142 = e[2] - t141;
-    const real t143 = Rc[2] * t142;
-    const real t144 = t132 + t143;
-    e_I[0] += t144;
-    const real t145 = Rc[3] * t119;
-    const real t146 = Rc[4] * t130;
-    const real t147 = t145 + t146;
-    const real t148 = Rc[5] * t142;
-    const real t149 = t147 + t148;
-    e_I[1] += t149;
-    const real t150 = Rc[6] * t119;
-    const real t151 = Rc[7] * t130;
-    const real t152 = t150 + t151;
-    const real t153 = Rc[8] * t142;
-    const real t154 = t152 + t153;
-    e_I[2] += t154;
-    const real t155 = V[3] * t68;
-    const real t156 = V[9] * t78;
-    const real t157 = t155 + t156;
-    const real t158 = V[15] * t88;
-    const real t159 = t157 + t158;
-    const real t160 = V[21] * t98;
-    const real t161 = t159 + t160;
-    const real t162 = V[27] * t108;
-    const real t163 = t161 + t162;
-    const real t164 = e[3] - t163;
-    const real t165 = Rc[0] * t164;
-    const real t166 = V[4] * t68;
-    const real t167 = V[10] * t78;
-    const real t168 = t166 + t167;
-    const real t169 = V[16] * t88;
-    const real t170 = t168 + t169;
-    const real t171 = V[22] * t98;
-    const real t172 = t170 + t171;
-    const real t173 = V[28] * t108;
-    const real t174 = t172 + t173;
-    const real t175 = e[4] - t174;
-    const real t176 = Rc[1] * t175;
-    const real t177 = t165 + t176;
-    const real t178 = V[5] * t68;
-    const real t179 = V[11] * t78;
-    const real t180 = t178 + t179;
-    const real t181 = V[17] * t88;
-    const real t182 = t180 + t181;
-    const real t183 = V[23] * t98;
-    const real t184 = t182 + t183;
-    const real t185 = V[29] * t108;
-    const real t186 = t184 + t185;
-    const real t187 = e[5] - t186;
-    const real t188 = Rc[2] * t187;
-    const real t189 = t177 + t188;
-    const real t190 = Rc[6] * r[1];
-    const real t191 = Rc[3] * r[2];
-    const real t192 = t190 - t191;
-    const real t193 = t119 * t192;
-    const real t194 = Rc[7] * r[1];
-    const real t195 = Rc[4] * r[2];
-    const real t196 = t194 - t195;
-    const real t197 = t130 * t196;
-    const real t198 = t193 + t197;
-    const real t199 = Rc[8] * r[1];
-    const real t200 = Rc[5] * r[2];
-    const real t201 = t199 - t200;
-    const real t202 = t142 * t201;
-    const real t203 = t198 + t202;
-    const real t204 = t189 + t203;
-    e_I[3] += t204;
-    const real t205 = Rc[3] * t164;
-    const real t206 = Rc[4] * t175;
-    const real t207 = t205 + t206;
-    const real t208 = Rc[5] * t187;
-    const real t209 = t207 + t208;
-    const real t210 = Rc[0] * r[2];
-    const real t211 = Rc[6] * r[0];
-    const real t212 = t210 - t211;
-    const real t213 = t119 * t212;
-    const real t214 = Rc[1] * r[2];
-    const real t215 = Rc[7] * r[0];
-    const real t216 = t214 - t215;
-    const real t217 = t130 * t216;
-    const real t218 = t213 + t217;
-    const real t219 = Rc[2] * r[2];
-    const real t220 = Rc[8] * r[0];
-    const real t221 = t219 - t220;
-    const real t222 = t142 * t221;
-    const real t223 = t218 + t222;
-    const real t224 = t209 + t223;
-    e_I[4] += t224;
-    const real t225 = Rc[6] * t164;
-    const real t226 = Rc[7] * t175;
-    const real t227 = t225 + t226;
-    const real t228 = Rc[8] * t187;
-    const real t229 = t227 + t228;
-    const real t230 = Rc[3] * r[0];
-    const real t231 = Rc[0] * r[1];
-    const real t232 = t230 - t231;
-    const real t233 = t119 * t232;
-    const real t234 = Rc[4] * r[0];
-    const real t235 = Rc[1] * r[1];
-    const real t236 = t234 - t235;
-    const real t237 = t130 * t236;
-    const real t238 = t233 + t237;
-    const real t239 = Rc[5] * r[0];
-    const real t240 = Rc[2] * r[1];
-    const real t241 = t239 - t240;
-    const real t242 = t142 * t241;
-    const real t243 = t238 + t242;
-    const real t244 = t229 + t243;
-    e_I[5] += t244;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[5] * e[1] + H[10] * e[2] + H[15] * e[3] + H[20] * e[4] +
+    H[25] * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[6] * e[1] + H[11] * e[2] + H[16] * e[3] + H[21] * e[4] +
+    H[26] * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[7] * e[1] + H[12] * e[2] + H[17] * e[3] + H[22] * e[4] +
+    H[27] * e[5]);
+  real t52 = e_f[3] + (H[3] * e[0] + H[8] * e[1] + H[13] * e[2] + H[18] * e[3] + H[23] * e[4] +
+    H[28] * e[5]);
+  real t66 = e_f[4] + (H[4] * e[0] + H[9] * e[1] + H[14] * e[2] + H[19] * e[3] + H[24] * e[4] +
+    H[29] * e[5]);
+  real t68 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38 + inverse[3] * t52 + inverse[4]
+    * t66;
+  y[0] = -t68;
+  real t78 = inverse[5] * t11 + inverse[6] * t24 + inverse[7] * t38 + inverse[8] * t52 + inverse[9]
+    * t66;
+  y[1] = -t78;
+  real t88 = inverse[10] * t11 + inverse[11] * t24 + inverse[12] * t38 + inverse[13] * t52 +
+    inverse[14] * t66;
+  y[2] = -t88;
+  real t98 = inverse[15] * t11 + inverse[16] * t24 + inverse[17] * t38 + inverse[18] * t52 +
+    inverse[19] * t66;
+  y[3] = -t98;
+  real t108 = inverse[20] * t11 + inverse[21] * t24 + inverse[22] * t38 + inverse[23] * t52 +
+    inverse[24] * t66;
+  y[4] = -t108;
+  real t119 = e[0] - (V[0] * t68 + V[6] * t78 + V[12] * t88 + V[18] * t98 + V[24] * t108);
+  real t130 = e[1] - (V[1] * t68 + V[7] * t78 + V[13] * t88 + V[19] * t98 + V[25] * t108);
+  real t142 = e[2] - (V[2] * t68 + V[8] * t78 + V[14] * t88 + V[20] * t98 + V[26] * t108);
+  e_I[0] += Rc[0] * t119 + Rc[1] * t130 + Rc[2] * t142;
+  e_I[1] += Rc[3] * t119 + Rc[4] * t130 + Rc[5] * t142;
+  e_I[2] += Rc[6] * t119 + Rc[7] * t130 + Rc[8] * t142;
+  real t164 = e[3] - (V[3] * t68 + V[9] * t78 + V[15] * t88 + V[21] * t98 + V[27] * t108);
+  real t175 = e[4] - (V[4] * t68 + V[10] * t78 + V[16] * t88 + V[22] * t98 + V[28] * t108);
+  real t187 = e[5] - (V[5] * t68 + V[11] * t78 + V[17] * t88 + V[23] * t98 + V[29] * t108);
+  e_I[3] += Rc[0] * t164 + Rc[1] * t175 + Rc[2] * t187 + (t119 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t130 * (Rc[7] * r[1] - Rc[4] * r[2]) + t142 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t164 + Rc[4] * t175 + Rc[5] * t187 + (t119 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t130 * (Rc[1] * r[2] - Rc[7] * r[0]) + t142 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t164 + Rc[7] * t175 + Rc[8] * t187 + (t119 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t130 * (Rc[4] * r[0] - Rc[1] * r[1]) + t142 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"V", 30, "", 0, 0},
-    {"inverse", 25, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_load_outputs[] = {
-    {"y", 5, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_load, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* solution of a hinge with 5 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9726,356 +2702,65 @@ static const mstmm_port mstmm_sweep_generic5_tangent_load_outputs[] = {
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic5_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z)
+int mstmm_sweep_generic5_tangent_solution(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I,
+    in_t B, in_t gain, in_t y, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = gain[0] * t4;
-    const real t6 = Rc[1] * z_I[0];
-    const real t7 = Rc[4] * z_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[7] * z_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = gain[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[2] * z_I[0];
-    const real t14 = Rc[5] * z_I[1];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[8] * z_I[2];
-    const real t17 = t15 + t16;
-    const real t18 = gain[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = w[2] * t10;
-    const real t21 = w[1] * t17;
-    const real t22 = t20 - t21;
-    const real t23 = Rc[0] * z_I[3];
-    const real t24 = Rc[3] * z_I[4];
-    const real t25 = t23 + t24;
-    const real t26 = Rc[6] * z_I[5];
-    const real t27 = t25 + t26;
-    const real t28 = t22 + t27;
-    const real t29 = gain[3] * t28;
-    const real t30 = t19 + t29;
-    const real t31 = w[0] * t17;
-    const real t32 = w[2] * t4;
-    const real t33 = t31 - t32;
-    const real t34 = Rc[1] * z_I[3];
-    const real t35 = Rc[4] * z_I[4];
-    const real t36 = t34 + t35;
-    const real t37 = Rc[7] * z_I[5];
-    const real t38 = t36 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = gain[4] * t39;
-    const real t41 = t30 + t40;
-    const real t42 = w[1] * t4;
-    const real t43 = w[0] * t10;
-    const real t44 = t42 - t43;
-    const real t45 = Rc[2] * z_I[3];
-    const real t46 = Rc[5] * z_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[8] * z_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = t44 + t49;
-    const real t51 = gain[5] * t50;
-    const real t52 = t41 + t51;
-    const real t53 = v[2] * 2.0;
-    const real t54 = t10 * t53;
-    const real t55 = v[1] * 2.0;
-    const real t56 = t17 * t55;
-    const real t57 = t54 - t56;
-    const real t58 = r[2] * z_I[4];
-    const real t59 = r[1] * w_I[1];
-    const real t60 = r[2] * w_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = z_I[0] * t61;
-    const real t63 = r[0] * w_I[1];
-    const real t64 = 2.0 * t63;
-    const real t65 = r[1] * w_I[0];
-    const real t66 = t64 - t65;
-    const real t67 = z_I[1] * t66;
-    const real t68 = r[0] * w_I[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = r[2] * w_I[0];
-    const real t71 = t69 - t70;
-    const real t72 = z_I[2] * t71;
-    const real t73 = t67 + t72;
-    const real t74 = t62 - t73;
-    const real t75 = r[1] * z_I[5];
-    const real t76 = t74 - t75;
-    const real t77 = t58 + t76;
-    const real t78 = z_I[6] + t77;
-    const real t79 = Rc[0] * t78;
-    const real t80 = r[0] * z_I[5];
-    const real t81 = r[0] * w_I[0];
-    const real t82 = t60 + t81;
-    const real t83 = z_I[1] * t82;
-    const real t84 = 2.0 * t65;
-    const real t85 = t84 - t63;
-    const real t86 = z_I[0] * t85;
-    const real t87 = t83 - t86;
-    const real t88 = r[1] * w_I[2];
-    const real t89 = 2.0 * t88;
-    const real t90 = r[2] * w_I[1];
-    const real t91 = t89 - t90;
-    const real t92 = z_I[2] * t91;
-    const real t93 = t87 - t92;
-    const real t94 = t80 + t93;
-    const real t95 = r[2] * z_I[3];
-    const real t96 = t94 - t95;
-    const real t97 = z_I[7] + t96;
-    const real t98 = Rc[3] * t97;
-    const real t99 = t79 + t98;
-    const real t100 = r[1] * z_I[3];
-    const real t101 = t59 + t81;
-    const real t102 = z_I[2] * t101;
-    const real t103 = 2.0 * t70;
-    const real t104 = t103 - t68;
-    const real t105 = z_I[0] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = 2.0 * t90;
-    const real t108 = t107 - t88;
-    const real t109 = z_I[1] * t108;
-    const real t110 = t106 - t109;
-    const real t111 = r[0] * z_I[4];
-    const real t112 = t110 - t111;
-    const real t113 = t100 + t112;
-    const real t114 = z_I[8] + t113;
-    const real t115 = Rc[6] * t114;
-    const real t116 = t99 + t115;
-    const real t117 = t57 + t116;
-    const real t118 = gain[6] * t117;
-    const real t119 = t52 + t118;
-    const real t120 = v[0] * 2.0;
-    const real t121 = t17 * t120;
-    const real t122 = t4 * t53;
-    const real t123 = t121 - t122;
-    const real t124 = Rc[1] * t78;
-    const real t125 = Rc[4] * t97;
-    const real t126 = t124 + t125;
-    const real t127 = Rc[7] * t114;
-    const real t128 = t126 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = gain[7] * t129;
-    const real t131 = t119 + t130;
-    const real t132 = t4 * t55;
-    const real t133 = t10 * t120;
-    const real t134 = t132 - t133;
-    const real t135 = Rc[2] * t78;
-    const real t136 = Rc[5] * t97;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * t114;
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = gain[8] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = y[0] - t142;
-    x[0] = t143;
-    const real t144 = gain[9] * t4;
-    const real t145 = gain[10] * t10;
-    const real t146 = t144 + t145;
-    const real t147 = gain[11] * t17;
-    const real t148 = t146 + t147;
-    const real t149 = gain[12] * t28;
-    const real t150 = t148 + t149;
-    const real t151 = gain[13] * t39;
-    const real t152 = t150 + t151;
-    const real t153 = gain[14] * t50;
-    const real t154 = t152 + t153;
-    const real t155 = gain[15] * t117;
-    const real t156 = t154 + t155;
-    const real t157 = gain[16] * t129;
-    const real t158 = t156 + t157;
-    const real t159 = gain[17] * t140;
-    const real t160 = t158 + t159;
-    const real t161 = y[1] - t160;
-    x[1] = t161;
-    const real t162 = gain[18] * t4;
-    const real t163 = gain[19] * t10;
-    const real t164 = t162 + t163;
-    const real t165 = gain[20] * t17;
-    const real t166 = t164 + t165;
-    const real t167 = gain[21] * t28;
-    const real t168 = t166 + t167;
-    const real t169 = gain[22] * t39;
-    const real t170 = t168 + t169;
-    const real t171 = gain[23] * t50;
-    const real t172 = t170 + t171;
-    const real t173 = gain[24] * t117;
-    const real t174 = t172 + t173;
-    const real t175 = gain[25] * t129;
-    const real t176 = t174 + t175;
-    const real t177 = gain[26] * t140;
-    const real t178 = t176 + t177;
-    const real t179 = y[2] - t178;
-    x[2] = t179;
-    const real t180 = gain[27] * t4;
-    const real t181 = gain[28] * t10;
-    const real t182 = t180 + t181;
-    const real t183 = gain[29] * t17;
-    const real t184 = t182 + t183;
-    const real t185 = gain[30] * t28;
-    const real t186 = t184 + t185;
-    const real t187 = gain[31] * t39;
-    const real t188 = t186 + t187;
-    const real t189 = gain[32] * t50;
-    const real t190 = t188 + t189;
-    const real t191 = gain[33] * t117;
-    const real t192 = t190 + t191;
-    const real t193 = gain[34] * t129;
-    const real t194 = t192 + t193;
-    const real t195 = gain[35] * t140;
-    const real t196 = t194 + t195;
-    const real t197 = y[3] - t196;
-    x[3] = t197;
-    const real t198 = gain[36] * t4;
-    const real t199 = gain[37] * t10;
-    const real t200 = t198 + t199;
-    const real t201 = gain[38] * t17;
-    const real t202 = t200 + t201;
-    const real t203 = gain[39] * t28;
-    const real t204 = t202 + t203;
-    const real t205 = gain[40] * t39;
-    const real t206 = t204 + t205;
-    const real t207 = gain[41] * t50;
-    const real t208 = t206 + t207;
-    const real t209 = gain[42] * t117;
-    const real t210 = t208 + t209;
-    const real t211 = gain[43] * t129;
-    const real t212 = t210 + t211;
-    const real t213 = gain[44] * t140;
-    const real t214 = t212 + t213;
-    const real t215 = y[4] - t214;
-    x[4] = t215;
-    const real t216 = B[0] * t143;
-    const real t217 = B[9] * t161;
-    const real t218 = t216 + t217;
-    const real t219 = B[18] * t179;
-    const real t220 = t218 + t219;
-    const real t221 = B[27] * t197;
-    const real t222 = t220 + t221;
-    const real t223 = B[36] * t215;
-    const real t224 = t222 + t223;
-    const real t225 = t4 + t224;
-    z[0] = t225;
-    const real t226 = B[1] * t143;
-    const real t227 = B[10] * t161;
-    const real t228 = t226 + t227;
-    const real t229 = B[19] * t179;
-    const real t230 = t228 + t229;
-    const real t231 = B[28] * t197;
-    const real t232 = t230 + t231;
-    const real t233 = B[37] * t215;
-    const real t234 = t232 + t233;
-    const real t235 = t10 + t234;
-    z[1] = t235;
-    const real t236 = B[2] * t143;
-    const real t237 = B[11] * t161;
-    const real t238 = t236 + t237;
-    const real t239 = B[20] * t179;
-    const real t240 = t238 + t239;
-    const real t241 = B[29] * t197;
-    const real t242 = t240 + t241;
-    const real t243 = B[38] * t215;
-    const real t244 = t242 + t243;
-    const real t245 = t17 + t244;
-    z[2] = t245;
-    const real t246 = B[3] * t143;
-    const real t247 = B[12] * t161;
-    const real t248 = t246 + t247;
-    const real t249 = B[21] * t179;
-    const real t250 = t248 + t249;
-    const real t251 = B[30] * t197;
-    const real t252 = t250 + t251;
-    const real t253 = B[39] * t215;
-    const real t254 = t252 + t253;
-    const real t255 = t28 + t254;
-    z[3] = t255;
-    const real t256 = B[4] * t143;
-    const real t257 = B[13] * t161;
-    const real t258 = t256 + t257;
-    const real t259 = B[22] * t179;
-    const real t260 = t258 + t259;
-    const real t261 = B[31] * t197;
-    const real t262 = t260 + t261;
-    const real t263 = B[40] * t215;
-    const real t264 = t262 + t263;
-    const real t265 = t39 + t264;
-    z[4] = t265;
-    const real t266 = B[5] * t143;
-    const real t267 = B[14] * t161;
-    const real t268 = t266 + t267;
-    const real t269 = B[23] * t179;
-    const real t270 = t268 + t269;
-    const real t271 = B[32] * t197;
-    const real t272 = t270 + t271;
-    const real t273 = B[41] * t215;
-    const real t274 = t272 + t273;
-    const real t275 = t50 + t274;
-    z[5] = t275;
-    const real t276 = B[6] * t143;
-    const real t277 = B[15] * t161;
-    const real t278 = t276 + t277;
-    const real t279 = B[24] * t179;
-    const real t280 = t278 + t279;
-    const real t281 = B[33] * t197;
-    const real t282 = t280 + t281;
-    const real t283 = B[42] * t215;
-    const real t284 = t282 + t283;
-    const real t285 = t117 + t284;
-    z[6] = t285;
-    const real t286 = B[7] * t143;
-    const real t287 = B[16] * t161;
-    const real t288 = t286 + t287;
-    const real t289 = B[25] * t179;
-    const real t290 = t288 + t289;
-    const real t291 = B[34] * t197;
-    const real t292 = t290 + t291;
-    const real t293 = B[43] * t215;
-    const real t294 = t292 + t293;
-    const real t295 = t129 + t294;
-    z[7] = t295;
-    const real t296 = B[8] * t143;
-    const real t297 = B[17] * t161;
-    const real t298 = t296 + t297;
-    const real t299 = B[26] * t179;
-    const real t300 = t298 + t299;
-    const real t301 = B[35] * t197;
-    const real t302 = t300 + t301;
-    const real t303 = B[44] * t215;
-    const real t304 = t302 + t303;
-    const real t305 = t140 + t304;
-    z[8] = t305;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t10 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t17 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t28 = w[2] * t10 - w[1] * t17 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  real t39 = w[0] * t17 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  real t50 = w[1] * t4 - w[0] * t10 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t53 = v[2] * 2.0;
+  real t55 = v[1] * 2.0;
+  real t59 = r[1] * w_I[1];
+  real t60 = r[2] * w_I[2];
+  real t63 = r[0] * w_I[1];
+  real t65 = r[1] * w_I[0];
+  real t68 = r[0] * w_I[2];
+  real t70 = r[2] * w_I[0];
+  real t78 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t59 + t60) - (z_I[1] * (2.0 * t63 - t65) + z_I[2]
+    * (2.0 * t68 - t70)) - r[1] * z_I[5]));
+  real t81 = r[0] * w_I[0];
+  real t88 = r[1] * w_I[2];
+  real t90 = r[2] * w_I[1];
+  real t97 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t60 + t81) - z_I[0] * (2.0 * t65 - t63) - z_I[2] *
+    (2.0 * t88 - t90)) - r[2] * z_I[3]);
+  real t114 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t59 + t81) - z_I[0] * (2.0 * t70 - t68) - z_I[1]
+    * (2.0 * t90 - t88) - r[0] * z_I[4]));
+  real t117 = t10 * t53 - t17 * t55 + (Rc[0] * t78 + Rc[3] * t97 + Rc[6] * t114);
+  real t120 = v[0] * 2.0;
+  real t129 = t17 * t120 - t4 * t53 + (Rc[1] * t78 + Rc[4] * t97 + Rc[7] * t114);
+  real t140 = t4 * t55 - t10 * t120 + (Rc[2] * t78 + Rc[5] * t97 + Rc[8] * t114);
+  real t143 = y[0] - (gain[0] * t4 + gain[1] * t10 + gain[2] * t17 + gain[3] * t28 + gain[4] * t39 +
+    gain[5] * t50 + gain[6] * t117 + gain[7] * t129 + gain[8] * t140);
+  x[0] = t143;
+  real t161 = y[1] - (gain[9] * t4 + gain[10] * t10 + gain[11] * t17 + gain[12] * t28 + gain[13] *
+    t39 + gain[14] * t50 + gain[15] * t117 + gain[16] * t129 + gain[17] * t140);
+  x[1] = t161;
+  real t179 = y[2] - (gain[18] * t4 + gain[19] * t10 + gain[20] * t17 + gain[21] * t28 + gain[22] *
+    t39 + gain[23] * t50 + gain[24] * t117 + gain[25] * t129 + gain[26] * t140);
+  x[2] = t179;
+  real t197 = y[3] - (gain[27] * t4 + gain[28] * t10 + gain[29] * t17 + gain[30] * t28 + gain[31] *
+    t39 + gain[32] * t50 + gain[33] * t117 + gain[34] * t129 + gain[35] * t140);
+  x[3] = t197;
+  real t215 = y[4] - (gain[36] * t4 + gain[37] * t10 + gain[38] * t17 + gain[39] * t28 + gain[40] *
+    t39 + gain[41] * t50 + gain[42] * t117 + gain[43] * t129 + gain[44] * t140);
+  x[4] = t215;
+  z[0] = t4 + (B[0] * t143 + B[9] * t161 + B[18] * t179 + B[27] * t197 + B[36] * t215);
+  z[1] = t10 + (B[1] * t143 + B[10] * t161 + B[19] * t179 + B[28] * t197 + B[37] * t215);
+  z[2] = t17 + (B[2] * t143 + B[11] * t161 + B[20] * t179 + B[29] * t197 + B[38] * t215);
+  z[3] = t28 + (B[3] * t143 + B[12] * t161 + B[21] * t179 + B[30] * t197 + B[39] * t215);
+  z[4] = t39 + (B[4] * t143 + B[13] * t161 + B[22] * t179 + B[31] * t197 + B[40] * t215);
+  z[5] = t50 + (B[5] * t143 + B[14] * t161 + B[23] * t179 + B[32] * t197 + B[41] * t215);
+  z[6] = t117 + (B[6] * t143 + B[15] * t161 + B[24] * t179 + B[33] * t197 + B[42] * t215);
+  z[7] = t129 + (B[7] * t143 + B[16] * t161 + B[25] * t179 + B[34] * t197 + B[43] * t215);
+  z[8] = t140 + (B[8] * t143 + B[17] * t161 + B[26] * t179 + B[35] * t197 + B[44] * t215);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_solution_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_solution_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 45, "", 0, 0},
-    {"gain", 45, "", 0, 0},
-    {"y", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_solution_outputs[] = {
-    {"x", 5, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_solution, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1]))
 
 /* a right-hand side carried across a hinge with 5 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -10091,297 +2776,60 @@ static const mstmm_port mstmm_sweep_generic5_tangent_solution_outputs[] = {
  * out y[5] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic5_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic5_tangent_load_with_increments(in_t Rc, in_t r, in_t H, in_t V, in_t inverse,
+    in_t e, in_t e_f, in_t e_b, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[5] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[6] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[11] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[16] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[21] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[26] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[7] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[12] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[17] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[22] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[27] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = H[3] * e[0];
-    const real t42 = H[8] * e[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[13] * e[2];
-    const real t45 = t43 + t44;
-    const real t46 = H[18] * e[3];
-    const real t47 = t45 + t46;
-    const real t48 = H[23] * e[4];
-    const real t49 = t47 + t48;
-    const real t50 = H[28] * e[5];
-    const real t51 = t49 + t50;
-    const real t52 = e_f[3] + t51;
-    const real t53 = inverse[3] * t52;
-    const real t54 = t40 + t53;
-    const real t55 = H[4] * e[0];
-    const real t56 = H[9] * e[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[14] * e[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[19] * e[3];
-    const real t61 = t59 + t60;
-    const real t62 = H[24] * e[4];
-    const real t63 = t61 + t62;
-    const real t64 = H[29] * e[5];
-    const real t65 = t63 + t64;
-    const real t66 = e_f[4] + t65;
-    const real t67 = inverse[4] * t66;
-    const real t68 = t54 + t67;
-    const real t69 = -t68;
-    y[0] = t69;
-    const real t70 = inverse[5] * t11;
-    const real t71 = inverse[6] * t24;
-    const real t72 = t70 + t71;
-    const real t73 = inverse[7] * t38;
-    const real t74 = t72 + t73;
-    const real t75 = inverse[8] * t52;
-    const real t76 = t74 + t75;
-    const real t77 = inverse[9] * t66;
-    const real t78 = t76 + t77;
-    const real t79 = -t78;
-    y[1] = t79;
-    const real t80 = inverse[10] * t11;
-    const real t81 = inverse[11] * t24;
-    const real t82 = t80 + t81;
-    const real t83 = inverse[12] * t38;
-    const real t84 = t82 + t83;
-    const real t85 = inverse[13] * t52;
-    const real t86 = t84 + t85;
-    const real t87 = inverse[14] * t66;
-    const real t88 = t86 + t87;
-    const real t89 = -t88;
-    y[2] = t89;
-    const real t90 = inverse[15] * t11;
-    const real t91 = inverse[16] * t24;
-    const real t92 = t90 + t91;
-    const real t93 = inverse[17] * t38;
-    const real t94 = t92 + t93;
-    const real t95 = inverse[18] * t52;
-    const real t96 = t94 + t95;
-    const real t97 = inverse[19] * t66;
-    const real t98 = t96 + t97;
-    const real t99 = -t98;
-    y[3] = t99;
-    const real t100 = inverse[20] * t11;
-    const real t101 = inverse[21] * t24;
-    const real t102 = t100 + t101;
-    const real t103 = inverse[22] * t38;
-    const real t104 = t102 + t103;
-    const real t105 = inverse[23] * t52;
-    const real t106 = t104 + t105;
-    const real t107 = inverse[24] * t66;
-    const real t108 = t106 + t107;
-    const real t109 = -t108;
-    y[4] = t109;
-    const real t110 = V[0] * t68;
-    const real t111 = V[6] * t78;
-    const real t112 = t110 + t111;
-    const real t113 = V[12] * t88;
-    const real t114 = t112 + t113;
-    const real t115 = V[18] * t98;
-    const real t116 = t114 + t115;
-    const real t117 = V[24] * t108;
-    const real t118 = t116 + t117;
-    const real t119 = e[0] - t118;
-    const real t120 = e_b[0] + t119;
-    const real t121 = Rc[0] * t120;
-    const real t122 = V[1] * t68;
-    const real t123 = V[7] * t78;
-    const real t124 = t122 + t123;
-    const real t125 = V[13] * t88;
-    const real t126 = t124 + t125;
-    const real t127 = V[19] * t98;
-    const real t128 = t126 + t127;
-    const real t129 = V[25] * t108;
-    const real t130 = t128 + t129;
-    const real t131 = e[1] - t130;
-    const real t132 = e_b[1] + t131;
-    const real t133 = Rc[1] * t132;
-    const real t134 = t121 + t133;
-    const real t135 = V[2] * t68;
-    const real t136 = V[8] * t78;
-    const real t137 = t135 + t136;
-    const real t138 = V[14] * t88;
-    const real t139 = t137 + t138;
-    const real t140 = V[20] * t98;
-    const real t141 = t139 + t140;
-    const real t142 = V[26] * t108;
-    const real t143 = t141 + t142;
-    const real t144 = e[2] - t143;
-    const real t145 = e_b[2] + t144;
-    const real t146 = Rc[2] * t145;
-    const real t147 = t134 + t146;
-    e_I[0] += t147;
-    const real t148 = Rc[3] * t120;
-    const real t149 = Rc[4] * t132;
-    const real t150 = t148 + t149;
-    const real t151 = Rc[5] * t145;
-    const real t152 = t150 + t151;
-    e_I[1] += t152;
-    const real t153 = Rc[6] * t120;
-    const real t154 = Rc[7] * t132;
-    const real t155 = t153 + t154;
-    const real t156 = Rc[8] * t145;
-    const real t157 = t155 + t156;
-    e_I[2] += t157;
-    const real t158 = V[3] * t68;
-    const real t159 = V[9] * t78;
-    const real t160 = t158 + t159;
-    const real t161 = V[15] * t88;
-    const real t162 = t160 + t161;
-    const real t163 = V[21] * t98;
-    const real t164 = t162 + t163;
-    const real t165 = V[27] * t108;
-    const real t166 = t164 + t165;
-    const real t167 = e[3] - t166;
-    const real t168 = e_b[3] + t167;
-    const real t169 = Rc[0] * t168;
-    const real t170 = V[4] * t68;
-    const real t171 = V[10] * t78;
-    const real t172 = t170 + t171;
-    const real t173 = V[16] * t88;
-    const real t174 = t172 + t173;
-    const real t175 = V[22] * t98;
-    const real t176 = t174 + t175;
-    const real t177 = V[28] * t108;
-    const real t178 = t176 + t177;
-    const real t179 = e[4] - t178;
-    const real t180 = e_b[4] + t179;
-    const real t181 = Rc[1] * t180;
-    const real t182 = t169 + t181;
-    const real t183 = V[5] * t68;
-    const real t184 = V[11] * t78;
-    const real t185 = t183 + t184;
-    const real t186 = V[17] * t88;
-    const real t187 = t185 + t186;
-    const real t188 = V[23] * t98;
-    const real t189 = t187 + t188;
-    const real t190 = V[29] * t108;
-    const real t191 = t189 + t190;
-    const real t192 = e[5] - t191;
-    const real t193 = e_b[5] + t192;
-    const real t194 = Rc[2] * t193;
-    const real t195 = t182 + t194;
-    const real t196 = Rc[6] * r[1];
-    const real t197 = Rc[3] * r[2];
-    const real t198 = t196 - t197;
-    const real t199 = t120 * t198;
-    const real t200 = Rc[7] * r[1];
-    const real t201 = Rc[4] * r[2];
-    const real t202 = t200 - t201;
-    const real t203 = t132 * t202;
-    const real t204 = t199 + t203;
-    const real t205 = Rc[8] * r[1];
-    const real t206 = Rc[5] * r[2];
-    const real t207 = t205 - t206;
-    const real t208 = t145 * t207;
-    const real t209 = t204 + t208;
-    const real t210 = t195 + t209;
-    e_I[3] += t210;
-    const real t211 = Rc[3] * t168;
-    const real t212 = Rc[4] * t180;
-    const real t213 = t211 + t212;
-    const real t214 = Rc[5] * t193;
-    const real t215 = t213 + t214;
-    const real t216 = Rc[0] * r[2];
-    const real t217 = Rc[6] * r[0];
-    const real t218 = t216 - t217;
-    const real t219 = t120 * t218;
-    const real t220 = Rc[1] * r[2];
-    const real t221 = Rc[7] * r[0];
-    const real t222 = t220 - t221;
-    const real t223 = t132 * t222;
-    const real t224 = t219 + t223;
-    const real t225 = Rc[2] * r[2];
-    const real t226 = Rc[8] * r[0];
-    const real t227 = t225 - t226;
-    const real t228 = t145 * t227;
-    const real t229 = t224 + t228;
-    const real t230 = t215 + t229;
-    e_I[4] += t230;
-    const real t231 = Rc[6] * t168;
-    const real t232 = Rc[7] * t180;
-    const real t233 = t231 + t232;
-    const real t234 = Rc[8] * t193;
-    const real t235 = t233 + t234;
-    const real t236 = Rc[3] * r[0];
-    const real t237 = Rc[0] * r[1];
-    const real t238 = t236 - t237;
-    const real t239 = t120 * t238;
-    const real t240 = Rc[4] * r[0];
-    const real t241 = Rc[1] * r[1];
-    const real t242 = t240 - t241;
-    const real t243 = t132 * t242;
-    const real t244 = t239 + t243;
-    const real t245 = Rc[5] * r[0];
-    const real t246 = Rc[2] * r[1];
-    const real t247 = t245 - t246;
-    const real t248 = t145 * t247;
-    const real t249 = t244 + t248;
-    const real t250 = t235 + t249;
-    e_I[5] += t250;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[5] * e[1] + H[10] * e[2] + H[15] * e[3] + H[20] * e[4] +
+    H[25] * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[6] * e[1] + H[11] * e[2] + H[16] * e[3] + H[21] * e[4] +
+    H[26] * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[7] * e[1] + H[12] * e[2] + H[17] * e[3] + H[22] * e[4] +
+    H[27] * e[5]);
+  real t52 = e_f[3] + (H[3] * e[0] + H[8] * e[1] + H[13] * e[2] + H[18] * e[3] + H[23] * e[4] +
+    H[28] * e[5]);
+  real t66 = e_f[4] + (H[4] * e[0] + H[9] * e[1] + H[14] * e[2] + H[19] * e[3] + H[24] * e[4] +
+    H[29] * e[5]);
+  real t68 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38 + inverse[3] * t52 + inverse[4]
+    * t66;
+  y[0] = -t68;
+  real t78 = inverse[5] * t11 + inverse[6] * t24 + inverse[7] * t38 + inverse[8] * t52 + inverse[9]
+    * t66;
+  y[1] = -t78;
+  real t88 = inverse[10] * t11 + inverse[11] * t24 + inverse[12] * t38 + inverse[13] * t52 +
+    inverse[14] * t66;
+  y[2] = -t88;
+  real t98 = inverse[15] * t11 + inverse[16] * t24 + inverse[17] * t38 + inverse[18] * t52 +
+    inverse[19] * t66;
+  y[3] = -t98;
+  real t108 = inverse[20] * t11 + inverse[21] * t24 + inverse[22] * t38 + inverse[23] * t52 +
+    inverse[24] * t66;
+  y[4] = -t108;
+  real t120 = e_b[0] + (e[0] - (V[0] * t68 + V[6] * t78 + V[12] * t88 + V[18] * t98 + V[24] *
+    t108));
+  real t132 = e_b[1] + (e[1] - (V[1] * t68 + V[7] * t78 + V[13] * t88 + V[19] * t98 + V[25] *
+    t108));
+  real t145 = e_b[2] + (e[2] - (V[2] * t68 + V[8] * t78 + V[14] * t88 + V[20] * t98 + V[26] *
+    t108));
+  e_I[0] += Rc[0] * t120 + Rc[1] * t132 + Rc[2] * t145;
+  e_I[1] += Rc[3] * t120 + Rc[4] * t132 + Rc[5] * t145;
+  e_I[2] += Rc[6] * t120 + Rc[7] * t132 + Rc[8] * t145;
+  real t168 = e_b[3] + (e[3] - (V[3] * t68 + V[9] * t78 + V[15] * t88 + V[21] * t98 + V[27] *
+    t108));
+  real t180 = e_b[4] + (e[4] - (V[4] * t68 + V[10] * t78 + V[16] * t88 + V[22] * t98 + V[28] *
+    t108));
+  real t193 = e_b[5] + (e[5] - (V[5] * t68 + V[11] * t78 + V[17] * t88 + V[23] * t98 + V[29] *
+    t108));
+  e_I[3] += Rc[0] * t168 + Rc[1] * t180 + Rc[2] * t193 + (t120 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t132 * (Rc[7] * r[1] - Rc[4] * r[2]) + t145 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t168 + Rc[4] * t180 + Rc[5] * t193 + (t120 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t132 * (Rc[1] * r[2] - Rc[7] * r[0]) + t145 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t168 + Rc[7] * t180 + Rc[8] * t193 + (t120 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t132 * (Rc[4] * r[0] - Rc[1] * r[1]) + t145 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_load_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"V", 30, "", 0, 0},
-    {"inverse", 25, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 5, "", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_load_with_increments_outputs[] = {
-    {"y", 5, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_load_with_increments, (in[0], in[1], in[2], in[3], in[4],
+  in[5], in[6], in[7], out[0], out[1]))
 
 /* solution of a hinge with 5 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -10399,1247 +2847,324 @@ static const mstmm_port mstmm_sweep_generic5_tangent_load_with_increments_output
  * out x[5] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic5_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_generic5_tangent_solution_with_increments(in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t z_I, in_t B, in_t gain, in_t y, in_t b, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = b[0] + t4;
-    const real t6 = gain[0] * t5;
-    const real t7 = Rc[1] * z_I[0];
-    const real t8 = Rc[4] * z_I[1];
-    const real t9 = t7 + t8;
-    const real t10 = Rc[7] * z_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = b[1] + t11;
-    const real t13 = gain[1] * t12;
-    const real t14 = t6 + t13;
-    const real t15 = Rc[2] * z_I[0];
-    const real t16 = Rc[5] * z_I[1];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[8] * z_I[2];
-    const real t19 = t17 + t18;
-    const real t20 = b[2] + t19;
-    const real t21 = gain[2] * t20;
-    const real t22 = t14 + t21;
-    const real t23 = w[2] * t11;
-    const real t24 = w[1] * t19;
-    const real t25 = t23 - t24;
-    const real t26 = Rc[0] * z_I[3];
-    const real t27 = Rc[3] * z_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[6] * z_I[5];
-    const real t30 = t28 + t29;
-    const real t31 = t25 + t30;
-    const real t32 = b[3] + t31;
-    const real t33 = gain[3] * t32;
-    const real t34 = t22 + t33;
-    const real t35 = w[0] * t19;
-    const real t36 = w[2] * t4;
-    const real t37 = t35 - t36;
-    const real t38 = Rc[1] * z_I[3];
-    const real t39 = Rc[4] * z_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[7] * z_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = b[4] + t43;
-    const real t45 = gain[4] * t44;
-    const real t46 = t34 + t45;
-    const real t47 = w[1] * t4;
-    const real t48 = w[0] * t11;
-    const real t49 = t47 - t48;
-    const real t50 = Rc[2] * z_I[3];
-    const real t51 = Rc[5] * z_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rc[8] * z_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = b[5] + t55;
-    const real t57 = gain[5] * t56;
-    const real t58 = t46 + t57;
-    const real t59 = v[2] * 2.0;
-    const real t60 = t11 * t59;
-    const real t61 = v[1] * 2.0;
-    const real t62 = t19 * t61;
-    const real t63 = t60 - t62;
-    const real t64 = r[2] * z_I[4];
-    const real t65 = r[1] * w_I[1];
-    const real t66 = r[2] * w_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = z_I[0] * t67;
-    const real t69 = r[0] * w_I[1];
-    const real t70 = 2.0 * t69;
-    const real t71 = r[1] * w_I[0];
-    const real t72 = t70 - t71;
-    const real t73 = z_I[1] * t72;
-    const real t74 = r[0] * w_I[2];
-    const real t75 = 2.0 * t74;
-    const real t76 = r[2] * w_I[0];
-    const real t77 = t75 - t76;
-    const real t78 = z_I[2] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = t68 - t79;
-    const real t81 = r[1] * z_I[5];
-    const real t82 = t80 - t81;
-    const real t83 = t64 + t82;
-    const real t84 = z_I[6] + t83;
-    const real t85 = Rc[0] * t84;
-    const real t86 = r[0] * z_I[5];
-    const real t87 = r[0] * w_I[0];
-    const real t88 = t66 + t87;
-    const real t89 = z_I[1] * t88;
-    const real t90 = 2.0 * t71;
-    const real t91 = t90 - t69;
-    const real t92 = z_I[0] * t91;
-    const real t93 = t89 - t92;
-    const real t94 = r[1] * w_I[2];
-    const real t95 = 2.0 * t94;
-    const real t96 = r[2] * w_I[1];
-    const real t97 = t95 - t96;
-    const real t98 = z_I[2] * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t86 + t99;
-    const real t101 = r[2] * z_I[3];
-    const real t102 = t100 - t101;
-    const real t103 = z_I[7] + t102;
-    const real t104 = Rc[3] * t103;
-    const real t105 = t85 + t104;
-    const real t106 = r[1] * z_I[3];
-    const real t107 = t65 + t87;
-    const real t108 = z_I[2] * t107;
-    const real t109 = 2.0 * t76;
-    const real t110 = t109 - t74;
-    const real t111 = z_I[0] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = 2.0 * t96;
-    const real t114 = t113 - t94;
-    const real t115 = z_I[1] * t114;
-    const real t116 = t112 - t115;
-    const real t117 = r[0] * z_I[4];
-    const real t118 = t116 - t117;
-    const real t119 = t106 + t118;
-    const real t120 = z_I[8] + t119;
-    const real t121 = Rc[6] * t120;
-    const real t122 = t105 + t121;
-    const real t123 = t63 + t122;
-    const real t124 = b[6] + t123;
-    const real t125 = gain[6] * t124;
-    const real t126 = t58 + t125;
-    const real t127 = v[0] * 2.0;
-    const real t128 = t19 * t127;
-    const real t129 = t4 * t59;
-    const real t130 = t128 - t129;
-    const real t131 = Rc[1] * t84;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[7] * t120;
-    const real t135 = t133 + t134;
-    const real t136 = t130 + t135;
-    const real t137 = b[7] + t136;
-    const real t138 = gain[7] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = t4 * t61;
-    const real t141 = t11 * t127;
-    const real t142 = t140 - t141;
-    const real t143 = Rc[2] * t84;
-    const real t144 = Rc[5] * t103;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[8] * t120;
-    const real t147 = t145 + t146;
-    const real t148 = t142 + t147;
-    const real t149 = b[8] + t148;
-    const real t150 = gain[8] * t149;
-    const real t151 = t139 + t150;
-    const real t152 = y[0] - t151;
-    x[0] = t152;
-    const real t153 = gain[9] * t5;
-    const real t154 = gain[10] * t12;
-    const real t155 = t153 + t154;
-    const real t156 = gain[11] * t20;
-    const real t157 = t155 + t156;
-    const real t158 = gain[12] * t32;
-    const real t159 = t157 + t158;
-    const real t160 = gain[13] * t44;
-    const real t161 = t159 + t160;
-    const real t162 = gain[14] * t56;
-    const real t163 = t161 + t162;
-    const real t164 = gain[15] * t124;
-    const real t165 = t163 + t164;
-    const real t166 = gain[16] * t137;
-    const real t167 = t165 + t166;
-    const real t168 = gain[17] * t149;
-    const real t169 = t167 + t168;
-    const real t170 = y[1] - t169;
-    x[1] = t170;
-    const real t171 = gain[18] * t5;
-    const real t172 = gain[19] * t12;
-    const real t173 = t171 + t172;
-    const real t174 = gain[20] * t20;
-    const real t175 = t173 + t174;
-    const real t176 = gain[21] * t32;
-    const real t177 = t175 + t176;
-    const real t178 = gain[22] * t44;
-    const real t179 = t177 + t178;
-    const real t180 = gain[23] * t56;
-    const real t181 = t179 + t180;
-    const real t182 = gain[24] * t124;
-    const real t183 = t181 + t182;
-    const real t184 = gain[25] * t137;
-    const real t185 = t183 + t184;
-    const real t186 = gain[26] * t149;
-    const real t187 = t185 + t186;
-    const real t188 = y[2] - t187;
-    x[2] = t188;
-    const real t189 = gain[27] * t5;
-    const real t190 = gain[28] * t12;
-    const real t191 = t189 + t190;
-    const real t192 = gain[29] * t20;
-    const real t193 = t191 + t192;
-    const real t194 = gain[30] * t32;
-    const real t195 = t193 + t194;
-    const real t196 = gain[31] * t44;
-    const real t197 = t195 + t196;
-    const real t198 = gain[32] * t56;
-    const real t199 = t197 + t198;
-    const real t200 = gain[33] * t124;
-    const real t201 = t199 + t200;
-    const real t202 = gain[34] * t137;
-    const real t203 = t201 + t202;
-    const real t204 = gain[35] * t149;
-    const real t205 = t203 + t204;
-    const real t206 = y[3] - t205;
-    x[3] = t206;
-    const real t207 = gain[36] * t5;
-    const real t208 = gain[37] * t12;
-    const real t209 = t207 + t208;
-    const real t210 = gain[38] * t20;
-    const real t211 = t209 + t210;
-    const real t212 = gain[39] * t32;
-    const real t213 = t211 + t212;
-    const real t214 = gain[40] * t44;
-    const real t215 = t213 + t214;
-    const real t216 = gain[41] * t56;
-    const real t217 = t215 + t216;
-    const real t218 = gain[42] * t124;
-    const real t219 = t217 + t218;
-    const real t220 = gain[43] * t137;
-    const real t221 = t219 + t220;
-    const real t222 = gain[44] * t149;
-    const real t223 = t221 + t222;
-    const real t224 = y[4] - t223;
-    x[4] = t224;
-    const real t225 = B[0] * t152;
-    const real t226 = B[9] * t170;
-    const real t227 = t225 + t226;
-    const real t228 = B[18] * t188;
-    const real t229 = t227 + t228;
-    const real t230 = B[27] * t206;
-    const real t231 = t229 + t230;
-    const real t232 = B[36] * t224;
-    const real t233 = t231 + t232;
-    const real t234 = t5 + t233;
-    z[0] = t234;
-    const real t235 = B[1] * t152;
-    const real t236 = B[10] * t170;
-    const real t237 = t235 + t236;
-    const real t238 = B[19] * t188;
-    const real t239 = t237 + t238;
-    const real t240 = B[28] * t206;
-    const real t241 = t239 + t240;
-    const real t242 = B[37] * t224;
-    const real t243 = t241 + t242;
-    const real t244 = t12 + t243;
-    z[1] = t244;
-    const real t245 = B[2] * t152;
-    const real t246 = B[11] * t170;
-    const real t247 = t245 + t246;
-    const real t248 = B[20] * t188;
-    const real t249 = t247 + t248;
-    const real t250 = B[29] * t206;
-    const real t251 = t249 + t250;
-    const real t252 = B[38] * t224;
-    const real t253 = t251 + t252;
-    const real t254 = t20 + t253;
-    z[2] = t254;
-    const real t255 = B[3] * t152;
-    const real t256 = B[12] * t170;
-    const real t257 = t255 + t256;
-    const real t258 = B[21] * t188;
-    const real t259 = t257 + t258;
-    const real t260 = B[30] * t206;
-    const real t261 = t259 + t260;
-    const real t262 = B[39] * t224;
-    const real t263 = t261 + t262;
-    const real t264 = t32 + t263;
-    z[3] = t264;
-    const real t265 = B[4] * t152;
-    const real t266 = B[13] * t170;
-    const real t267 = t265 + t266;
-    const real t268 = B[22] * t188;
-    const real t269 = t267 + t268;
-    const real t270 = B[31] * t206;
-    const real t271 = t269 + t270;
-    const real t272 = B[40] * t224;
-    const real t273 = t271 + t272;
-    const real t274 = t44 + t273;
-    z[4] = t274;
-    const real t275 = B[5] * t152;
-    const real t276 = B[14] * t170;
-    const real t277 = t275 + t276;
-    const real t278 = B[23] * t188;
-    const real t279 = t277 + t278;
-    const real t280 = B[32] * t206;
-    const real t281 = t279 + t280;
-    const real t282 = B[41] * t224;
-    const real t283 = t281 + t282;
-    const real t284 = t56 + t283;
-    z[5] = t284;
-    const real t285 = B[6] * t152;
-    const real t286 = B[15] * t170;
-    const real t287 = t285 + t286;
-    const real t288 = B[24] * t188;
-    const real t289 = t287 + t288;
-    const real t290 = B[33] * t206;
-    const real t291 = t289 + t290;
-    const real t292 = B[42] * t224;
-    const real t293 = t291 + t292;
-    const real t294 = t124 + t293;
-    z[6] = t294;
-    const real t295 = B[7] * t152;
-    const real t296 = B[16] * t170;
-    const real t297 = t295 + t296;
-    const real t298 = B[25] * t188;
-    const real t299 = t297 + t298;
-    const real t300 = B[34] * t206;
-    const real t301 = t299 + t300;
-    const real t302 = B[43] * t224;
-    const real t303 = t301 + t302;
-    const real t304 = t137 + t303;
-    z[7] = t304;
-    const real t305 = B[8] * t152;
-    const real t306 = B[17] * t170;
-    const real t307 = t305 + t306;
-    const real t308 = B[26] * t188;
-    const real t309 = t307 + t308;
-    const real t310 = B[35] * t206;
-    const real t311 = t309 + t310;
-    const real t312 = B[44] * t224;
-    const real t313 = t311 + t312;
-    const real t314 = t149 + t313;
-    z[8] = t314;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t5 = b[0] + t4;
+  real t11 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t12 = b[1] + t11;
+  real t19 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t20 = b[2] + t19;
+  real t32 = b[3] + (w[2] * t11 - w[1] * t19 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]));
+  real t44 = b[4] + (w[0] * t19 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]));
+  real t56 = b[5] + (w[1] * t4 - w[0] * t11 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]));
+  real t59 = v[2] * 2.0;
+  real t61 = v[1] * 2.0;
+  real t65 = r[1] * w_I[1];
+  real t66 = r[2] * w_I[2];
+  real t69 = r[0] * w_I[1];
+  real t71 = r[1] * w_I[0];
+  real t74 = r[0] * w_I[2];
+  real t76 = r[2] * w_I[0];
+  real t84 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t65 + t66) - (z_I[1] * (2.0 * t69 - t71) + z_I[2]
+    * (2.0 * t74 - t76)) - r[1] * z_I[5]));
+  real t87 = r[0] * w_I[0];
+  real t94 = r[1] * w_I[2];
+  real t96 = r[2] * w_I[1];
+  real t103 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t66 + t87) - z_I[0] * (2.0 * t71 - t69) - z_I[2]
+    * (2.0 * t94 - t96)) - r[2] * z_I[3]);
+  real t120 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t65 + t87) - z_I[0] * (2.0 * t76 - t74) - z_I[1]
+    * (2.0 * t96 - t94) - r[0] * z_I[4]));
+  real t124 = b[6] + (t11 * t59 - t19 * t61 + (Rc[0] * t84 + Rc[3] * t103 + Rc[6] * t120));
+  real t127 = v[0] * 2.0;
+  real t137 = b[7] + (t19 * t127 - t4 * t59 + (Rc[1] * t84 + Rc[4] * t103 + Rc[7] * t120));
+  real t149 = b[8] + (t4 * t61 - t11 * t127 + (Rc[2] * t84 + Rc[5] * t103 + Rc[8] * t120));
+  real t152 = y[0] - (gain[0] * t5 + gain[1] * t12 + gain[2] * t20 + gain[3] * t32 + gain[4] * t44 +
+    gain[5] * t56 + gain[6] * t124 + gain[7] * t137 + gain[8] * t149);
+  x[0] = t152;
+  real t170 = y[1] - (gain[9] * t5 + gain[10] * t12 + gain[11] * t20 + gain[12] * t32 + gain[13] *
+    t44 + gain[14] * t56 + gain[15] * t124 + gain[16] * t137 + gain[17] * t149);
+  x[1] = t170;
+  real t188 = y[2] - (gain[18] * t5 + gain[19] * t12 + gain[20] * t20 + gain[21] * t32 + gain[22] *
+    t44 + gain[23] * t56 + gain[24] * t124 + gain[25] * t137 + gain[26] * t149);
+  x[2] = t188;
+  real t206 = y[3] - (gain[27] * t5 + gain[28] * t12 + gain[29] * t20 + gain[30] * t32 + gain[31] *
+    t44 + gain[32] * t56 + gain[33] * t124 + gain[34] * t137 + gain[35] * t149);
+  x[3] = t206;
+  real t224 = y[4] - (gain[36] * t5 + gain[37] * t12 + gain[38] * t20 + gain[39] * t32 + gain[40] *
+    t44 + gain[41] * t56 + gain[42] * t124 + gain[43] * t137 + gain[44] * t149);
+  x[4] = t224;
+  z[0] = t5 + (B[0] * t152 + B[9] * t170 + B[18] * t188 + B[27] * t206 + B[36] * t224);
+  z[1] = t12 + (B[1] * t152 + B[10] * t170 + B[19] * t188 + B[28] * t206 + B[37] * t224);
+  z[2] = t20 + (B[2] * t152 + B[11] * t170 + B[20] * t188 + B[29] * t206 + B[38] * t224);
+  z[3] = t32 + (B[3] * t152 + B[12] * t170 + B[21] * t188 + B[30] * t206 + B[39] * t224);
+  z[4] = t44 + (B[4] * t152 + B[13] * t170 + B[22] * t188 + B[31] * t206 + B[40] * t224);
+  z[5] = t56 + (B[5] * t152 + B[14] * t170 + B[23] * t188 + B[32] * t206 + B[41] * t224);
+  z[6] = t124 + (B[6] * t152 + B[15] * t170 + B[24] * t188 + B[33] * t206 + B[42] * t224);
+  z[7] = t137 + (B[7] * t152 + B[16] * t170 + B[25] * t188 + B[34] * t206 + B[43] * t224);
+  z[8] = t149 + (B[8] * t152 + B[17] * t170 + B[26] * t188 + B[35] * t206 + B[44] * t224);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_tangent_solution_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 45, "", 0, 0},
-    {"gain", 45, "", 0, 0},
-    {"y", 5, "", 0, 0},
-    {"b", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_tangent_solution_with_increments_outputs[] = {
-    {"x", 5, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_tangent_solution_with_increments, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]))
 
 /* free and constrained directions of a hinge with 5 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][5] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic5_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic5_complement(in_t H, out_t W)
 {
-    const real t0 = H[25] * H[25];
-    const real t1 = H[20] * H[20];
-    const real t2 = H[15] * H[15];
-    const real t3 = H[10] * H[10];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[5] * H[5];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[6] * H[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[11] * H[11];
-    const real t16 = t14 + t15;
-    const real t17 = H[16] * H[16];
-    const real t18 = t16 + t17;
-    const real t19 = H[21] * H[21];
-    const real t20 = t18 + t19;
-    const real t21 = H[26] * H[26];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[25] * H[26];
-    const real t25 = H[20] * H[21];
-    const real t26 = H[15] * H[16];
-    const real t27 = H[10] * H[11];
-    const real t28 = H[5] * H[6];
-    const real t29 = H[0] * H[1];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t26 + t31;
-    const real t33 = t25 + t32;
-    const real t34 = t24 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[7] * H[7];
-    const real t42 = t40 + t41;
-    const real t43 = H[12] * H[12];
-    const real t44 = t42 + t43;
-    const real t45 = H[17] * H[17];
-    const real t46 = t44 + t45;
-    const real t47 = H[22] * H[22];
-    const real t48 = t46 + t47;
-    const real t49 = H[27] * H[27];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[25] * H[27];
-    const real t53 = H[20] * H[22];
-    const real t54 = H[15] * H[17];
-    const real t55 = H[10] * H[12];
-    const real t56 = H[5] * H[7];
-    const real t57 = H[0] * H[2];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    const real t60 = t54 + t59;
-    const real t61 = t53 + t60;
-    const real t62 = t52 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[6] * H[7];
-    const real t68 = t66 + t67;
-    const real t69 = H[11] * H[12];
-    const real t70 = t68 + t69;
-    const real t71 = H[16] * H[17];
-    const real t72 = t70 + t71;
-    const real t73 = H[21] * H[22];
-    const real t74 = t72 + t73;
-    const real t75 = H[26] * H[27];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[3] * H[3];
-    const real t85 = H[8] * H[8];
-    const real t86 = t84 + t85;
-    const real t87 = H[13] * H[13];
-    const real t88 = t86 + t87;
-    const real t89 = H[18] * H[18];
-    const real t90 = t88 + t89;
-    const real t91 = H[23] * H[23];
-    const real t92 = t90 + t91;
-    const real t93 = H[28] * H[28];
-    const real t94 = t92 + t93;
-    const real t95 = t94 * ((real)1 / (real)10000000000000);
-    const real t96 = H[25] * H[28];
-    const real t97 = H[20] * H[23];
-    const real t98 = H[15] * H[18];
-    const real t99 = H[10] * H[13];
-    const real t100 = H[5] * H[8];
-    const real t101 = H[0] * H[3];
-    const real t102 = t100 + t101;
-    const real t103 = t99 + t102;
-    const real t104 = t98 + t103;
-    const real t105 = t97 + t104;
-    const real t106 = t96 + t105;
-    const real t107 = t106 * t35;
-    const real t108 = t106 * t107;
-    const real t109 = t94 - t108;
-    const real t110 = H[1] * H[3];
-    const real t111 = H[6] * H[8];
-    const real t112 = t110 + t111;
-    const real t113 = H[11] * H[13];
-    const real t114 = t112 + t113;
-    const real t115 = H[16] * H[18];
-    const real t116 = t114 + t115;
-    const real t117 = H[21] * H[23];
-    const real t118 = t116 + t117;
-    const real t119 = H[26] * H[28];
-    const real t120 = t118 + t119;
-    const real t121 = t106 * t36;
-    const real t122 = t120 - t121;
-    const real t123 = t79 * t122;
-    const real t124 = t122 * t123;
-    const real t125 = t109 - t124;
-    const real t126 = H[2] * H[3];
-    const real t127 = H[7] * H[8];
-    const real t128 = t126 + t127;
-    const real t129 = H[12] * H[13];
-    const real t130 = t128 + t129;
-    const real t131 = H[17] * H[18];
-    const real t132 = t130 + t131;
-    const real t133 = H[22] * H[23];
-    const real t134 = t132 + t133;
-    const real t135 = H[27] * H[28];
-    const real t136 = t134 + t135;
-    const real t137 = t106 * t63;
-    const real t138 = t136 - t137;
-    const real t139 = t80 * t122;
-    const real t140 = t138 - t139;
-    const real t141 = 1.0 / t82;
-    const real t142 = t141 * t140;
-    const real t143 = t140 * t142;
-    const real t144 = t125 - t143;
-    const real t145 = t95 < t144;
-    if (!(t145 != 0)) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t146 = H[4] * H[4];
-    const real t147 = H[9] * H[9];
-    const real t148 = t146 + t147;
-    const real t149 = H[14] * H[14];
-    const real t150 = t148 + t149;
-    const real t151 = H[19] * H[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[24] * H[24];
-    const real t154 = t152 + t153;
-    const real t155 = H[29] * H[29];
-    const real t156 = t154 + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[25] * H[29];
-    const real t159 = H[20] * H[24];
-    const real t160 = H[15] * H[19];
-    const real t161 = H[10] * H[14];
-    const real t162 = H[5] * H[9];
-    const real t163 = H[0] * H[4];
-    const real t164 = t162 + t163;
-    const real t165 = t161 + t164;
-    const real t166 = t160 + t165;
-    const real t167 = t159 + t166;
-    const real t168 = t158 + t167;
-    const real t169 = t168 * t35;
-    const real t170 = t168 * t169;
-    const real t171 = t156 - t170;
-    const real t172 = H[1] * H[4];
-    const real t173 = H[6] * H[9];
-    const real t174 = t172 + t173;
-    const real t175 = H[11] * H[14];
-    const real t176 = t174 + t175;
-    const real t177 = H[16] * H[19];
-    const real t178 = t176 + t177;
-    const real t179 = H[21] * H[24];
-    const real t180 = t178 + t179;
-    const real t181 = H[26] * H[29];
-    const real t182 = t180 + t181;
-    const real t183 = t168 * t36;
-    const real t184 = t182 - t183;
-    const real t185 = t79 * t184;
-    const real t186 = t184 * t185;
-    const real t187 = t171 - t186;
-    const real t188 = H[2] * H[4];
-    const real t189 = H[7] * H[9];
-    const real t190 = t188 + t189;
-    const real t191 = H[12] * H[14];
-    const real t192 = t190 + t191;
-    const real t193 = H[17] * H[19];
-    const real t194 = t192 + t193;
-    const real t195 = H[22] * H[24];
-    const real t196 = t194 + t195;
-    const real t197 = H[27] * H[29];
-    const real t198 = t196 + t197;
-    const real t199 = t168 * t63;
-    const real t200 = t198 - t199;
-    const real t201 = t80 * t184;
-    const real t202 = t200 - t201;
-    const real t203 = t141 * t202;
-    const real t204 = t202 * t203;
-    const real t205 = t187 - t204;
-    const real t206 = H[3] * H[4];
-    const real t207 = H[8] * H[9];
-    const real t208 = t206 + t207;
-    const real t209 = H[13] * H[14];
-    const real t210 = t208 + t209;
-    const real t211 = H[18] * H[19];
-    const real t212 = t210 + t211;
-    const real t213 = H[23] * H[24];
-    const real t214 = t212 + t213;
-    const real t215 = H[28] * H[29];
-    const real t216 = t214 + t215;
-    const real t217 = t168 * t107;
-    const real t218 = t216 - t217;
-    const real t219 = t123 * t184;
-    const real t220 = t218 - t219;
-    const real t221 = t142 * t202;
-    const real t222 = t220 - t221;
-    const real t223 = 1.0 / t144;
-    const real t224 = t223 * t222;
-    const real t225 = t222 * t224;
-    const real t226 = t205 - t225;
-    const real t227 = t157 < t226;
-    if (!(t227 != 0)) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
-    const real t228 = H[0] * t35;
-    const real t229 = H[0] * t36;
-    const real t230 = H[1] - t229;
-    const real t231 = t79 * t230;
-    const real t232 = H[0] * t63;
-    const real t233 = H[2] - t232;
-    const real t234 = t80 * t230;
-    const real t235 = t233 - t234;
-    const real t236 = t141 * t235;
-    const real t237 = H[0] * t107;
-    const real t238 = H[3] - t237;
-    const real t239 = t123 * t230;
-    const real t240 = t238 - t239;
-    const real t241 = t142 * t235;
-    const real t242 = t240 - t241;
-    const real t243 = t223 * t242;
-    const real t244 = 1.0 / t226;
-    const real t245 = H[0] * t169;
-    const real t246 = H[4] - t245;
-    const real t247 = t185 * t230;
-    const real t248 = t246 - t247;
-    const real t249 = t203 * t235;
-    const real t250 = t248 - t249;
-    const real t251 = t224 * t242;
-    const real t252 = t250 - t251;
-    const real t253 = t244 * t252;
-    const real t254 = t224 * t253;
-    const real t255 = t243 - t254;
-    const real t256 = t142 * t255;
-    const real t257 = t236 - t256;
-    const real t258 = t203 * t253;
-    const real t259 = t257 - t258;
-    const real t260 = t80 * t259;
-    const real t261 = t231 - t260;
-    const real t262 = t123 * t255;
-    const real t263 = t261 - t262;
-    const real t264 = t185 * t253;
-    const real t265 = t263 - t264;
-    const real t266 = t36 * t265;
-    const real t267 = t228 - t266;
-    const real t268 = t63 * t259;
-    const real t269 = t267 - t268;
-    const real t270 = t107 * t255;
-    const real t271 = t269 - t270;
-    const real t272 = t169 * t253;
-    const real t273 = t271 - t272;
-    W[0] = t273;
-    const real t274 = H[5] * t35;
-    const real t275 = H[5] * t36;
-    const real t276 = H[6] - t275;
-    const real t277 = t79 * t276;
-    const real t278 = H[5] * t63;
-    const real t279 = H[7] - t278;
-    const real t280 = t80 * t276;
-    const real t281 = t279 - t280;
-    const real t282 = t141 * t281;
-    const real t283 = H[5] * t107;
-    const real t284 = H[8] - t283;
-    const real t285 = t123 * t276;
-    const real t286 = t284 - t285;
-    const real t287 = t142 * t281;
-    const real t288 = t286 - t287;
-    const real t289 = t223 * t288;
-    const real t290 = H[5] * t169;
-    const real t291 = H[9] - t290;
-    const real t292 = t185 * t276;
-    const real t293 = t291 - t292;
-    const real t294 = t203 * t281;
-    const real t295 = t293 - t294;
-    const real t296 = t224 * t288;
-    const real t297 = t295 - t296;
-    const real t298 = t244 * t297;
-    const real t299 = t224 * t298;
-    const real t300 = t289 - t299;
-    const real t301 = t142 * t300;
-    const real t302 = t282 - t301;
-    const real t303 = t203 * t298;
-    const real t304 = t302 - t303;
-    const real t305 = t80 * t304;
-    const real t306 = t277 - t305;
-    const real t307 = t123 * t300;
-    const real t308 = t306 - t307;
-    const real t309 = t185 * t298;
-    const real t310 = t308 - t309;
-    const real t311 = t36 * t310;
-    const real t312 = t274 - t311;
-    const real t313 = t63 * t304;
-    const real t314 = t312 - t313;
-    const real t315 = t107 * t300;
-    const real t316 = t314 - t315;
-    const real t317 = t169 * t298;
-    const real t318 = t316 - t317;
-    W[1] = t318;
-    const real t319 = H[10] * t35;
-    const real t320 = H[10] * t36;
-    const real t321 = H[11] - t320;
-    const real t322 = t79 * t321;
-    const real t323 = H[10] * t63;
-    const real t324 = H[12] - t323;
-    const real t325 = t80 * t321;
-    const real t326 = t324 - t325;
-    const real t327 = t141 * t326;
-    const real t328 = H[10] * t107;
-    const real t329 = H[13] - t328;
-    const real t330 = t123 * t321;
-    const real t331 = t329 - t330;
-    const real t332 = t142 * t326;
-    const real t333 = t331 - t332;
-    const real t334 = t223 * t333;
-    const real t335 = H[10] * t169;
-    const real t336 = H[14] - t335;
-    const real t337 = t185 * t321;
-    const real t338 = t336 - t337;
-    const real t339 = t203 * t326;
-    const real t340 = t338 - t339;
-    const real t341 = t224 * t333;
-    const real t342 = t340 - t341;
-    const real t343 = t244 * t342;
-    const real t344 = t224 * t343;
-    const real t345 = t334 - t344;
-    const real t346 = t142 * t345;
-    const real t347 = t327 - t346;
-    const real t348 = t203 * t343;
-    const real t349 = t347 - t348;
-    const real t350 = t80 * t349;
-    const real t351 = t322 - t350;
-    const real t352 = t123 * t345;
-    const real t353 = t351 - t352;
-    const real t354 = t185 * t343;
-    const real t355 = t353 - t354;
-    const real t356 = t36 * t355;
-    const real t357 = t319 - t356;
-    const real t358 = t63 * t349;
-    const real t359 = t357 - t358;
-    const real t360 = t107 * t345;
-    const real t361 = t359 - t360;
-    const real t362 = t169 * t343;
-    const real t363 = t361 - t362;
-    W[2] = t363;
-    const real t364 = H[15] * t35;
-    const real t365 = H[15] * t36;
-    const real t366 = H[16] - t365;
-    const real t367 = t79 * t366;
-    const real t368 = H[15] * t63;
-    const real t369 = H[17] - t368;
-    const real t370 = t80 * t366;
-    const real t371 = t369 - t370;
-    const real t372 = t141 * t371;
-    const real t373 = H[15] * t107;
-    const real t374 = H[18] - t373;
-    const real t375 = t123 * t366;
-    const real t376 = t374 - t375;
-    const real t377 = t142 * t371;
-    const real t378 = t376 - t377;
-    const real t379 = t223 * t378;
-    const real t380 = H[15] * t169;
-    const real t381 = H[19] - t380;
-    const real t382 = t185 * t366;
-    const real t383 = t381 - t382;
-    const real t384 = t203 * t371;
-    const real t385 = t383 - t384;
-    const real t386 = t224 * t378;
-    const real t387 = t385 - t386;
-    const real t388 = t244 * t387;
-    const real t389 = t224 * t388;
-    const real t390 = t379 - t389;
-    const real t391 = t142 * t390;
-    const real t392 = t372 - t391;
-    const real t393 = t203 * t388;
-    const real t394 = t392 - t393;
-    const real t395 = t80 * t394;
-    const real t396 = t367 - t395;
-    const real t397 = t123 * t390;
-    const real t398 = t396 - t397;
-    const real t399 = t185 * t388;
-    const real t400 = t398 - t399;
-    const real t401 = t36 * t400;
-    const real t402 = t364 - t401;
-    const real t403 = t63 * t394;
-    const real t404 = t402 - t403;
-    const real t405 = t107 * t390;
-    const real t406 = t404 - t405;
-    const real t407 = t169 * t388;
-    const real t408 = t406 - t407;
-    W[3] = t408;
-    const real t409 = H[20] * t35;
-    const real t410 = H[20] * t36;
-    const real t411 = H[21] - t410;
-    const real t412 = t79 * t411;
-    const real t413 = H[20] * t63;
-    const real t414 = H[22] - t413;
-    const real t415 = t80 * t411;
-    const real t416 = t414 - t415;
-    const real t417 = t141 * t416;
-    const real t418 = H[20] * t107;
-    const real t419 = H[23] - t418;
-    const real t420 = t123 * t411;
-    const real t421 = t419 - t420;
-    const real t422 = t142 * t416;
-    const real t423 = t421 - t422;
-    const real t424 = t223 * t423;
-    const real t425 = H[20] * t169;
-    const real t426 = H[24] - t425;
-    const real t427 = t185 * t411;
-    const real t428 = t426 - t427;
-    const real t429 = t203 * t416;
-    const real t430 = t428 - t429;
-    const real t431 = t224 * t423;
-    const real t432 = t430 - t431;
-    const real t433 = t244 * t432;
-    const real t434 = t224 * t433;
-    const real t435 = t424 - t434;
-    const real t436 = t142 * t435;
-    const real t437 = t417 - t436;
-    const real t438 = t203 * t433;
-    const real t439 = t437 - t438;
-    const real t440 = t80 * t439;
-    const real t441 = t412 - t440;
-    const real t442 = t123 * t435;
-    const real t443 = t441 - t442;
-    const real t444 = t185 * t433;
-    const real t445 = t443 - t444;
-    const real t446 = t36 * t445;
-    const real t447 = t409 - t446;
-    const real t448 = t63 * t439;
-    const real t449 = t447 - t448;
-    const real t450 = t107 * t435;
-    const real t451 = t449 - t450;
-    const real t452 = t169 * t433;
-    const real t453 = t451 - t452;
-    W[4] = t453;
-    const real t454 = H[25] * t35;
-    const real t455 = H[25] * t36;
-    const real t456 = H[26] - t455;
-    const real t457 = t79 * t456;
-    const real t458 = H[25] * t63;
-    const real t459 = H[27] - t458;
-    const real t460 = t80 * t456;
-    const real t461 = t459 - t460;
-    const real t462 = t141 * t461;
-    const real t463 = H[25] * t107;
-    const real t464 = H[28] - t463;
-    const real t465 = t123 * t456;
-    const real t466 = t464 - t465;
-    const real t467 = t142 * t461;
-    const real t468 = t466 - t467;
-    const real t469 = t223 * t468;
-    const real t470 = H[25] * t169;
-    const real t471 = H[29] - t470;
-    const real t472 = t185 * t456;
-    const real t473 = t471 - t472;
-    const real t474 = t203 * t461;
-    const real t475 = t473 - t474;
-    const real t476 = t224 * t468;
-    const real t477 = t475 - t476;
-    const real t478 = t244 * t477;
-    const real t479 = t224 * t478;
-    const real t480 = t469 - t479;
-    const real t481 = t142 * t480;
-    const real t482 = t462 - t481;
-    const real t483 = t203 * t478;
-    const real t484 = t482 - t483;
-    const real t485 = t80 * t484;
-    const real t486 = t457 - t485;
-    const real t487 = t123 * t480;
-    const real t488 = t486 - t487;
-    const real t489 = t185 * t478;
-    const real t490 = t488 - t489;
-    const real t491 = t36 * t490;
-    const real t492 = t454 - t491;
-    const real t493 = t63 * t484;
-    const real t494 = t492 - t493;
-    const real t495 = t107 * t480;
-    const real t496 = t494 - t495;
-    const real t497 = t169 * t478;
-    const real t498 = t496 - t497;
-    W[5] = t498;
-    W[6] = t265;
-    W[7] = t310;
-    W[8] = t355;
-    W[9] = t400;
-    W[10] = t445;
-    W[11] = t490;
-    W[12] = t259;
-    W[13] = t304;
-    W[14] = t349;
-    W[15] = t394;
-    W[16] = t439;
-    W[17] = t484;
-    W[18] = t255;
-    W[19] = t300;
-    W[20] = t345;
-    W[21] = t390;
-    W[22] = t435;
-    W[23] = t480;
-    W[24] = t253;
-    W[25] = t298;
-    W[26] = t343;
-    W[27] = t388;
-    W[28] = t433;
-    W[29] = t478;
-    const real t499 = H[0] < 0.0;
-    const real t500 = sqrt(t10);
-    const real t501 = -t500;
-    const real t502 = t499 != 0 ? t501 : t500;
-    const real t503 = H[0] + t502;
-    const real t504 = fabs(H[0]);
-    const real t505 = t500 + t504;
-    const real t506 = t500 * t505;
-    const real t507 = 0.0 < t506;
-    const real t508 = 1.0 / t506;
-    const real t509 = t507 != 0 ? t508 : 0.0;
-    const real t510 = H[4] * t503;
-    const real t511 = t510 + t162;
-    const real t512 = t161 + t511;
-    const real t513 = t160 + t512;
-    const real t514 = t159 + t513;
-    const real t515 = t158 + t514;
-    const real t516 = t509 * t515;
-    const real t517 = H[25] * t516;
-    const real t518 = H[29] - t517;
-    const real t519 = H[1] * t503;
-    const real t520 = t519 + t28;
-    const real t521 = t27 + t520;
-    const real t522 = t26 + t521;
-    const real t523 = t25 + t522;
-    const real t524 = t24 + t523;
-    const real t525 = t509 * t524;
-    const real t526 = H[25] * t525;
-    const real t527 = H[26] - t526;
-    const real t528 = t527 * t527;
-    const real t529 = H[20] * t525;
-    const real t530 = H[21] - t529;
-    const real t531 = t530 * t530;
-    const real t532 = H[15] * t525;
-    const real t533 = H[16] - t532;
-    const real t534 = t533 * t533;
-    const real t535 = H[5] * t525;
-    const real t536 = H[6] - t535;
-    const real t537 = t536 * t536;
-    const real t538 = H[10] * t525;
-    const real t539 = H[11] - t538;
-    const real t540 = t539 * t539;
-    const real t541 = t537 + t540;
-    const real t542 = t534 + t541;
-    const real t543 = t531 + t542;
-    const real t544 = t528 + t543;
-    const real t545 = sqrt(t544);
-    const real t546 = fabs(t536);
-    const real t547 = t545 + t546;
-    const real t548 = t545 * t547;
-    const real t549 = 0.0 < t548;
-    const real t550 = 1.0 / t548;
-    const real t551 = t549 != 0 ? t550 : 0.0;
-    const real t552 = t527 * t518;
-    const real t553 = H[20] * t516;
-    const real t554 = H[24] - t553;
-    const real t555 = t530 * t554;
-    const real t556 = H[15] * t516;
-    const real t557 = H[19] - t556;
-    const real t558 = t533 * t557;
-    const real t559 = H[5] * t516;
-    const real t560 = H[9] - t559;
-    const real t561 = t536 < 0.0;
-    const real t562 = -t545;
-    const real t563 = t561 != 0 ? t562 : t545;
-    const real t564 = t536 + t563;
-    const real t565 = t560 * t564;
-    const real t566 = H[10] * t516;
-    const real t567 = H[14] - t566;
-    const real t568 = t539 * t567;
-    const real t569 = t565 + t568;
-    const real t570 = t558 + t569;
-    const real t571 = t555 + t570;
-    const real t572 = t552 + t571;
-    const real t573 = t551 * t572;
-    const real t574 = t527 * t573;
-    const real t575 = t518 - t574;
-    const real t576 = H[2] * t503;
-    const real t577 = t576 + t56;
-    const real t578 = t55 + t577;
-    const real t579 = t54 + t578;
-    const real t580 = t53 + t579;
-    const real t581 = t52 + t580;
-    const real t582 = t509 * t581;
-    const real t583 = H[25] * t582;
-    const real t584 = H[27] - t583;
-    const real t585 = t527 * t584;
-    const real t586 = H[20] * t582;
-    const real t587 = H[22] - t586;
-    const real t588 = t530 * t587;
-    const real t589 = H[15] * t582;
-    const real t590 = H[17] - t589;
-    const real t591 = t533 * t590;
-    const real t592 = H[5] * t582;
-    const real t593 = H[7] - t592;
-    const real t594 = t593 * t564;
-    const real t595 = H[10] * t582;
-    const real t596 = H[12] - t595;
-    const real t597 = t539 * t596;
-    const real t598 = t594 + t597;
-    const real t599 = t591 + t598;
-    const real t600 = t588 + t599;
-    const real t601 = t585 + t600;
-    const real t602 = t551 * t601;
-    const real t603 = t527 * t602;
-    const real t604 = t584 - t603;
-    const real t605 = t604 * t604;
-    const real t606 = t530 * t602;
-    const real t607 = t587 - t606;
-    const real t608 = t607 * t607;
-    const real t609 = t539 * t602;
-    const real t610 = t596 - t609;
-    const real t611 = t610 * t610;
-    const real t612 = t533 * t602;
-    const real t613 = t590 - t612;
-    const real t614 = t613 * t613;
-    const real t615 = t611 + t614;
-    const real t616 = t608 + t615;
-    const real t617 = t605 + t616;
-    const real t618 = sqrt(t617);
-    const real t619 = fabs(t610);
-    const real t620 = t618 + t619;
-    const real t621 = t618 * t620;
-    const real t622 = 0.0 < t621;
-    const real t623 = 1.0 / t621;
-    const real t624 = t622 != 0 ? t623 : 0.0;
-    const real t625 = t604 * t575;
-    const real t626 = t530 * t573;
-    const real t627 = t554 - t626;
-    const real t628 = t607 * t627;
-    const real t629 = t539 * t573;
-    const real t630 = t567 - t629;
-    const real t631 = t610 < 0.0;
-    const real t632 = -t618;
-    const real t633 = t631 != 0 ? t632 : t618;
-    const real t634 = t610 + t633;
-    const real t635 = t630 * t634;
-    const real t636 = t533 * t573;
-    const real t637 = t557 - t636;
-    const real t638 = t613 * t637;
-    const real t639 = t635 + t638;
-    const real t640 = t628 + t639;
-    const real t641 = t625 + t640;
-    const real t642 = t624 * t641;
-    const real t643 = t604 * t642;
-    const real t644 = t575 - t643;
-    const real t645 = H[3] * t503;
-    const real t646 = t645 + t100;
-    const real t647 = t99 + t646;
-    const real t648 = t98 + t647;
-    const real t649 = t97 + t648;
-    const real t650 = t96 + t649;
-    const real t651 = t509 * t650;
-    const real t652 = H[25] * t651;
-    const real t653 = H[28] - t652;
-    const real t654 = t527 * t653;
-    const real t655 = H[20] * t651;
-    const real t656 = H[23] - t655;
-    const real t657 = t530 * t656;
-    const real t658 = H[15] * t651;
-    const real t659 = H[18] - t658;
-    const real t660 = t533 * t659;
-    const real t661 = H[5] * t651;
-    const real t662 = H[8] - t661;
-    const real t663 = t662 * t564;
-    const real t664 = H[10] * t651;
-    const real t665 = H[13] - t664;
-    const real t666 = t539 * t665;
-    const real t667 = t663 + t666;
-    const real t668 = t660 + t667;
-    const real t669 = t657 + t668;
-    const real t670 = t654 + t669;
-    const real t671 = t551 * t670;
-    const real t672 = t527 * t671;
-    const real t673 = t653 - t672;
-    const real t674 = t604 * t673;
-    const real t675 = t530 * t671;
-    const real t676 = t656 - t675;
-    const real t677 = t607 * t676;
-    const real t678 = t539 * t671;
-    const real t679 = t665 - t678;
-    const real t680 = t679 * t634;
-    const real t681 = t533 * t671;
-    const real t682 = t659 - t681;
-    const real t683 = t613 * t682;
-    const real t684 = t680 + t683;
-    const real t685 = t677 + t684;
-    const real t686 = t674 + t685;
-    const real t687 = t624 * t686;
-    const real t688 = t604 * t687;
-    const real t689 = t673 - t688;
-    const real t690 = t689 * t689;
-    const real t691 = t613 * t687;
-    const real t692 = t682 - t691;
-    const real t693 = t692 * t692;
-    const real t694 = t607 * t687;
-    const real t695 = t676 - t694;
-    const real t696 = t695 * t695;
-    const real t697 = t693 + t696;
-    const real t698 = t690 + t697;
-    const real t699 = sqrt(t698);
-    const real t700 = fabs(t692);
-    const real t701 = t699 + t700;
-    const real t702 = t699 * t701;
-    const real t703 = 0.0 < t702;
-    const real t704 = 1.0 / t702;
-    const real t705 = t703 != 0 ? t704 : 0.0;
-    const real t706 = t689 * t644;
-    const real t707 = t613 * t642;
-    const real t708 = t637 - t707;
-    const real t709 = t692 < 0.0;
-    const real t710 = -t699;
-    const real t711 = t709 != 0 ? t710 : t699;
-    const real t712 = t692 + t711;
-    const real t713 = t708 * t712;
-    const real t714 = t607 * t642;
-    const real t715 = t627 - t714;
-    const real t716 = t695 * t715;
-    const real t717 = t713 + t716;
-    const real t718 = t706 + t717;
-    const real t719 = t705 * t718;
-    const real t720 = t689 * t719;
-    const real t721 = t644 - t720;
-    const real t722 = t721 * t721;
-    const real t723 = t695 * t719;
-    const real t724 = t715 - t723;
-    const real t725 = t724 * t724;
-    const real t726 = t725 + t722;
-    const real t727 = sqrt(t726);
-    const real t728 = fabs(t724);
-    const real t729 = t727 + t728;
-    const real t730 = t727 * t729;
-    const real t731 = 0.0 < t730;
-    const real t732 = 1.0 / t730;
-    const real t733 = t731 != 0 ? t732 : 0.0;
-    const real t734 = t722 * t733;
-    const real t735 = 1.0 - t734;
-    const real t736 = t689 * t735;
-    const real t737 = t724 < 0.0;
-    const real t738 = -t727;
-    const real t739 = t737 != 0 ? t738 : t727;
-    const real t740 = t724 + t739;
-    const real t741 = t740 * t733;
-    const real t742 = t721 * t741;
-    const real t743 = t695 * t742;
-    const real t744 = t736 - t743;
-    const real t745 = t705 * t744;
-    const real t746 = t689 * t745;
-    const real t747 = t735 - t746;
-    const real t748 = t604 * t747;
-    const real t749 = t712 * t745;
-    const real t750 = t613 * t749;
-    const real t751 = t695 * t745;
-    const real t752 = t742 + t751;
-    const real t753 = t607 * t752;
-    const real t754 = t750 + t753;
-    const real t755 = t748 - t754;
-    const real t756 = t624 * t755;
-    const real t757 = t604 * t756;
-    const real t758 = t747 - t757;
-    const real t759 = t527 * t758;
-    const real t760 = t607 * t756;
-    const real t761 = t752 + t760;
-    const real t762 = t530 * t761;
-    const real t763 = t634 * t756;
-    const real t764 = t539 * t763;
-    const real t765 = t613 * t756;
-    const real t766 = t749 + t765;
-    const real t767 = t533 * t766;
-    const real t768 = t764 + t767;
-    const real t769 = t762 + t768;
-    const real t770 = t759 - t769;
-    const real t771 = t551 * t770;
-    const real t772 = t527 * t771;
-    const real t773 = t758 - t772;
-    const real t774 = H[25] * t773;
-    const real t775 = t530 * t771;
-    const real t776 = t761 + t775;
-    const real t777 = H[20] * t776;
-    const real t778 = t533 * t771;
-    const real t779 = t766 + t778;
-    const real t780 = H[15] * t779;
-    const real t781 = t564 * t771;
-    const real t782 = H[5] * t781;
-    const real t783 = t539 * t771;
-    const real t784 = t763 + t783;
-    const real t785 = H[10] * t784;
-    const real t786 = t782 + t785;
-    const real t787 = t780 + t786;
-    const real t788 = t777 + t787;
-    const real t789 = t774 - t788;
-    const real t790 = t509 * t789;
-    const real t791 = t503 * t790;
-    const real t792 = -t791;
-    W[30] = t792;
-    const real t793 = H[5] * t790;
-    const real t794 = t781 + t793;
-    const real t795 = -t794;
-    W[31] = t795;
-    const real t796 = H[10] * t790;
-    const real t797 = t784 + t796;
-    const real t798 = -t797;
-    W[32] = t798;
-    const real t799 = H[15] * t790;
-    const real t800 = t779 + t799;
-    const real t801 = -t800;
-    W[33] = t801;
-    const real t802 = H[20] * t790;
-    const real t803 = t776 + t802;
-    const real t804 = -t803;
-    W[34] = t804;
-    const real t805 = H[25] * t790;
-    const real t806 = t773 - t805;
-    W[35] = t806;
-    return 0;
+  real t10 = H[25] * H[25] + (H[20] * H[20] + (H[15] * H[15] + (H[10] * H[10] + (H[0] * H[0] + H[5]
+    * H[5]))));
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 5 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[6] * H[6] + H[11] * H[11] + H[16] * H[16] + H[21] * H[21] + H[26] *
+    H[26];
+  real t24 = H[25] * H[26];
+  real t25 = H[20] * H[21];
+  real t26 = H[15] * H[16];
+  real t27 = H[10] * H[11];
+  real t28 = H[5] * H[6];
+  real t34 = t24 + (t25 + (t26 + (t27 + (t28 + H[0] * H[1]))));
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 5 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[7] * H[7] + H[12] * H[12] + H[17] * H[17] + H[22] * H[22] + H[27] *
+    H[27];
+  real t52 = H[25] * H[27];
+  real t53 = H[20] * H[22];
+  real t54 = H[15] * H[17];
+  real t55 = H[10] * H[12];
+  real t56 = H[5] * H[7];
+  real t62 = t52 + (t53 + (t54 + (t55 + (t56 + H[0] * H[2]))));
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[6] * H[7] + H[11] * H[12] + H[16] * H[17] + H[21] * H[22] + H[26] *
+    H[27] - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 5 vanishes: a motion of the hinge is undetermined */
+  real t94 = H[3] * H[3] + H[8] * H[8] + H[13] * H[13] + H[18] * H[18] + H[23] * H[23] + H[28] *
+    H[28];
+  real t96 = H[25] * H[28];
+  real t97 = H[20] * H[23];
+  real t98 = H[15] * H[18];
+  real t99 = H[10] * H[13];
+  real t100 = H[5] * H[8];
+  real t106 = t96 + (t97 + (t98 + (t99 + (t100 + H[0] * H[3]))));
+  real t107 = t106 * t35;
+  real t122 = H[1] * H[3] + H[6] * H[8] + H[11] * H[13] + H[16] * H[18] + H[21] * H[23] + H[26] *
+    H[28] - t106 * t36;
+  real t123 = t79 * t122;
+  real t140 = H[2] * H[3] + H[7] * H[8] + H[12] * H[13] + H[17] * H[18] + H[22] * H[23] + H[27] *
+    H[28] - t106 * t63 - t80 * t122;
+  real t141 = 1.0 / t82;
+  real t142 = t141 * t140;
+  real t144 = t94 - t106 * t107 - t122 * t123 - t140 * t142;
+  if (!((t94 * ((real)1 / (real)10000000000000) < t144))) return 1; /* pivot 4 of 5 vanishes: a motion of the hinge is undetermined */
+  real t156 = H[4] * H[4] + H[9] * H[9] + H[14] * H[14] + H[19] * H[19] + H[24] * H[24] + H[29] *
+    H[29];
+  real t158 = H[25] * H[29];
+  real t159 = H[20] * H[24];
+  real t160 = H[15] * H[19];
+  real t161 = H[10] * H[14];
+  real t162 = H[5] * H[9];
+  real t168 = t158 + (t159 + (t160 + (t161 + (t162 + H[0] * H[4]))));
+  real t169 = t168 * t35;
+  real t184 = H[1] * H[4] + H[6] * H[9] + H[11] * H[14] + H[16] * H[19] + H[21] * H[24] + H[26] *
+    H[29] - t168 * t36;
+  real t185 = t79 * t184;
+  real t202 = H[2] * H[4] + H[7] * H[9] + H[12] * H[14] + H[17] * H[19] + H[22] * H[24] + H[27] *
+    H[29] - t168 * t63 - t80 * t184;
+  real t203 = t141 * t202;
+  real t222 = H[3] * H[4] + H[8] * H[9] + H[13] * H[14] + H[18] * H[19] + H[23] * H[24] + H[28] *
+    H[29] - t168 * t107 - t123 * t184 - t142 * t202;
+  real t223 = 1.0 / t144;
+  real t224 = t223 * t222;
+  real t226 = t156 - t168 * t169 - t184 * t185 - t202 * t203 - t222 * t224;
+  if (!((t156 * ((real)1 / (real)10000000000000) < t226))) return 1; /* pivot 5 of 5 vanishes: a motion of the hinge is undetermined */
+  real t230 = H[1] - H[0] * t36;
+  real t235 = H[2] - H[0] * t63 - t80 * t230;
+  real t242 = H[3] - H[0] * t107 - t123 * t230 - t142 * t235;
+  real t244 = 1.0 / t226;
+  real t253 = t244 * (H[4] - H[0] * t169 - t185 * t230 - t203 * t235 - t224 * t242);
+  real t255 = t223 * t242 - t224 * t253;
+  real t259 = t141 * t235 - t142 * t255 - t203 * t253;
+  real t265 = t79 * t230 - t80 * t259 - t123 * t255 - t185 * t253;
+  W[0] = H[0] * t35 - t36 * t265 - t63 * t259 - t107 * t255 - t169 * t253;
+  real t276 = H[6] - H[5] * t36;
+  real t281 = H[7] - H[5] * t63 - t80 * t276;
+  real t288 = H[8] - H[5] * t107 - t123 * t276 - t142 * t281;
+  real t298 = t244 * (H[9] - H[5] * t169 - t185 * t276 - t203 * t281 - t224 * t288);
+  real t300 = t223 * t288 - t224 * t298;
+  real t304 = t141 * t281 - t142 * t300 - t203 * t298;
+  real t310 = t79 * t276 - t80 * t304 - t123 * t300 - t185 * t298;
+  W[1] = H[5] * t35 - t36 * t310 - t63 * t304 - t107 * t300 - t169 * t298;
+  real t321 = H[11] - H[10] * t36;
+  real t326 = H[12] - H[10] * t63 - t80 * t321;
+  real t333 = H[13] - H[10] * t107 - t123 * t321 - t142 * t326;
+  real t343 = t244 * (H[14] - H[10] * t169 - t185 * t321 - t203 * t326 - t224 * t333);
+  real t345 = t223 * t333 - t224 * t343;
+  real t349 = t141 * t326 - t142 * t345 - t203 * t343;
+  real t355 = t79 * t321 - t80 * t349 - t123 * t345 - t185 * t343;
+  W[2] = H[10] * t35 - t36 * t355 - t63 * t349 - t107 * t345 - t169 * t343;
+  real t366 = H[16] - H[15] * t36;
+  real t371 = H[17] - H[15] * t63 - t80 * t366;
+  real t378 = H[18] - H[15] * t107 - t123 * t366 - t142 * t371;
+  real t388 = t244 * (H[19] - H[15] * t169 - t185 * t366 - t203 * t371 - t224 * t378);
+  real t390 = t223 * t378 - t224 * t388;
+  real t394 = t141 * t371 - t142 * t390 - t203 * t388;
+  real t400 = t79 * t366 - t80 * t394 - t123 * t390 - t185 * t388;
+  W[3] = H[15] * t35 - t36 * t400 - t63 * t394 - t107 * t390 - t169 * t388;
+  real t411 = H[21] - H[20] * t36;
+  real t416 = H[22] - H[20] * t63 - t80 * t411;
+  real t423 = H[23] - H[20] * t107 - t123 * t411 - t142 * t416;
+  real t433 = t244 * (H[24] - H[20] * t169 - t185 * t411 - t203 * t416 - t224 * t423);
+  real t435 = t223 * t423 - t224 * t433;
+  real t439 = t141 * t416 - t142 * t435 - t203 * t433;
+  real t445 = t79 * t411 - t80 * t439 - t123 * t435 - t185 * t433;
+  W[4] = H[20] * t35 - t36 * t445 - t63 * t439 - t107 * t435 - t169 * t433;
+  real t456 = H[26] - H[25] * t36;
+  real t461 = H[27] - H[25] * t63 - t80 * t456;
+  real t468 = H[28] - H[25] * t107 - t123 * t456 - t142 * t461;
+  real t478 = t244 * (H[29] - H[25] * t169 - t185 * t456 - t203 * t461 - t224 * t468);
+  real t480 = t223 * t468 - t224 * t478;
+  real t484 = t141 * t461 - t142 * t480 - t203 * t478;
+  real t490 = t79 * t456 - t80 * t484 - t123 * t480 - t185 * t478;
+  W[5] = H[25] * t35 - t36 * t490 - t63 * t484 - t107 * t480 - t169 * t478;
+  W[6] = t265;
+  W[7] = t310;
+  W[8] = t355;
+  W[9] = t400;
+  W[10] = t445;
+  W[11] = t490;
+  W[12] = t259;
+  W[13] = t304;
+  W[14] = t349;
+  W[15] = t394;
+  W[16] = t439;
+  W[17] = t484;
+  W[18] = t255;
+  W[19] = t300;
+  W[20] = t345;
+  W[21] = t390;
+  W[22] = t435;
+  W[23] = t480;
+  W[24] = t253;
+  W[25] = t298;
+  W[26] = t343;
+  W[27] = t388;
+  W[28] = t433;
+  W[29] = t478;
+  real t500 = sqrt(t10);
+  real t501 = -t500;
+  real t503 = H[0] + ((H[0] < 0.0) ? t501 : t500);
+  real t506 = t500 * (t500 + (fabs(H[0])));
+  real t508 = 1.0 / t506;
+  real t509 = (0.0 < t506) ? t508 : 0.0;
+  real t516 = t509 * (t158 + (t159 + (t160 + (t161 + (H[4] * t503 + t162)))));
+  real t518 = H[29] - H[25] * t516;
+  real t525 = t509 * (t24 + (t25 + (t26 + (t27 + (H[1] * t503 + t28)))));
+  real t527 = H[26] - H[25] * t525;
+  real t530 = H[21] - H[20] * t525;
+  real t533 = H[16] - H[15] * t525;
+  real t536 = H[6] - H[5] * t525;
+  real t539 = H[11] - H[10] * t525;
+  real t545 = sqrt(t527 * t527 + (t530 * t530 + (t533 * t533 + (t536 * t536 + t539 * t539))));
+  real t548 = t545 * (t545 + (fabs(t536)));
+  real t550 = 1.0 / t548;
+  real t551 = (0.0 < t548) ? t550 : 0.0;
+  real t554 = H[24] - H[20] * t516;
+  real t557 = H[19] - H[15] * t516;
+  real t562 = -t545;
+  real t564 = t536 + ((t536 < 0.0) ? t562 : t545);
+  real t567 = H[14] - H[10] * t516;
+  real t573 = t551 * (t527 * t518 + (t530 * t554 + (t533 * t557 + ((H[9] - H[5] * t516) * t564 +
+    t539 * t567))));
+  real t575 = t518 - t527 * t573;
+  real t582 = t509 * (t52 + (t53 + (t54 + (t55 + (H[2] * t503 + t56)))));
+  real t584 = H[27] - H[25] * t582;
+  real t587 = H[22] - H[20] * t582;
+  real t590 = H[17] - H[15] * t582;
+  real t596 = H[12] - H[10] * t582;
+  real t602 = t551 * (t527 * t584 + (t530 * t587 + (t533 * t590 + ((H[7] - H[5] * t582) * t564 +
+    t539 * t596))));
+  real t604 = t584 - t527 * t602;
+  real t607 = t587 - t530 * t602;
+  real t610 = t596 - t539 * t602;
+  real t613 = t590 - t533 * t602;
+  real t618 = sqrt(t604 * t604 + (t607 * t607 + (t610 * t610 + t613 * t613)));
+  real t621 = t618 * (t618 + (fabs(t610)));
+  real t623 = 1.0 / t621;
+  real t624 = (0.0 < t621) ? t623 : 0.0;
+  real t627 = t554 - t530 * t573;
+  real t632 = -t618;
+  real t634 = t610 + ((t610 < 0.0) ? t632 : t618);
+  real t637 = t557 - t533 * t573;
+  real t642 = t624 * (t604 * t575 + (t607 * t627 + ((t567 - t539 * t573) * t634 + t613 * t637)));
+  real t644 = t575 - t604 * t642;
+  real t651 = t509 * (t96 + (t97 + (t98 + (t99 + (H[3] * t503 + t100)))));
+  real t653 = H[28] - H[25] * t651;
+  real t656 = H[23] - H[20] * t651;
+  real t659 = H[18] - H[15] * t651;
+  real t665 = H[13] - H[10] * t651;
+  real t671 = t551 * (t527 * t653 + (t530 * t656 + (t533 * t659 + ((H[8] - H[5] * t651) * t564 +
+    t539 * t665))));
+  real t673 = t653 - t527 * t671;
+  real t676 = t656 - t530 * t671;
+  real t682 = t659 - t533 * t671;
+  real t687 = t624 * (t604 * t673 + (t607 * t676 + ((t665 - t539 * t671) * t634 + t613 * t682)));
+  real t689 = t673 - t604 * t687;
+  real t692 = t682 - t613 * t687;
+  real t695 = t676 - t607 * t687;
+  real t699 = sqrt(t689 * t689 + (t692 * t692 + t695 * t695));
+  real t702 = t699 * (t699 + (fabs(t692)));
+  real t704 = 1.0 / t702;
+  real t705 = (0.0 < t702) ? t704 : 0.0;
+  real t710 = -t699;
+  real t712 = t692 + ((t692 < 0.0) ? t710 : t699);
+  real t715 = t627 - t607 * t642;
+  real t719 = t705 * (t689 * t644 + ((t637 - t613 * t642) * t712 + t695 * t715));
+  real t721 = t644 - t689 * t719;
+  real t722 = t721 * t721;
+  real t724 = t715 - t695 * t719;
+  real t727 = sqrt(t724 * t724 + t722);
+  real t730 = t727 * (t727 + (fabs(t724)));
+  real t732 = 1.0 / t730;
+  real t733 = (0.0 < t730) ? t732 : 0.0;
+  real t735 = 1.0 - t722 * t733;
+  real t738 = -t727;
+  real t742 = t721 * ((t724 + ((t724 < 0.0) ? t738 : t727)) * t733);
+  real t745 = t705 * (t689 * t735 - t695 * t742);
+  real t747 = t735 - t689 * t745;
+  real t749 = t712 * t745;
+  real t752 = t742 + t695 * t745;
+  real t756 = t624 * (t604 * t747 - (t613 * t749 + t607 * t752));
+  real t758 = t747 - t604 * t756;
+  real t761 = t752 + t607 * t756;
+  real t763 = t634 * t756;
+  real t766 = t749 + t613 * t756;
+  real t771 = t551 * (t527 * t758 - (t530 * t761 + (t539 * t763 + t533 * t766)));
+  real t773 = t758 - t527 * t771;
+  real t776 = t761 + t530 * t771;
+  real t779 = t766 + t533 * t771;
+  real t781 = t564 * t771;
+  real t784 = t763 + t539 * t771;
+  real t790 = t509 * (H[25] * t773 - (H[20] * t776 + (H[15] * t779 + (H[5] * t781 + H[10] *
+    t784))));
+  W[30] = -(t503 * t790);
+  W[31] = -(t781 + H[5] * t790);
+  W[32] = -(t784 + H[10] * t790);
+  W[33] = -(t779 + H[15] * t790);
+  W[34] = -(t776 + H[20] * t790);
+  W[35] = t773 - H[25] * t790;
+  return 0;
 }
 
-static int mstmm_sweep_generic5_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_complement_inputs[] = {
-    {"H", 30, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic5_complement_guards[] = {
-    {1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic5_complement, (in[0], out[0]))
 
 /* a column's rows divided by D, across a hinge with 5 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -11648,75 +3173,24 @@ static const mstmm_guard mstmm_sweep_generic5_complement_guards[] = {
  * in  y[5] -H^T K - C
  * out z[5] D^-1 y
  */
-int mstmm_sweep_generic5_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_generic5_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[5] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[6] * t2;
-    const real t4 = F[10] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[11] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[12] * t7;
-    const real t9 = F[15] * y[0];
-    const real t10 = y[3] - t9;
-    const real t11 = F[16] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = F[17] * t7;
-    const real t14 = t12 - t13;
-    const real t15 = F[18] * t14;
-    const real t16 = F[20] * y[0];
-    const real t17 = y[4] - t16;
-    const real t18 = F[21] * t2;
-    const real t19 = t17 - t18;
-    const real t20 = F[22] * t7;
-    const real t21 = t19 - t20;
-    const real t22 = F[23] * t14;
-    const real t23 = t21 - t22;
-    const real t24 = F[24] * t23;
-    const real t25 = F[23] * t24;
-    const real t26 = t15 - t25;
-    const real t27 = F[17] * t26;
-    const real t28 = t8 - t27;
-    const real t29 = F[22] * t24;
-    const real t30 = t28 - t29;
-    const real t31 = F[11] * t30;
-    const real t32 = t3 - t31;
-    const real t33 = F[16] * t26;
-    const real t34 = t32 - t33;
-    const real t35 = F[21] * t24;
-    const real t36 = t34 - t35;
-    const real t37 = F[5] * t36;
-    const real t38 = t0 - t37;
-    const real t39 = F[10] * t30;
-    const real t40 = t38 - t39;
-    const real t41 = F[15] * t26;
-    const real t42 = t40 - t41;
-    const real t43 = F[20] * t24;
-    const real t44 = t42 - t43;
-    z[0] = t44;
-    z[1] = t36;
-    z[2] = t30;
-    z[3] = t26;
-    z[4] = t24;
-    return 0;
+  real t2 = y[1] - F[5] * y[0];
+  real t7 = y[2] - F[10] * y[0] - F[11] * t2;
+  real t14 = y[3] - F[15] * y[0] - F[16] * t2 - F[17] * t7;
+  real t24 = F[24] * (y[4] - F[20] * y[0] - F[21] * t2 - F[22] * t7 - F[23] * t14);
+  real t26 = F[18] * t14 - F[23] * t24;
+  real t30 = F[12] * t7 - F[17] * t26 - F[22] * t24;
+  real t36 = F[6] * t2 - F[11] * t30 - F[16] * t26 - F[21] * t24;
+  z[0] = F[0] * y[0] - F[5] * t36 - F[10] * t30 - F[15] * t26 - F[20] * t24;
+  z[1] = t36;
+  z[2] = t30;
+  z[3] = t26;
+  z[4] = t24;
+  return 0;
 }
 
-static int mstmm_sweep_generic5_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_divide_inputs[] = {
-    {"F", 25, "", 0, 0},
-    {"y", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_divide_outputs[] = {
-    {"z", 5, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 5 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -11725,35 +3199,13 @@ static const mstmm_port mstmm_sweep_generic5_divide_outputs[] = {
  * in  z[5] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_generic5_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+int mstmm_sweep_generic5_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = y[3] * z[3];
-    const real t6 = t4 + t5;
-    const real t7 = y[4] * z[4];
-    const real t8 = t6 + t7;
-    L_ij[0] += t8;
-    return 0;
+  L_ij[0] += y[0] * z[0] + y[1] * z[1] + y[2] * z[2] + y[3] * z[3] + y[4] * z[4];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_couple_inputs[] = {
-    {"y", 5, "", 0, 0},
-    {"z", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 5 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -11762,37 +3214,13 @@ static const mstmm_port mstmm_sweep_generic5_couple_outputs[] = {
  * in  z[5] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic5_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_generic5_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = y[3] * z[3];
-    const real t6 = t4 + t5;
-    const real t7 = y[4] * z[4];
-    const real t8 = t6 + t7;
-    const real t9 = -t8;
-    l[0] += t9;
-    return 0;
+  l[0] += -(y[0] * z[0] + y[1] * z[1] + y[2] * z[2] + y[3] * z[3] + y[4] * z[4]);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_add_known_part_inputs[] = {
-    {"y", 5, "", 0, 0},
-    {"z", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 5 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -11801,36 +3229,17 @@ static const mstmm_port mstmm_sweep_generic5_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[5] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic5_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_generic5_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    const real t1 = y[1] * x[0];
-    y_0[1] += t1;
-    const real t2 = y[2] * x[0];
-    y_0[2] += t2;
-    const real t3 = y[3] * x[0];
-    y_0[3] += t3;
-    const real t4 = y[4] * x[0];
-    y_0[4] += t4;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  y_0[1] += y[1] * x[0];
+  y_0[2] += y[2] * x[0];
+  y_0[3] += y[3] * x[0];
+  y_0[4] += y[4] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_inputs[] = {
-    {"y", 5, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_outputs[] = {
-    {"y_0", 5, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of the bodies accelerated by a hinge with 5 speeds
  * in  S[21] inertia of everything outboard, at P
@@ -11838,516 +3247,73 @@ static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_outputs[] = {
  * in  udot[5] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic5_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e)
+int mstmm_sweep_generic5_required_load(in_t S, in_t H, in_t udot, out_t e)
 {
-    const real t0 = S[0] * H[0];
-    const real t1 = S[1] * H[5];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * H[10];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * H[15];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * H[20];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * H[25];
-    const real t10 = t8 + t9;
-    const real t11 = udot[0] * t10;
-    const real t12 = S[0] * H[1];
-    const real t13 = S[1] * H[6];
-    const real t14 = t12 + t13;
-    const real t15 = S[2] * H[11];
-    const real t16 = t14 + t15;
-    const real t17 = S[3] * H[16];
-    const real t18 = t16 + t17;
-    const real t19 = S[4] * H[21];
-    const real t20 = t18 + t19;
-    const real t21 = S[5] * H[26];
-    const real t22 = t20 + t21;
-    const real t23 = udot[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = S[0] * H[2];
-    const real t26 = S[1] * H[7];
-    const real t27 = t25 + t26;
-    const real t28 = S[2] * H[12];
-    const real t29 = t27 + t28;
-    const real t30 = S[3] * H[17];
-    const real t31 = t29 + t30;
-    const real t32 = S[4] * H[22];
-    const real t33 = t31 + t32;
-    const real t34 = S[5] * H[27];
-    const real t35 = t33 + t34;
-    const real t36 = udot[2] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = S[0] * H[3];
-    const real t39 = S[1] * H[8];
-    const real t40 = t38 + t39;
-    const real t41 = S[2] * H[13];
-    const real t42 = t40 + t41;
-    const real t43 = S[3] * H[18];
-    const real t44 = t42 + t43;
-    const real t45 = S[4] * H[23];
-    const real t46 = t44 + t45;
-    const real t47 = S[5] * H[28];
-    const real t48 = t46 + t47;
-    const real t49 = udot[3] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = S[0] * H[4];
-    const real t52 = S[1] * H[9];
-    const real t53 = t51 + t52;
-    const real t54 = S[2] * H[14];
-    const real t55 = t53 + t54;
-    const real t56 = S[3] * H[19];
-    const real t57 = t55 + t56;
-    const real t58 = S[4] * H[24];
-    const real t59 = t57 + t58;
-    const real t60 = S[5] * H[29];
-    const real t61 = t59 + t60;
-    const real t62 = udot[4] * t61;
-    const real t63 = t50 + t62;
-    e[0] = t63;
-    const real t64 = S[1] * H[0];
-    const real t65 = S[6] * H[5];
-    const real t66 = t64 + t65;
-    const real t67 = S[7] * H[10];
-    const real t68 = t66 + t67;
-    const real t69 = S[8] * H[15];
-    const real t70 = t68 + t69;
-    const real t71 = S[9] * H[20];
-    const real t72 = t70 + t71;
-    const real t73 = S[10] * H[25];
-    const real t74 = t72 + t73;
-    const real t75 = udot[0] * t74;
-    const real t76 = S[1] * H[1];
-    const real t77 = S[6] * H[6];
-    const real t78 = t76 + t77;
-    const real t79 = S[7] * H[11];
-    const real t80 = t78 + t79;
-    const real t81 = S[8] * H[16];
-    const real t82 = t80 + t81;
-    const real t83 = S[9] * H[21];
-    const real t84 = t82 + t83;
-    const real t85 = S[10] * H[26];
-    const real t86 = t84 + t85;
-    const real t87 = udot[1] * t86;
-    const real t88 = t75 + t87;
-    const real t89 = S[1] * H[2];
-    const real t90 = S[6] * H[7];
-    const real t91 = t89 + t90;
-    const real t92 = S[7] * H[12];
-    const real t93 = t91 + t92;
-    const real t94 = S[8] * H[17];
-    const real t95 = t93 + t94;
-    const real t96 = S[9] * H[22];
-    const real t97 = t95 + t96;
-    const real t98 = S[10] * H[27];
-    const real t99 = t97 + t98;
-    const real t100 = udot[2] * t99;
-    const real t101 = t88 + t100;
-    const real t102 = S[1] * H[3];
-    const real t103 = S[6] * H[8];
-    const real t104 = t102 + t103;
-    const real t105 = S[7] * H[13];
-    const real t106 = t104 + t105;
-    const real t107 = S[8] * H[18];
-    const real t108 = t106 + t107;
-    const real t109 = S[9] * H[23];
-    const real t110 = t108 + t109;
-    const real t111 = S[10] * H[28];
-    const real t112 = t110 + t111;
-    const real t113 = udot[3] * t112;
-    const real t114 = t101 + t113;
-    const real t115 = S[1] * H[4];
-    const real t116 = S[6] * H[9];
-    const real t117 = t115 + t116;
-    const real t118 = S[7] * H[14];
-    const real t119 = t117 + t118;
-    const real t120 = S[8] * H[19];
-    const real t121 = t119 + t120;
-    const real t122 = S[9] * H[24];
-    const real t123 = t121 + t122;
-    const real t124 = S[10] * H[29];
-    const real t125 = t123 + t124;
-    const real t126 = udot[4] * t125;
-    const real t127 = t114 + t126;
-    e[1] = t127;
-    const real t128 = S[2] * H[0];
-    const real t129 = S[7] * H[5];
-    const real t130 = t128 + t129;
-    const real t131 = S[11] * H[10];
-    const real t132 = t130 + t131;
-    const real t133 = S[12] * H[15];
-    const real t134 = t132 + t133;
-    const real t135 = S[13] * H[20];
-    const real t136 = t134 + t135;
-    const real t137 = S[14] * H[25];
-    const real t138 = t136 + t137;
-    const real t139 = udot[0] * t138;
-    const real t140 = S[2] * H[1];
-    const real t141 = S[7] * H[6];
-    const real t142 = t140 + t141;
-    const real t143 = S[11] * H[11];
-    const real t144 = t142 + t143;
-    const real t145 = S[12] * H[16];
-    const real t146 = t144 + t145;
-    const real t147 = S[13] * H[21];
-    const real t148 = t146 + t147;
-    const real t149 = S[14] * H[26];
-    const real t150 = t148 + t149;
-    const real t151 = udot[1] * t150;
-    const real t152 = t139 + t151;
-    const real t153 = S[2] * H[2];
-    const real t154 = S[7] * H[7];
-    const real t155 = t153 + t154;
-    const real t156 = S[11] * H[12];
-    const real t157 = t155 + t156;
-    const real t158 = S[12] * H[17];
-    const real t159 = t157 + t158;
-    const real t160 = S[13] * H[22];
-    const real t161 = t159 + t160;
-    const real t162 = S[14] * H[27];
-    const real t163 = t161 + t162;
-    const real t164 = udot[2] * t163;
-    const real t165 = t152 + t164;
-    const real t166 = S[2] * H[3];
-    const real t167 = S[7] * H[8];
-    const real t168 = t166 + t167;
-    const real t169 = S[11] * H[13];
-    const real t170 = t168 + t169;
-    const real t171 = S[12] * H[18];
-    const real t172 = t170 + t171;
-    const real t173 = S[13] * H[23];
-    const real t174 = t172 + t173;
-    const real t175 = S[14] * H[28];
-    const real t176 = t174 + t175;
-    const real t177 = udot[3] * t176;
-    const real t178 = t165 + t177;
-    const real t179 = S[2] * H[4];
-    const real t180 = S[7] * H[9];
-    const real t181 = t179 + t180;
-    const real t182 = S[11] * H[14];
-    const real t183 = t181 + t182;
-    const real t184 = S[12] * H[19];
-    const real t185 = t183 + t184;
-    const real t186 = S[13] * H[24];
-    const real t187 = t185 + t186;
-    const real t188 = S[14] * H[29];
-    const real t189 = t187 + t188;
-    const real t190 = udot[4] * t189;
-    const real t191 = t178 + t190;
-    e[2] = t191;
-    const real t192 = S[3] * H[0];
-    const real t193 = S[8] * H[5];
-    const real t194 = t192 + t193;
-    const real t195 = S[12] * H[10];
-    const real t196 = t194 + t195;
-    const real t197 = S[15] * H[15];
-    const real t198 = t196 + t197;
-    const real t199 = S[16] * H[20];
-    const real t200 = t198 + t199;
-    const real t201 = S[17] * H[25];
-    const real t202 = t200 + t201;
-    const real t203 = udot[0] * t202;
-    const real t204 = S[3] * H[1];
-    const real t205 = S[8] * H[6];
-    const real t206 = t204 + t205;
-    const real t207 = S[12] * H[11];
-    const real t208 = t206 + t207;
-    const real t209 = S[15] * H[16];
-    const real t210 = t208 + t209;
-    const real t211 = S[16] * H[21];
-    const real t212 = t210 + t211;
-    const real t213 = S[17] * H[26];
-    const real t214 = t212 + t213;
-    const real t215 = udot[1] * t214;
-    const real t216 = t203 + t215;
-    const real t217 = S[3] * H[2];
-    const real t218 = S[8] * H[7];
-    const real t219 = t217 + t218;
-    const real t220 = S[12] * H[12];
-    const real t221 = t219 + t220;
-    const real t222 = S[15] * H[17];
-    const real t223 = t221 + t222;
-    const real t224 = S[16] * H[22];
-    const real t225 = t223 + t224;
-    const real t226 = S[17] * H[27];
-    const real t227 = t225 + t226;
-    const real t228 = udot[2] * t227;
-    const real t229 = t216 + t228;
-    const real t230 = S[3] * H[3];
-    const real t231 = S[8] * H[8];
-    const real t232 = t230 + t231;
-    const real t233 = S[12] * H[13];
-    const real t234 = t232 + t233;
-    const real t235 = S[15] * H[18];
-    const real t236 = t234 + t235;
-    const real t237 = S[16] * H[23];
-    const real t238 = t236 + t237;
-    const real t239 = S[17] * H[28];
-    const real t240 = t238 + t239;
-    const real t241 = udot[3] * t240;
-    const real t242 = t229 + t241;
-    const real t243 = S[3] * H[4];
-    const real t244 = S[8] * H[9];
-    const real t245 = t243 + t244;
-    const real t246 = S[12] * H[14];
-    const real t247 = t245 + t246;
-    const real t248 = S[15] * H[19];
-    const real t249 = t247 + t248;
-    const real t250 = S[16] * H[24];
-    const real t251 = t249 + t250;
-    const real t252 = S[17] * H[29];
-    const real t253 = t251 + t252;
-    const real t254 = udot[4] * t253;
-    const real t255 = t242 + t254;
-    e[3] = t255;
-    const real t256 = S[4] * H[0];
-    const real t257 = S[9] * H[5];
-    const real t258 = t256 + t257;
-    const real t259 = S[13] * H[10];
-    const real t260 = t258 + t259;
-    const real t261 = S[16] * H[15];
-    const real t262 = t260 + t261;
-    const real t263 = S[18] * H[20];
-    const real t264 = t262 + t263;
-    const real t265 = S[19] * H[25];
-    const real t266 = t264 + t265;
-    const real t267 = udot[0] * t266;
-    const real t268 = S[4] * H[1];
-    const real t269 = S[9] * H[6];
-    const real t270 = t268 + t269;
-    const real t271 = S[13] * H[11];
-    const real t272 = t270 + t271;
-    const real t273 = S[16] * H[16];
-    const real t274 = t272 + t273;
-    const real t275 = S[18] * H[21];
-    const real t276 = t274 + t275;
-    const real t277 = S[19] * H[26];
-    const real t278 = t276 + t277;
-    const real t279 = udot[1] * t278;
-    const real t280 = t267 + t279;
-    const real t281 = S[4] * H[2];
-    const real t282 = S[9] * H[7];
-    const real t283 = t281 + t282;
-    const real t284 = S[13] * H[12];
-    const real t285 = t283 + t284;
-    const real t286 = S[16] * H[17];
-    const real t287 = t285 + t286;
-    const real t288 = S[18] * H[22];
-    const real t289 = t287 + t288;
-    const real t290 = S[19] * H[27];
-    const real t291 = t289 + t290;
-    const real t292 = udot[2] * t291;
-    const real t293 = t280 + t292;
-    const real t294 = S[4] * H[3];
-    const real t295 = S[9] * H[8];
-    const real t296 = t294 + t295;
-    const real t297 = S[13] * H[13];
-    const real t298 = t296 + t297;
-    const real t299 = S[16] * H[18];
-    const real t300 = t298 + t299;
-    const real t301 = S[18] * H[23];
-    const real t302 = t300 + t301;
-    const real t303 = S[19] * H[28];
-    const real t304 = t302 + t303;
-    const real t305 = udot[3] * t304;
-    const real t306 = t293 + t305;
-    const real t307 = S[4] * H[4];
-    const real t308 = S[9] * H[9];
-    const real t309 = t307 + t308;
-    const real t310 = S[13] * H[14];
-    const real t311 = t309 + t310;
-    const real t312 = S[16] * H[19];
-    const real t313 = t311 + t312;
-    const real t314 = S[18] * H[24];
-    const real t315 = t313 + t314;
-    const real t316 = S[19] * H[29];
-    const real t317 = t315 + t316;
-    const real t318 = udot[4] * t317;
-    const real t319 = t306 + t318;
-    e[4] = t319;
-    const real t320 = S[5] * H[0];
-    const real t321 = S[10] * H[5];
-    const real t322 = t320 + t321;
-    const real t323 = S[14] * H[10];
-    const real t324 = t322 + t323;
-    const real t325 = S[17] * H[15];
-    const real t326 = t324 + t325;
-    const real t327 = S[19] * H[20];
-    const real t328 = t326 + t327;
-    const real t329 = S[20] * H[25];
-    const real t330 = t328 + t329;
-    const real t331 = udot[0] * t330;
-    const real t332 = S[5] * H[1];
-    const real t333 = S[10] * H[6];
-    const real t334 = t332 + t333;
-    const real t335 = S[14] * H[11];
-    const real t336 = t334 + t335;
-    const real t337 = S[17] * H[16];
-    const real t338 = t336 + t337;
-    const real t339 = S[19] * H[21];
-    const real t340 = t338 + t339;
-    const real t341 = S[20] * H[26];
-    const real t342 = t340 + t341;
-    const real t343 = udot[1] * t342;
-    const real t344 = t331 + t343;
-    const real t345 = S[5] * H[2];
-    const real t346 = S[10] * H[7];
-    const real t347 = t345 + t346;
-    const real t348 = S[14] * H[12];
-    const real t349 = t347 + t348;
-    const real t350 = S[17] * H[17];
-    const real t351 = t349 + t350;
-    const real t352 = S[19] * H[22];
-    const real t353 = t351 + t352;
-    const real t354 = S[20] * H[27];
-    const real t355 = t353 + t354;
-    const real t356 = udot[2] * t355;
-    const real t357 = t344 + t356;
-    const real t358 = S[5] * H[3];
-    const real t359 = S[10] * H[8];
-    const real t360 = t358 + t359;
-    const real t361 = S[14] * H[13];
-    const real t362 = t360 + t361;
-    const real t363 = S[17] * H[18];
-    const real t364 = t362 + t363;
-    const real t365 = S[19] * H[23];
-    const real t366 = t364 + t365;
-    const real t367 = S[20] * H[28];
-    const real t368 = t366 + t367;
-    const real t369 = udot[3] * t368;
-    const real t370 = t357 + t369;
-    const real t371 = S[5] * H[4];
-    const real t372 = S[10] * H[9];
-    const real t373 = t371 + t372;
-    const real t374 = S[14] * H[14];
-    const real t375 = t373 + t374;
-    const real t376 = S[17] * H[19];
-    const real t377 = t375 + t376;
-    const real t378 = S[19] * H[24];
-    const real t379 = t377 + t378;
-    const real t380 = S[20] * H[29];
-    const real t381 = t379 + t380;
-    const real t382 = udot[4] * t381;
-    const real t383 = t370 + t382;
-    e[5] = t383;
-    return 0;
+  e[0] = udot[0] * (S[0] * H[0] + S[1] * H[5] + S[2] * H[10] + S[3] * H[15] + S[4] * H[20] + S[5] *
+    H[25]) + udot[1] * (S[0] * H[1] + S[1] * H[6] + S[2] * H[11] + S[3] * H[16] + S[4] * H[21] +
+    S[5] * H[26]) + udot[2] * (S[0] * H[2] + S[1] * H[7] + S[2] * H[12] + S[3] * H[17] + S[4] *
+    H[22] + S[5] * H[27]) + udot[3] * (S[0] * H[3] + S[1] * H[8] + S[2] * H[13] + S[3] * H[18] +
+    S[4] * H[23] + S[5] * H[28]) + udot[4] * (S[0] * H[4] + S[1] * H[9] + S[2] * H[14] + S[3] *
+    H[19] + S[4] * H[24] + S[5] * H[29]);
+  e[1] = udot[0] * (S[1] * H[0] + S[6] * H[5] + S[7] * H[10] + S[8] * H[15] + S[9] * H[20] + S[10] *
+    H[25]) + udot[1] * (S[1] * H[1] + S[6] * H[6] + S[7] * H[11] + S[8] * H[16] + S[9] * H[21] +
+    S[10] * H[26]) + udot[2] * (S[1] * H[2] + S[6] * H[7] + S[7] * H[12] + S[8] * H[17] + S[9] *
+    H[22] + S[10] * H[27]) + udot[3] * (S[1] * H[3] + S[6] * H[8] + S[7] * H[13] + S[8] * H[18] +
+    S[9] * H[23] + S[10] * H[28]) + udot[4] * (S[1] * H[4] + S[6] * H[9] + S[7] * H[14] + S[8] *
+    H[19] + S[9] * H[24] + S[10] * H[29]);
+  e[2] = udot[0] * (S[2] * H[0] + S[7] * H[5] + S[11] * H[10] + S[12] * H[15] + S[13] * H[20] +
+    S[14] * H[25]) + udot[1] * (S[2] * H[1] + S[7] * H[6] + S[11] * H[11] + S[12] * H[16] + S[13] *
+    H[21] + S[14] * H[26]) + udot[2] * (S[2] * H[2] + S[7] * H[7] + S[11] * H[12] + S[12] * H[17] +
+    S[13] * H[22] + S[14] * H[27]) + udot[3] * (S[2] * H[3] + S[7] * H[8] + S[11] * H[13] + S[12] *
+    H[18] + S[13] * H[23] + S[14] * H[28]) + udot[4] * (S[2] * H[4] + S[7] * H[9] + S[11] * H[14] +
+    S[12] * H[19] + S[13] * H[24] + S[14] * H[29]);
+  e[3] = udot[0] * (S[3] * H[0] + S[8] * H[5] + S[12] * H[10] + S[15] * H[15] + S[16] * H[20] +
+    S[17] * H[25]) + udot[1] * (S[3] * H[1] + S[8] * H[6] + S[12] * H[11] + S[15] * H[16] + S[16] *
+    H[21] + S[17] * H[26]) + udot[2] * (S[3] * H[2] + S[8] * H[7] + S[12] * H[12] + S[15] * H[17] +
+    S[16] * H[22] + S[17] * H[27]) + udot[3] * (S[3] * H[3] + S[8] * H[8] + S[12] * H[13] + S[15] *
+    H[18] + S[16] * H[23] + S[17] * H[28]) + udot[4] * (S[3] * H[4] + S[8] * H[9] + S[12] * H[14] +
+    S[15] * H[19] + S[16] * H[24] + S[17] * H[29]);
+  e[4] = udot[0] * (S[4] * H[0] + S[9] * H[5] + S[13] * H[10] + S[16] * H[15] + S[18] * H[20] +
+    S[19] * H[25]) + udot[1] * (S[4] * H[1] + S[9] * H[6] + S[13] * H[11] + S[16] * H[16] + S[18] *
+    H[21] + S[19] * H[26]) + udot[2] * (S[4] * H[2] + S[9] * H[7] + S[13] * H[12] + S[16] * H[17] +
+    S[18] * H[22] + S[19] * H[27]) + udot[3] * (S[4] * H[3] + S[9] * H[8] + S[13] * H[13] + S[16] *
+    H[18] + S[18] * H[23] + S[19] * H[28]) + udot[4] * (S[4] * H[4] + S[9] * H[9] + S[13] * H[14] +
+    S[16] * H[19] + S[18] * H[24] + S[19] * H[29]);
+  e[5] = udot[0] * (S[5] * H[0] + S[10] * H[5] + S[14] * H[10] + S[17] * H[15] + S[19] * H[20] +
+    S[20] * H[25]) + udot[1] * (S[5] * H[1] + S[10] * H[6] + S[14] * H[11] + S[17] * H[16] + S[19] *
+    H[21] + S[20] * H[26]) + udot[2] * (S[5] * H[2] + S[10] * H[7] + S[14] * H[12] + S[17] * H[17] +
+    S[19] * H[22] + S[20] * H[27]) + udot[3] * (S[5] * H[3] + S[10] * H[8] + S[14] * H[13] + S[17] *
+    H[18] + S[19] * H[23] + S[20] * H[28]) + udot[4] * (S[5] * H[4] + S[10] * H[9] + S[14] * H[14] +
+    S[17] * H[19] + S[19] * H[24] + S[20] * H[29]);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_required_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_required_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_required_load_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"udot", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_required_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_required_load, (in[0], in[1], in[2], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 5 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][5] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[5] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[5] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic5_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y)
+int mstmm_sweep_generic5_ground_column_load(in_t H, in_t e, in_t tau, out_t y)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[5] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[10] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[15] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[20] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[25] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[6] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[11] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[16] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[21] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[26] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[7] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[12] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[17] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[22] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[27] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = H[3] * e[0];
-    const real t37 = H[8] * e[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[13] * e[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[18] * e[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[23] * e[4];
-    const real t44 = t42 + t43;
-    const real t45 = H[28] * e[5];
-    const real t46 = t44 + t45;
-    const real t47 = tau[3] - t46;
-    y[3] = t47;
-    const real t48 = H[4] * e[0];
-    const real t49 = H[9] * e[1];
-    const real t50 = t48 + t49;
-    const real t51 = H[14] * e[2];
-    const real t52 = t50 + t51;
-    const real t53 = H[19] * e[3];
-    const real t54 = t52 + t53;
-    const real t55 = H[24] * e[4];
-    const real t56 = t54 + t55;
-    const real t57 = H[29] * e[5];
-    const real t58 = t56 + t57;
-    const real t59 = tau[4] - t58;
-    y[4] = t59;
-    return 0;
+  y[0] = tau[0] - (H[0] * e[0] + H[5] * e[1] + H[10] * e[2] + H[15] * e[3] + H[20] * e[4] + H[25] *
+    e[5]);
+  y[1] = tau[1] - (H[1] * e[0] + H[6] * e[1] + H[11] * e[2] + H[16] * e[3] + H[21] * e[4] + H[26] *
+    e[5]);
+  y[2] = tau[2] - (H[2] * e[0] + H[7] * e[1] + H[12] * e[2] + H[17] * e[3] + H[22] * e[4] + H[27] *
+    e[5]);
+  y[3] = tau[3] - (H[3] * e[0] + H[8] * e[1] + H[13] * e[2] + H[18] * e[3] + H[23] * e[4] + H[28] *
+    e[5]);
+  y[4] = tau[4] - (H[4] * e[0] + H[9] * e[1] + H[14] * e[2] + H[19] * e[3] + H[24] * e[4] + H[29] *
+    e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic5_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_ground_column_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_ground_column_load_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 5, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_ground_column_load_outputs[] = {
-    {"y", 5, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_ground_column_load, (in[0], in[1], in[2], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -12370,584 +3336,125 @@ static const mstmm_port mstmm_sweep_generic5_ground_column_load_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic5_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic5_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)c;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = s[4] * d_H[19];
-    const real t159 = H[19] * d_s[4];
-    const real t160 = t158 + t159;
-    const real t161 = s[3] * d_H[18];
-    const real t162 = H[18] * d_s[3];
-    const real t163 = t161 + t162;
-    const real t164 = s[2] * d_H[17];
-    const real t165 = H[17] * d_s[2];
-    const real t166 = t164 + t165;
-    const real t167 = s[1] * d_H[16];
-    const real t168 = H[16] * d_s[1];
-    const real t169 = t167 + t168;
-    const real t170 = s[0] * d_H[15];
-    const real t171 = H[15] * d_s[0];
-    const real t172 = t170 + t171;
-    const real t173 = t169 + t172;
-    const real t174 = t166 + t173;
-    const real t175 = t163 + t174;
-    const real t176 = t160 + t175;
-    const real t177 = d_c[3] + t176;
-    const real t178 = t157 + t177;
-    const real t179 = motion_I[5] * t34;
-    const real t180 = t65 * d_motion_I[5];
-    const real t181 = t179 + t180;
-    const real t182 = motion_I[4] * t19;
-    const real t183 = t73 * d_motion_I[4];
-    const real t184 = t182 + t183;
-    const real t185 = motion_I[3] * t4;
-    const real t186 = t81 * d_motion_I[3];
-    const real t187 = t185 + t186;
-    const real t188 = t184 + t187;
-    const real t189 = t181 + t188;
-    const real t190 = t178 + t189;
-    d_motion[3] = t190;
-    const real t191 = t153 * d_w[0];
-    const real t192 = w[0] * t139;
-    const real t193 = t191 + t192;
-    const real t194 = w[2] * t85;
-    const real t195 = t81 * motion_I[0];
-    const real t196 = t73 * motion_I[1];
-    const real t197 = t195 + t196;
-    const real t198 = t65 * motion_I[2];
-    const real t199 = t197 + t198;
-    const real t200 = t199 * d_w[2];
-    const real t201 = t194 + t200;
-    const real t202 = t193 - t201;
-    const real t203 = H[24] * d_s[4];
-    const real t204 = s[4] * d_H[24];
-    const real t205 = t203 + t204;
-    const real t206 = H[23] * d_s[3];
-    const real t207 = s[3] * d_H[23];
-    const real t208 = t206 + t207;
-    const real t209 = H[22] * d_s[2];
-    const real t210 = s[2] * d_H[22];
-    const real t211 = t209 + t210;
-    const real t212 = H[21] * d_s[1];
-    const real t213 = s[1] * d_H[21];
-    const real t214 = t212 + t213;
-    const real t215 = H[20] * d_s[0];
-    const real t216 = s[0] * d_H[20];
-    const real t217 = t215 + t216;
-    const real t218 = t214 + t217;
-    const real t219 = t211 + t218;
-    const real t220 = t208 + t219;
-    const real t221 = t205 + t220;
-    const real t222 = d_c[4] + t221;
-    const real t223 = t202 + t222;
-    const real t224 = motion_I[5] * t39;
-    const real t225 = t92 * d_motion_I[5];
-    const real t226 = t224 + t225;
-    const real t227 = motion_I[4] * t24;
-    const real t228 = t100 * d_motion_I[4];
-    const real t229 = t227 + t228;
-    const real t230 = motion_I[3] * t9;
-    const real t231 = t108 * d_motion_I[3];
-    const real t232 = t230 + t231;
-    const real t233 = t229 + t232;
-    const real t234 = t226 + t233;
-    const real t235 = t223 + t234;
-    d_motion[4] = t235;
-    const real t236 = w[1] * t85;
-    const real t237 = t199 * d_w[1];
-    const real t238 = t236 + t237;
-    const real t239 = t146 * d_w[0];
-    const real t240 = w[0] * t112;
-    const real t241 = t239 + t240;
-    const real t242 = t238 - t241;
-    const real t243 = H[29] * d_s[4];
-    const real t244 = s[4] * d_H[29];
-    const real t245 = t243 + t244;
-    const real t246 = H[28] * d_s[3];
-    const real t247 = s[3] * d_H[28];
-    const real t248 = t246 + t247;
-    const real t249 = H[27] * d_s[2];
-    const real t250 = s[2] * d_H[27];
-    const real t251 = t249 + t250;
-    const real t252 = H[26] * d_s[1];
-    const real t253 = s[1] * d_H[26];
-    const real t254 = t252 + t253;
-    const real t255 = H[25] * d_s[0];
-    const real t256 = s[0] * d_H[25];
-    const real t257 = t255 + t256;
-    const real t258 = t254 + t257;
-    const real t259 = t251 + t258;
-    const real t260 = t248 + t259;
-    const real t261 = t245 + t260;
-    const real t262 = d_c[5] + t261;
-    const real t263 = t242 + t262;
-    const real t264 = motion_I[5] * t44;
-    const real t265 = t119 * d_motion_I[5];
-    const real t266 = t264 + t265;
-    const real t267 = motion_I[4] * t29;
-    const real t268 = t127 * d_motion_I[4];
-    const real t269 = t267 + t268;
-    const real t270 = motion_I[3] * t14;
-    const real t271 = t135 * d_motion_I[3];
-    const real t272 = t270 + t271;
-    const real t273 = t269 + t272;
-    const real t274 = t266 + t273;
-    const real t275 = t263 + t274;
-    d_motion[5] = t275;
-    const real t276 = v[2] * t112;
-    const real t277 = t146 * d_v[2];
-    const real t278 = t276 + t277;
-    const real t279 = 2.0 * t278;
-    const real t280 = v[1] * t139;
-    const real t281 = t153 * d_v[1];
-    const real t282 = t280 + t281;
-    const real t283 = 2.0 * t282;
-    const real t284 = t279 - t283;
-    const real t285 = H[4] * d_s[4];
-    const real t286 = s[4] * d_H[4];
-    const real t287 = t285 + t286;
-    const real t288 = H[3] * d_s[3];
-    const real t289 = s[3] * d_H[3];
-    const real t290 = t288 + t289;
-    const real t291 = H[2] * d_s[2];
-    const real t292 = s[2] * d_H[2];
-    const real t293 = t291 + t292;
-    const real t294 = H[1] * d_s[1];
-    const real t295 = s[1] * d_H[1];
-    const real t296 = t294 + t295;
-    const real t297 = H[0] * d_s[0];
-    const real t298 = s[0] * d_H[0];
-    const real t299 = t297 + t298;
-    const real t300 = t296 + t299;
-    const real t301 = t293 + t300;
-    const real t302 = t290 + t301;
-    const real t303 = t287 + t302;
-    const real t304 = d_c[0] + t303;
-    const real t305 = t284 + t304;
-    const real t306 = Rt[0] * d[0];
-    const real t307 = Rt[1] * d[1];
-    const real t308 = t306 + t307;
-    const real t309 = Rt[2] * d[2];
-    const real t310 = t308 + t309;
-    const real t311 = t310 + ro[0];
-    const real t312 = motion_I[0] * motion_I[2];
-    const real t313 = t312 - motion_I[4];
-    const real t314 = t311 * t313;
-    const real t315 = Rt[3] * d[0];
-    const real t316 = Rt[4] * d[1];
-    const real t317 = t315 + t316;
-    const real t318 = Rt[5] * d[2];
-    const real t319 = t317 + t318;
-    const real t320 = t319 + ro[1];
-    const real t321 = motion_I[1] * motion_I[2];
-    const real t322 = motion_I[3] + t321;
-    const real t323 = t320 * t322;
-    const real t324 = t314 + t323;
-    const real t325 = Rt[6] * d[0];
-    const real t326 = Rt[7] * d[1];
-    const real t327 = t325 + t326;
-    const real t328 = Rt[8] * d[2];
-    const real t329 = t327 + t328;
-    const real t330 = t329 + ro[2];
-    const real t331 = motion_I[1] * motion_I[1];
-    const real t332 = motion_I[0] * motion_I[0];
-    const real t333 = t331 + t332;
-    const real t334 = t330 * t333;
-    const real t335 = t324 - t334;
-    const real t336 = t335 + motion_I[8];
-    const real t337 = t336 * t34;
-    const real t338 = t322 * t54;
-    const real t339 = motion_I[2] * d_motion_I[1];
-    const real t340 = motion_I[1] * d_motion_I[2];
-    const real t341 = t339 + t340;
-    const real t342 = d_motion_I[3] + t341;
-    const real t343 = t320 * t342;
-    const real t344 = t338 + t343;
-    const real t345 = t313 * t49;
-    const real t346 = motion_I[2] * d_motion_I[0];
-    const real t347 = motion_I[0] * d_motion_I[2];
-    const real t348 = t346 + t347;
-    const real t349 = t348 - d_motion_I[4];
-    const real t350 = t311 * t349;
-    const real t351 = t345 + t350;
-    const real t352 = t344 + t351;
-    const real t353 = t333 * t59;
-    const real t354 = motion_I[0] * d_motion_I[0];
-    const real t355 = t354 + t354;
-    const real t356 = motion_I[1] * d_motion_I[1];
-    const real t357 = t356 + t356;
-    const real t358 = t355 + t357;
-    const real t359 = t330 * t358;
-    const real t360 = t353 + t359;
-    const real t361 = t352 - t360;
-    const real t362 = d_motion_I[8] + t361;
-    const real t363 = t65 * t362;
-    const real t364 = t337 + t363;
-    const real t365 = motion_I[0] * motion_I[1];
-    const real t366 = motion_I[5] + t365;
-    const real t367 = t311 * t366;
-    const real t368 = motion_I[2] * motion_I[2];
-    const real t369 = t368 + t332;
-    const real t370 = t320 * t369;
-    const real t371 = t367 - t370;
-    const real t372 = t321 - motion_I[3];
-    const real t373 = t330 * t372;
-    const real t374 = t371 + t373;
-    const real t375 = t374 + motion_I[7];
-    const real t376 = t375 * t19;
-    const real t377 = t372 * t59;
-    const real t378 = t341 - d_motion_I[3];
-    const real t379 = t330 * t378;
-    const real t380 = t377 + t379;
-    const real t381 = t366 * t49;
-    const real t382 = motion_I[1] * d_motion_I[0];
-    const real t383 = motion_I[0] * d_motion_I[1];
-    const real t384 = t382 + t383;
-    const real t385 = d_motion_I[5] + t384;
-    const real t386 = t311 * t385;
-    const real t387 = t381 + t386;
-    const real t388 = t369 * t54;
-    const real t389 = motion_I[2] * d_motion_I[2];
-    const real t390 = t389 + t389;
-    const real t391 = t355 + t390;
-    const real t392 = t320 * t391;
-    const real t393 = t388 + t392;
-    const real t394 = t387 - t393;
-    const real t395 = t380 + t394;
-    const real t396 = d_motion_I[7] + t395;
-    const real t397 = t73 * t396;
-    const real t398 = t376 + t397;
-    const real t399 = t365 - motion_I[5];
-    const real t400 = t320 * t399;
-    const real t401 = t331 + t368;
-    const real t402 = t311 * t401;
-    const real t403 = t400 - t402;
-    const real t404 = motion_I[4] + t312;
-    const real t405 = t330 * t404;
-    const real t406 = t403 + t405;
-    const real t407 = t406 + motion_I[6];
-    const real t408 = t407 * t4;
-    const real t409 = t404 * t59;
-    const real t410 = d_motion_I[4] + t348;
-    const real t411 = t330 * t410;
-    const real t412 = t409 + t411;
-    const real t413 = t399 * t54;
-    const real t414 = t384 - d_motion_I[5];
-    const real t415 = t320 * t414;
-    const real t416 = t413 + t415;
-    const real t417 = t401 * t49;
-    const real t418 = t357 + t390;
-    const real t419 = t311 * t418;
-    const real t420 = t417 + t419;
-    const real t421 = t416 - t420;
-    const real t422 = t412 + t421;
-    const real t423 = d_motion_I[6] + t422;
-    const real t424 = t81 * t423;
-    const real t425 = t408 + t424;
-    const real t426 = t398 + t425;
-    const real t427 = t364 + t426;
-    const real t428 = t305 + t427;
-    d_motion[6] = t428;
-    const real t429 = v[0] * t139;
-    const real t430 = t153 * d_v[0];
-    const real t431 = t429 + t430;
-    const real t432 = 2.0 * t431;
-    const real t433 = v[2] * t85;
-    const real t434 = t199 * d_v[2];
-    const real t435 = t433 + t434;
-    const real t436 = 2.0 * t435;
-    const real t437 = t432 - t436;
-    const real t438 = H[9] * d_s[4];
-    const real t439 = s[4] * d_H[9];
-    const real t440 = t438 + t439;
-    const real t441 = H[8] * d_s[3];
-    const real t442 = s[3] * d_H[8];
-    const real t443 = t441 + t442;
-    const real t444 = H[7] * d_s[2];
-    const real t445 = s[2] * d_H[7];
-    const real t446 = t444 + t445;
-    const real t447 = H[6] * d_s[1];
-    const real t448 = s[1] * d_H[6];
-    const real t449 = t447 + t448;
-    const real t450 = H[5] * d_s[0];
-    const real t451 = s[0] * d_H[5];
-    const real t452 = t450 + t451;
-    const real t453 = t449 + t452;
-    const real t454 = t446 + t453;
-    const real t455 = t443 + t454;
-    const real t456 = t440 + t455;
-    const real t457 = d_c[1] + t456;
-    const real t458 = t437 + t457;
-    const real t459 = t336 * t39;
-    const real t460 = t92 * t362;
-    const real t461 = t459 + t460;
-    const real t462 = t375 * t24;
-    const real t463 = t100 * t396;
-    const real t464 = t462 + t463;
-    const real t465 = t407 * t9;
-    const real t466 = t108 * t423;
-    const real t467 = t465 + t466;
-    const real t468 = t464 + t467;
-    const real t469 = t461 + t468;
-    const real t470 = t458 + t469;
-    d_motion[7] = t470;
-    const real t471 = v[1] * t85;
-    const real t472 = t199 * d_v[1];
-    const real t473 = t471 + t472;
-    const real t474 = 2.0 * t473;
-    const real t475 = v[0] * t112;
-    const real t476 = t146 * d_v[0];
-    const real t477 = t475 + t476;
-    const real t478 = 2.0 * t477;
-    const real t479 = t474 - t478;
-    const real t480 = H[14] * d_s[4];
-    const real t481 = s[4] * d_H[14];
-    const real t482 = t480 + t481;
-    const real t483 = H[13] * d_s[3];
-    const real t484 = s[3] * d_H[13];
-    const real t485 = t483 + t484;
-    const real t486 = H[12] * d_s[2];
-    const real t487 = s[2] * d_H[12];
-    const real t488 = t486 + t487;
-    const real t489 = H[11] * d_s[1];
-    const real t490 = s[1] * d_H[11];
-    const real t491 = t489 + t490;
-    const real t492 = H[10] * d_s[0];
-    const real t493 = s[0] * d_H[10];
-    const real t494 = t492 + t493;
-    const real t495 = t491 + t494;
-    const real t496 = t488 + t495;
-    const real t497 = t485 + t496;
-    const real t498 = t482 + t497;
-    const real t499 = d_c[2] + t498;
-    const real t500 = t479 + t499;
-    const real t501 = t336 * t44;
-    const real t502 = t119 * t362;
-    const real t503 = t501 + t502;
-    const real t504 = t375 * t29;
-    const real t505 = t127 * t396;
-    const real t506 = t504 + t505;
-    const real t507 = t407 * t14;
-    const real t508 = t135 * t423;
-    const real t509 = t507 + t508;
-    const real t510 = t506 + t509;
-    const real t511 = t503 + t510;
-    const real t512 = t500 + t511;
-    d_motion[8] = t512;
-    return 0;
+  (void)c;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139) + (d_c[3] + (s[4] *
+    d_H[19] + H[19] * d_s[4] + (s[3] * d_H[18] + H[18] * d_s[3] + (s[2] * d_H[17] + H[17] * d_s[2] +
+    (s[1] * d_H[16] + H[16] * d_s[1] + (s[0] * d_H[15] + H[15] * d_s[0])))))) + (motion_I[5] * t34 +
+    t65 * d_motion_I[5] + (motion_I[4] * t19 + t73 * d_motion_I[4] + (motion_I[3] * t4 + t81 *
+    d_motion_I[3])));
+  real t199 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t199 * d_w[2]) + (d_c[4] + (H[24] *
+    d_s[4] + s[4] * d_H[24] + (H[23] * d_s[3] + s[3] * d_H[23] + (H[22] * d_s[2] + s[2] * d_H[22] +
+    (H[21] * d_s[1] + s[1] * d_H[21] + (H[20] * d_s[0] + s[0] * d_H[20])))))) + (motion_I[5] * t39 +
+    t92 * d_motion_I[5] + (motion_I[4] * t24 + t100 * d_motion_I[4] + (motion_I[3] * t9 + t108 *
+    d_motion_I[3])));
+  d_motion[5] = w[1] * t85 + t199 * d_w[1] - (t146 * d_w[0] + w[0] * t112) + (d_c[5] + (H[29] *
+    d_s[4] + s[4] * d_H[29] + (H[28] * d_s[3] + s[3] * d_H[28] + (H[27] * d_s[2] + s[2] * d_H[27] +
+    (H[26] * d_s[1] + s[1] * d_H[26] + (H[25] * d_s[0] + s[0] * d_H[25])))))) + (motion_I[5] * t44 +
+    t119 * d_motion_I[5] + (motion_I[4] * t29 + t127 * d_motion_I[4] + (motion_I[3] * t14 + t135 *
+    d_motion_I[3])));
+  real t311 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t312 = motion_I[0] * motion_I[2];
+  real t313 = t312 - motion_I[4];
+  real t320 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t321 = motion_I[1] * motion_I[2];
+  real t322 = motion_I[3] + t321;
+  real t330 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t331 = motion_I[1] * motion_I[1];
+  real t332 = motion_I[0] * motion_I[0];
+  real t333 = t331 + t332;
+  real t336 = t311 * t313 + t320 * t322 - t330 * t333 + motion_I[8];
+  real t341 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t348 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t354 = motion_I[0] * d_motion_I[0];
+  real t355 = t354 + t354;
+  real t356 = motion_I[1] * d_motion_I[1];
+  real t357 = t356 + t356;
+  real t362 = d_motion_I[8] + (t322 * t54 + t320 * (d_motion_I[3] + t341) + (t313 * t49 + t311 *
+    (t348 - d_motion_I[4])) - (t333 * t59 + t330 * (t355 + t357)));
+  real t365 = motion_I[0] * motion_I[1];
+  real t366 = motion_I[5] + t365;
+  real t368 = motion_I[2] * motion_I[2];
+  real t369 = t368 + t332;
+  real t372 = t321 - motion_I[3];
+  real t375 = t311 * t366 - t320 * t369 + t330 * t372 + motion_I[7];
+  real t384 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t389 = motion_I[2] * d_motion_I[2];
+  real t390 = t389 + t389;
+  real t396 = d_motion_I[7] + (t372 * t59 + t330 * (t341 - d_motion_I[3]) + (t366 * t49 + t311 *
+    (d_motion_I[5] + t384) - (t369 * t54 + t320 * (t355 + t390))));
+  real t399 = t365 - motion_I[5];
+  real t401 = t331 + t368;
+  real t404 = motion_I[4] + t312;
+  real t407 = t320 * t399 - t311 * t401 + t330 * t404 + motion_I[6];
+  real t423 = d_motion_I[6] + (t404 * t59 + t330 * (d_motion_I[4] + t348) + (t399 * t54 + t320 *
+    (t384 - d_motion_I[5]) - (t401 * t49 + t311 * (t357 + t390))));
+  d_motion[6] = 2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]) + (d_c[0]
+    + (H[4] * d_s[4] + s[4] * d_H[4] + (H[3] * d_s[3] + s[3] * d_H[3] + (H[2] * d_s[2] + s[2] *
+    d_H[2] + (H[1] * d_s[1] + s[1] * d_H[1] + (H[0] * d_s[0] + s[0] * d_H[0])))))) + (t336 * t34 +
+    t65 * t362 + (t375 * t19 + t73 * t396 + (t407 * t4 + t81 * t423)));
+  d_motion[7] = 2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t199 * d_v[2]) + (d_c[1] +
+    (H[9] * d_s[4] + s[4] * d_H[9] + (H[8] * d_s[3] + s[3] * d_H[8] + (H[7] * d_s[2] + s[2] * d_H[7]
+    + (H[6] * d_s[1] + s[1] * d_H[6] + (H[5] * d_s[0] + s[0] * d_H[5])))))) + (t336 * t39 + t92 *
+    t362 + (t375 * t24 + t100 * t396 + (t407 * t9 + t108 * t423)));
+  d_motion[8] = 2.0 * (v[1] * t85 + t199 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]) + (d_c[2] +
+    (H[14] * d_s[4] + s[4] * d_H[14] + (H[13] * d_s[3] + s[3] * d_H[13] + (H[12] * d_s[2] + s[2] *
+    d_H[12] + (H[11] * d_s[1] + s[1] * d_H[11] + (H[10] * d_s[0] + s[0] * d_H[10])))))) + (t336 *
+    t44 + t119 * t362 + (t375 * t29 + t127 * t396 + (t407 * t14 + t135 * t423)));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 30, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 5, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 30, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 5, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6][5] motion subspace
@@ -12956,148 +3463,27 @@ static const mstmm_port mstmm_sweep_generic5_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[5] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic5_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic5_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    const real t0 = f[5] * d_H[25];
-    const real t1 = H[25] * d_f[5];
-    const real t2 = t0 + t1;
-    const real t3 = f[4] * d_H[20];
-    const real t4 = H[20] * d_f[4];
-    const real t5 = t3 + t4;
-    const real t6 = f[3] * d_H[15];
-    const real t7 = H[15] * d_f[3];
-    const real t8 = t6 + t7;
-    const real t9 = f[2] * d_H[10];
-    const real t10 = H[10] * d_f[2];
-    const real t11 = t9 + t10;
-    const real t12 = f[1] * d_H[5];
-    const real t13 = H[5] * d_f[1];
-    const real t14 = t12 + t13;
-    const real t15 = f[0] * d_H[0];
-    const real t16 = H[0] * d_f[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_tau[0] = t22;
-    const real t23 = H[26] * d_f[5];
-    const real t24 = f[5] * d_H[26];
-    const real t25 = t23 + t24;
-    const real t26 = H[21] * d_f[4];
-    const real t27 = f[4] * d_H[21];
-    const real t28 = t26 + t27;
-    const real t29 = H[16] * d_f[3];
-    const real t30 = f[3] * d_H[16];
-    const real t31 = t29 + t30;
-    const real t32 = H[11] * d_f[2];
-    const real t33 = f[2] * d_H[11];
-    const real t34 = t32 + t33;
-    const real t35 = H[6] * d_f[1];
-    const real t36 = f[1] * d_H[6];
-    const real t37 = t35 + t36;
-    const real t38 = H[1] * d_f[0];
-    const real t39 = f[0] * d_H[1];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t31 + t42;
-    const real t44 = t28 + t43;
-    const real t45 = t25 + t44;
-    d_tau[1] = t45;
-    const real t46 = H[27] * d_f[5];
-    const real t47 = f[5] * d_H[27];
-    const real t48 = t46 + t47;
-    const real t49 = H[22] * d_f[4];
-    const real t50 = f[4] * d_H[22];
-    const real t51 = t49 + t50;
-    const real t52 = H[17] * d_f[3];
-    const real t53 = f[3] * d_H[17];
-    const real t54 = t52 + t53;
-    const real t55 = H[12] * d_f[2];
-    const real t56 = f[2] * d_H[12];
-    const real t57 = t55 + t56;
-    const real t58 = H[7] * d_f[1];
-    const real t59 = f[1] * d_H[7];
-    const real t60 = t58 + t59;
-    const real t61 = H[2] * d_f[0];
-    const real t62 = f[0] * d_H[2];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    const real t66 = t54 + t65;
-    const real t67 = t51 + t66;
-    const real t68 = t48 + t67;
-    d_tau[2] = t68;
-    const real t69 = H[28] * d_f[5];
-    const real t70 = f[5] * d_H[28];
-    const real t71 = t69 + t70;
-    const real t72 = H[23] * d_f[4];
-    const real t73 = f[4] * d_H[23];
-    const real t74 = t72 + t73;
-    const real t75 = H[18] * d_f[3];
-    const real t76 = f[3] * d_H[18];
-    const real t77 = t75 + t76;
-    const real t78 = H[13] * d_f[2];
-    const real t79 = f[2] * d_H[13];
-    const real t80 = t78 + t79;
-    const real t81 = H[8] * d_f[1];
-    const real t82 = f[1] * d_H[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[3] * d_f[0];
-    const real t85 = f[0] * d_H[3];
-    const real t86 = t84 + t85;
-    const real t87 = t83 + t86;
-    const real t88 = t80 + t87;
-    const real t89 = t77 + t88;
-    const real t90 = t74 + t89;
-    const real t91 = t71 + t90;
-    d_tau[3] = t91;
-    const real t92 = H[29] * d_f[5];
-    const real t93 = f[5] * d_H[29];
-    const real t94 = t92 + t93;
-    const real t95 = H[24] * d_f[4];
-    const real t96 = f[4] * d_H[24];
-    const real t97 = t95 + t96;
-    const real t98 = H[19] * d_f[3];
-    const real t99 = f[3] * d_H[19];
-    const real t100 = t98 + t99;
-    const real t101 = H[14] * d_f[2];
-    const real t102 = f[2] * d_H[14];
-    const real t103 = t101 + t102;
-    const real t104 = H[9] * d_f[1];
-    const real t105 = f[1] * d_H[9];
-    const real t106 = t104 + t105;
-    const real t107 = H[4] * d_f[0];
-    const real t108 = f[0] * d_H[4];
-    const real t109 = t107 + t108;
-    const real t110 = t106 + t109;
-    const real t111 = t103 + t110;
-    const real t112 = t100 + t111;
-    const real t113 = t97 + t112;
-    const real t114 = t94 + t113;
-    d_tau[4] = t114;
-    return 0;
+  d_tau[0] = f[5] * d_H[25] + H[25] * d_f[5] + (f[4] * d_H[20] + H[20] * d_f[4] + (f[3] * d_H[15] +
+    H[15] * d_f[3] + (f[2] * d_H[10] + H[10] * d_f[2] + (f[1] * d_H[5] + H[5] * d_f[1] + (f[0] *
+    d_H[0] + H[0] * d_f[0])))));
+  d_tau[1] = H[26] * d_f[5] + f[5] * d_H[26] + (H[21] * d_f[4] + f[4] * d_H[21] + (H[16] * d_f[3] +
+    f[3] * d_H[16] + (H[11] * d_f[2] + f[2] * d_H[11] + (H[6] * d_f[1] + f[1] * d_H[6] + (H[1] *
+    d_f[0] + f[0] * d_H[1])))));
+  d_tau[2] = H[27] * d_f[5] + f[5] * d_H[27] + (H[22] * d_f[4] + f[4] * d_H[22] + (H[17] * d_f[3] +
+    f[3] * d_H[17] + (H[12] * d_f[2] + f[2] * d_H[12] + (H[7] * d_f[1] + f[1] * d_H[7] + (H[2] *
+    d_f[0] + f[0] * d_H[2])))));
+  d_tau[3] = H[28] * d_f[5] + f[5] * d_H[28] + (H[23] * d_f[4] + f[4] * d_H[23] + (H[18] * d_f[3] +
+    f[3] * d_H[18] + (H[13] * d_f[2] + f[2] * d_H[13] + (H[8] * d_f[1] + f[1] * d_H[8] + (H[3] *
+    d_f[0] + f[0] * d_H[3])))));
+  d_tau[4] = H[29] * d_f[5] + f[5] * d_H[29] + (H[24] * d_f[4] + f[4] * d_H[24] + (H[19] * d_f[3] +
+    f[3] * d_H[19] + (H[14] * d_f[2] + f[2] * d_H[14] + (H[9] * d_f[1] + f[1] * d_H[9] + (H[4] *
+    d_f[0] + f[0] * d_H[4])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_effort_slope_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 30, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_effort_slope_outputs[] = {
-    {"d_tau", 5, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -13105,2375 +3491,581 @@ static const mstmm_port mstmm_sweep_generic5_effort_slope_outputs[] = {
  * in  d_H[6][5] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic5_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic5_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    const real t0 = H[25] * H[25];
-    const real t1 = H[20] * H[20];
-    const real t2 = H[15] * H[15];
-    const real t3 = H[10] * H[10];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[5] * H[5];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 1.0 / t10;
-    const real t12 = t11 * d_H[0];
-    const real t13 = H[5] * d_H[5];
-    const real t14 = t13 + t13;
-    const real t15 = H[0] * d_H[0];
-    const real t16 = t15 + t15;
-    const real t17 = t14 + t16;
-    const real t18 = H[10] * d_H[10];
-    const real t19 = t18 + t18;
-    const real t20 = t17 + t19;
-    const real t21 = H[15] * d_H[15];
-    const real t22 = t21 + t21;
-    const real t23 = t20 + t22;
-    const real t24 = H[20] * d_H[20];
-    const real t25 = t24 + t24;
-    const real t26 = t23 + t25;
-    const real t27 = H[25] * d_H[25];
-    const real t28 = t27 + t27;
-    const real t29 = t26 + t28;
-    const real t30 = t11 * t29;
-    const real t31 = t30 / t10;
-    const real t32 = H[0] * t31;
-    const real t33 = t12 - t32;
-    const real t34 = H[1] * H[1];
-    const real t35 = H[6] * H[6];
-    const real t36 = t34 + t35;
-    const real t37 = H[11] * H[11];
-    const real t38 = t36 + t37;
-    const real t39 = H[16] * H[16];
-    const real t40 = t38 + t39;
-    const real t41 = H[21] * H[21];
-    const real t42 = t40 + t41;
-    const real t43 = H[26] * H[26];
-    const real t44 = t42 + t43;
-    const real t45 = H[25] * H[26];
-    const real t46 = H[20] * H[21];
-    const real t47 = H[15] * H[16];
-    const real t48 = H[10] * H[11];
-    const real t49 = H[5] * H[6];
-    const real t50 = H[0] * H[1];
-    const real t51 = t49 + t50;
-    const real t52 = t48 + t51;
-    const real t53 = t47 + t52;
-    const real t54 = t46 + t53;
-    const real t55 = t45 + t54;
-    const real t56 = t55 * t11;
-    const real t57 = t55 * t56;
-    const real t58 = t44 - t57;
-    const real t59 = 1.0 / t58;
-    const real t60 = H[0] * t56;
-    const real t61 = H[1] - t60;
-    const real t62 = t59 * t61;
-    const real t63 = H[1] * H[2];
-    const real t64 = H[6] * H[7];
-    const real t65 = t63 + t64;
-    const real t66 = H[11] * H[12];
-    const real t67 = t65 + t66;
-    const real t68 = H[16] * H[17];
-    const real t69 = t67 + t68;
-    const real t70 = H[21] * H[22];
-    const real t71 = t69 + t70;
-    const real t72 = H[26] * H[27];
-    const real t73 = t71 + t72;
-    const real t74 = H[25] * H[27];
-    const real t75 = H[20] * H[22];
-    const real t76 = H[15] * H[17];
-    const real t77 = H[10] * H[12];
-    const real t78 = H[5] * H[7];
-    const real t79 = H[0] * H[2];
-    const real t80 = t78 + t79;
-    const real t81 = t77 + t80;
-    const real t82 = t76 + t81;
-    const real t83 = t75 + t82;
-    const real t84 = t74 + t83;
-    const real t85 = t56 * t84;
-    const real t86 = t73 - t85;
-    const real t87 = t86 * t59;
-    const real t88 = H[2] * H[2];
-    const real t89 = H[7] * H[7];
-    const real t90 = t88 + t89;
-    const real t91 = H[12] * H[12];
-    const real t92 = t90 + t91;
-    const real t93 = H[17] * H[17];
-    const real t94 = t92 + t93;
-    const real t95 = H[22] * H[22];
-    const real t96 = t94 + t95;
-    const real t97 = H[27] * H[27];
-    const real t98 = t96 + t97;
-    const real t99 = t11 * t84;
-    const real t100 = t84 * t99;
-    const real t101 = t98 - t100;
-    const real t102 = t86 * t87;
-    const real t103 = t101 - t102;
-    const real t104 = 1.0 / t103;
-    const real t105 = H[0] * t99;
-    const real t106 = H[2] - t105;
-    const real t107 = t87 * t61;
-    const real t108 = t106 - t107;
-    const real t109 = t104 * t108;
-    const real t110 = H[2] * H[3];
-    const real t111 = H[7] * H[8];
-    const real t112 = t110 + t111;
-    const real t113 = H[12] * H[13];
-    const real t114 = t112 + t113;
-    const real t115 = H[17] * H[18];
-    const real t116 = t114 + t115;
-    const real t117 = H[22] * H[23];
-    const real t118 = t116 + t117;
-    const real t119 = H[27] * H[28];
-    const real t120 = t118 + t119;
-    const real t121 = H[25] * H[28];
-    const real t122 = H[20] * H[23];
-    const real t123 = H[15] * H[18];
-    const real t124 = H[10] * H[13];
-    const real t125 = H[5] * H[8];
-    const real t126 = H[0] * H[3];
-    const real t127 = t125 + t126;
-    const real t128 = t124 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = t122 + t129;
-    const real t131 = t121 + t130;
-    const real t132 = t99 * t131;
-    const real t133 = t120 - t132;
-    const real t134 = H[1] * H[3];
-    const real t135 = H[6] * H[8];
-    const real t136 = t134 + t135;
-    const real t137 = H[11] * H[13];
-    const real t138 = t136 + t137;
-    const real t139 = H[16] * H[18];
-    const real t140 = t138 + t139;
-    const real t141 = H[21] * H[23];
-    const real t142 = t140 + t141;
-    const real t143 = H[26] * H[28];
-    const real t144 = t142 + t143;
-    const real t145 = t56 * t131;
-    const real t146 = t144 - t145;
-    const real t147 = t87 * t146;
-    const real t148 = t133 - t147;
-    const real t149 = t148 * t104;
-    const real t150 = H[3] * H[3];
-    const real t151 = H[8] * H[8];
-    const real t152 = t150 + t151;
-    const real t153 = H[13] * H[13];
-    const real t154 = t152 + t153;
-    const real t155 = H[18] * H[18];
-    const real t156 = t154 + t155;
-    const real t157 = H[23] * H[23];
-    const real t158 = t156 + t157;
-    const real t159 = H[28] * H[28];
-    const real t160 = t158 + t159;
-    const real t161 = t11 * t131;
-    const real t162 = t131 * t161;
-    const real t163 = t160 - t162;
-    const real t164 = t59 * t146;
-    const real t165 = t146 * t164;
-    const real t166 = t163 - t165;
-    const real t167 = t148 * t149;
-    const real t168 = t166 - t167;
-    const real t169 = 1.0 / t168;
-    const real t170 = H[0] * t161;
-    const real t171 = H[3] - t170;
-    const real t172 = t164 * t61;
-    const real t173 = t171 - t172;
-    const real t174 = t149 * t108;
-    const real t175 = t173 - t174;
-    const real t176 = t169 * t175;
-    const real t177 = H[3] * H[4];
-    const real t178 = H[8] * H[9];
-    const real t179 = t177 + t178;
-    const real t180 = H[13] * H[14];
-    const real t181 = t179 + t180;
-    const real t182 = H[18] * H[19];
-    const real t183 = t181 + t182;
-    const real t184 = H[23] * H[24];
-    const real t185 = t183 + t184;
-    const real t186 = H[28] * H[29];
-    const real t187 = t185 + t186;
-    const real t188 = H[25] * H[29];
-    const real t189 = H[20] * H[24];
-    const real t190 = H[15] * H[19];
-    const real t191 = H[10] * H[14];
-    const real t192 = H[5] * H[9];
-    const real t193 = H[0] * H[4];
-    const real t194 = t192 + t193;
-    const real t195 = t191 + t194;
-    const real t196 = t190 + t195;
-    const real t197 = t189 + t196;
-    const real t198 = t188 + t197;
-    const real t199 = t161 * t198;
-    const real t200 = t187 - t199;
-    const real t201 = H[1] * H[4];
-    const real t202 = H[6] * H[9];
-    const real t203 = t201 + t202;
-    const real t204 = H[11] * H[14];
-    const real t205 = t203 + t204;
-    const real t206 = H[16] * H[19];
-    const real t207 = t205 + t206;
-    const real t208 = H[21] * H[24];
-    const real t209 = t207 + t208;
-    const real t210 = H[26] * H[29];
-    const real t211 = t209 + t210;
-    const real t212 = t56 * t198;
-    const real t213 = t211 - t212;
-    const real t214 = t164 * t213;
-    const real t215 = t200 - t214;
-    const real t216 = H[2] * H[4];
-    const real t217 = H[7] * H[9];
-    const real t218 = t216 + t217;
-    const real t219 = H[12] * H[14];
-    const real t220 = t218 + t219;
-    const real t221 = H[17] * H[19];
-    const real t222 = t220 + t221;
-    const real t223 = H[22] * H[24];
-    const real t224 = t222 + t223;
-    const real t225 = H[27] * H[29];
-    const real t226 = t224 + t225;
-    const real t227 = t99 * t198;
-    const real t228 = t226 - t227;
-    const real t229 = t87 * t213;
-    const real t230 = t228 - t229;
-    const real t231 = t149 * t230;
-    const real t232 = t215 - t231;
-    const real t233 = t232 * t169;
-    const real t234 = H[4] * H[4];
-    const real t235 = H[9] * H[9];
-    const real t236 = t234 + t235;
-    const real t237 = H[14] * H[14];
-    const real t238 = t236 + t237;
-    const real t239 = H[19] * H[19];
-    const real t240 = t238 + t239;
-    const real t241 = H[24] * H[24];
-    const real t242 = t240 + t241;
-    const real t243 = H[29] * H[29];
-    const real t244 = t242 + t243;
-    const real t245 = t11 * t198;
-    const real t246 = t198 * t245;
-    const real t247 = t244 - t246;
-    const real t248 = t59 * t213;
-    const real t249 = t213 * t248;
-    const real t250 = t247 - t249;
-    const real t251 = t104 * t230;
-    const real t252 = t230 * t251;
-    const real t253 = t250 - t252;
-    const real t254 = t232 * t233;
-    const real t255 = t253 - t254;
-    const real t256 = 1.0 / t255;
-    const real t257 = H[0] * t245;
-    const real t258 = H[4] - t257;
-    const real t259 = t248 * t61;
-    const real t260 = t258 - t259;
-    const real t261 = t251 * t108;
-    const real t262 = t260 - t261;
-    const real t263 = t233 * t175;
-    const real t264 = t262 - t263;
-    const real t265 = t256 * t264;
-    const real t266 = t233 * t265;
-    const real t267 = t176 - t266;
-    const real t268 = t149 * t267;
-    const real t269 = t109 - t268;
-    const real t270 = t251 * t265;
-    const real t271 = t269 - t270;
-    const real t272 = t87 * t271;
-    const real t273 = t62 - t272;
-    const real t274 = t164 * t267;
-    const real t275 = t273 - t274;
-    const real t276 = t248 * t265;
-    const real t277 = t275 - t276;
-    const real t278 = H[1] * d_H[0];
-    const real t279 = H[0] * d_H[1];
-    const real t280 = t278 + t279;
-    const real t281 = H[6] * d_H[5];
-    const real t282 = H[5] * d_H[6];
-    const real t283 = t281 + t282;
-    const real t284 = t280 + t283;
-    const real t285 = H[11] * d_H[10];
-    const real t286 = H[10] * d_H[11];
-    const real t287 = t285 + t286;
-    const real t288 = t284 + t287;
-    const real t289 = H[16] * d_H[15];
-    const real t290 = H[15] * d_H[16];
-    const real t291 = t289 + t290;
-    const real t292 = t288 + t291;
-    const real t293 = H[21] * d_H[20];
-    const real t294 = H[20] * d_H[21];
-    const real t295 = t293 + t294;
-    const real t296 = t292 + t295;
-    const real t297 = H[26] * d_H[25];
-    const real t298 = H[25] * d_H[26];
-    const real t299 = t297 + t298;
-    const real t300 = t296 + t299;
-    const real t301 = t11 * t300;
-    const real t302 = t55 * t31;
-    const real t303 = t301 - t302;
-    const real t304 = t277 * t303;
-    const real t305 = t56 * d_H[0];
-    const real t306 = H[0] * t303;
-    const real t307 = t305 + t306;
-    const real t308 = d_H[1] - t307;
-    const real t309 = t59 * t308;
-    const real t310 = H[26] * d_H[26];
-    const real t311 = t310 + t310;
-    const real t312 = H[21] * d_H[21];
-    const real t313 = t312 + t312;
-    const real t314 = H[16] * d_H[16];
-    const real t315 = t314 + t314;
-    const real t316 = H[11] * d_H[11];
-    const real t317 = t316 + t316;
-    const real t318 = H[6] * d_H[6];
-    const real t319 = t318 + t318;
-    const real t320 = H[1] * d_H[1];
-    const real t321 = t320 + t320;
-    const real t322 = t319 + t321;
-    const real t323 = t317 + t322;
-    const real t324 = t315 + t323;
-    const real t325 = t313 + t324;
-    const real t326 = t311 + t325;
-    const real t327 = t56 * t300;
-    const real t328 = t55 * t303;
-    const real t329 = t327 + t328;
-    const real t330 = t326 - t329;
-    const real t331 = t59 * t330;
-    const real t332 = t331 / t58;
-    const real t333 = t61 * t332;
-    const real t334 = t309 - t333;
-    const real t335 = H[27] * d_H[26];
-    const real t336 = H[26] * d_H[27];
-    const real t337 = t335 + t336;
-    const real t338 = H[22] * d_H[21];
-    const real t339 = H[21] * d_H[22];
-    const real t340 = t338 + t339;
-    const real t341 = H[17] * d_H[16];
-    const real t342 = H[16] * d_H[17];
-    const real t343 = t341 + t342;
-    const real t344 = H[12] * d_H[11];
-    const real t345 = H[11] * d_H[12];
-    const real t346 = t344 + t345;
-    const real t347 = H[7] * d_H[6];
-    const real t348 = H[6] * d_H[7];
-    const real t349 = t347 + t348;
-    const real t350 = H[2] * d_H[1];
-    const real t351 = H[1] * d_H[2];
-    const real t352 = t350 + t351;
-    const real t353 = t349 + t352;
-    const real t354 = t346 + t353;
-    const real t355 = t343 + t354;
-    const real t356 = t340 + t355;
-    const real t357 = t337 + t356;
-    const real t358 = t84 * t303;
-    const real t359 = H[2] * d_H[0];
-    const real t360 = H[0] * d_H[2];
-    const real t361 = t359 + t360;
-    const real t362 = H[7] * d_H[5];
-    const real t363 = H[5] * d_H[7];
-    const real t364 = t362 + t363;
-    const real t365 = t361 + t364;
-    const real t366 = H[12] * d_H[10];
-    const real t367 = H[10] * d_H[12];
-    const real t368 = t366 + t367;
-    const real t369 = t365 + t368;
-    const real t370 = H[17] * d_H[15];
-    const real t371 = H[15] * d_H[17];
-    const real t372 = t370 + t371;
-    const real t373 = t369 + t372;
-    const real t374 = H[22] * d_H[20];
-    const real t375 = H[20] * d_H[22];
-    const real t376 = t374 + t375;
-    const real t377 = t373 + t376;
-    const real t378 = H[27] * d_H[25];
-    const real t379 = H[25] * d_H[27];
-    const real t380 = t378 + t379;
-    const real t381 = t377 + t380;
-    const real t382 = t56 * t381;
-    const real t383 = t358 + t382;
-    const real t384 = t357 - t383;
-    const real t385 = t59 * t384;
-    const real t386 = t86 * t332;
-    const real t387 = t385 - t386;
-    const real t388 = t271 * t387;
-    const real t389 = t99 * d_H[0];
-    const real t390 = t11 * t381;
-    const real t391 = t84 * t31;
-    const real t392 = t390 - t391;
-    const real t393 = H[0] * t392;
-    const real t394 = t389 + t393;
-    const real t395 = d_H[2] - t394;
-    const real t396 = t61 * t387;
-    const real t397 = t87 * t308;
-    const real t398 = t396 + t397;
-    const real t399 = t395 - t398;
-    const real t400 = t104 * t399;
-    const real t401 = H[27] * d_H[27];
-    const real t402 = t401 + t401;
-    const real t403 = H[22] * d_H[22];
-    const real t404 = t403 + t403;
-    const real t405 = H[17] * d_H[17];
-    const real t406 = t405 + t405;
-    const real t407 = H[12] * d_H[12];
-    const real t408 = t407 + t407;
-    const real t409 = H[7] * d_H[7];
-    const real t410 = t409 + t409;
-    const real t411 = H[2] * d_H[2];
-    const real t412 = t411 + t411;
-    const real t413 = t410 + t412;
-    const real t414 = t408 + t413;
-    const real t415 = t406 + t414;
-    const real t416 = t404 + t415;
-    const real t417 = t402 + t416;
-    const real t418 = t99 * t381;
-    const real t419 = t84 * t392;
-    const real t420 = t418 + t419;
-    const real t421 = t417 - t420;
-    const real t422 = t87 * t384;
-    const real t423 = t86 * t387;
-    const real t424 = t422 + t423;
-    const real t425 = t421 - t424;
-    const real t426 = t104 * t425;
-    const real t427 = t426 / t103;
-    const real t428 = t108 * t427;
-    const real t429 = t400 - t428;
-    const real t430 = H[28] * d_H[27];
-    const real t431 = H[27] * d_H[28];
-    const real t432 = t430 + t431;
-    const real t433 = H[23] * d_H[22];
-    const real t434 = H[22] * d_H[23];
-    const real t435 = t433 + t434;
-    const real t436 = H[18] * d_H[17];
-    const real t437 = H[17] * d_H[18];
-    const real t438 = t436 + t437;
-    const real t439 = H[13] * d_H[12];
-    const real t440 = H[12] * d_H[13];
-    const real t441 = t439 + t440;
-    const real t442 = H[8] * d_H[7];
-    const real t443 = H[7] * d_H[8];
-    const real t444 = t442 + t443;
-    const real t445 = H[3] * d_H[2];
-    const real t446 = H[2] * d_H[3];
-    const real t447 = t445 + t446;
-    const real t448 = t444 + t447;
-    const real t449 = t441 + t448;
-    const real t450 = t438 + t449;
-    const real t451 = t435 + t450;
-    const real t452 = t432 + t451;
-    const real t453 = t131 * t392;
-    const real t454 = H[3] * d_H[0];
-    const real t455 = H[0] * d_H[3];
-    const real t456 = t454 + t455;
-    const real t457 = H[8] * d_H[5];
-    const real t458 = H[5] * d_H[8];
-    const real t459 = t457 + t458;
-    const real t460 = t456 + t459;
-    const real t461 = H[13] * d_H[10];
-    const real t462 = H[10] * d_H[13];
-    const real t463 = t461 + t462;
-    const real t464 = t460 + t463;
-    const real t465 = H[18] * d_H[15];
-    const real t466 = H[15] * d_H[18];
-    const real t467 = t465 + t466;
-    const real t468 = t464 + t467;
-    const real t469 = H[23] * d_H[20];
-    const real t470 = H[20] * d_H[23];
-    const real t471 = t469 + t470;
-    const real t472 = t468 + t471;
-    const real t473 = H[28] * d_H[25];
-    const real t474 = H[25] * d_H[28];
-    const real t475 = t473 + t474;
-    const real t476 = t472 + t475;
-    const real t477 = t99 * t476;
-    const real t478 = t453 + t477;
-    const real t479 = t452 - t478;
-    const real t480 = t146 * t387;
-    const real t481 = H[28] * d_H[26];
-    const real t482 = H[26] * d_H[28];
-    const real t483 = t481 + t482;
-    const real t484 = H[23] * d_H[21];
-    const real t485 = H[21] * d_H[23];
-    const real t486 = t484 + t485;
-    const real t487 = H[18] * d_H[16];
-    const real t488 = H[16] * d_H[18];
-    const real t489 = t487 + t488;
-    const real t490 = H[13] * d_H[11];
-    const real t491 = H[11] * d_H[13];
-    const real t492 = t490 + t491;
-    const real t493 = H[8] * d_H[6];
-    const real t494 = H[6] * d_H[8];
-    const real t495 = t493 + t494;
-    const real t496 = H[3] * d_H[1];
-    const real t497 = H[1] * d_H[3];
-    const real t498 = t496 + t497;
-    const real t499 = t495 + t498;
-    const real t500 = t492 + t499;
-    const real t501 = t489 + t500;
-    const real t502 = t486 + t501;
-    const real t503 = t483 + t502;
-    const real t504 = t131 * t303;
-    const real t505 = t56 * t476;
-    const real t506 = t504 + t505;
-    const real t507 = t503 - t506;
-    const real t508 = t87 * t507;
-    const real t509 = t480 + t508;
-    const real t510 = t479 - t509;
-    const real t511 = t104 * t510;
-    const real t512 = t148 * t427;
-    const real t513 = t511 - t512;
-    const real t514 = t267 * t513;
-    const real t515 = t161 * d_H[0];
-    const real t516 = t11 * t476;
-    const real t517 = t131 * t31;
-    const real t518 = t516 - t517;
-    const real t519 = H[0] * t518;
-    const real t520 = t515 + t519;
-    const real t521 = d_H[3] - t520;
-    const real t522 = t59 * t507;
-    const real t523 = t146 * t332;
-    const real t524 = t522 - t523;
-    const real t525 = t61 * t524;
-    const real t526 = t164 * t308;
-    const real t527 = t525 + t526;
-    const real t528 = t521 - t527;
-    const real t529 = t108 * t513;
-    const real t530 = t149 * t399;
-    const real t531 = t529 + t530;
-    const real t532 = t528 - t531;
-    const real t533 = t169 * t532;
-    const real t534 = H[28] * d_H[28];
-    const real t535 = t534 + t534;
-    const real t536 = H[23] * d_H[23];
-    const real t537 = t536 + t536;
-    const real t538 = H[18] * d_H[18];
-    const real t539 = t538 + t538;
-    const real t540 = H[13] * d_H[13];
-    const real t541 = t540 + t540;
-    const real t542 = H[8] * d_H[8];
-    const real t543 = t542 + t542;
-    const real t544 = H[3] * d_H[3];
-    const real t545 = t544 + t544;
-    const real t546 = t543 + t545;
-    const real t547 = t541 + t546;
-    const real t548 = t539 + t547;
-    const real t549 = t537 + t548;
-    const real t550 = t535 + t549;
-    const real t551 = t161 * t476;
-    const real t552 = t131 * t518;
-    const real t553 = t551 + t552;
-    const real t554 = t550 - t553;
-    const real t555 = t164 * t507;
-    const real t556 = t146 * t524;
-    const real t557 = t555 + t556;
-    const real t558 = t554 - t557;
-    const real t559 = t149 * t510;
-    const real t560 = t148 * t513;
-    const real t561 = t559 + t560;
-    const real t562 = t558 - t561;
-    const real t563 = t169 * t562;
-    const real t564 = t563 / t168;
-    const real t565 = t175 * t564;
-    const real t566 = t533 - t565;
-    const real t567 = H[29] * d_H[28];
-    const real t568 = H[28] * d_H[29];
-    const real t569 = t567 + t568;
-    const real t570 = H[24] * d_H[23];
-    const real t571 = H[23] * d_H[24];
-    const real t572 = t570 + t571;
-    const real t573 = H[19] * d_H[18];
-    const real t574 = H[18] * d_H[19];
-    const real t575 = t573 + t574;
-    const real t576 = H[14] * d_H[13];
-    const real t577 = H[13] * d_H[14];
-    const real t578 = t576 + t577;
-    const real t579 = H[9] * d_H[8];
-    const real t580 = H[8] * d_H[9];
-    const real t581 = t579 + t580;
-    const real t582 = H[4] * d_H[3];
-    const real t583 = H[3] * d_H[4];
-    const real t584 = t582 + t583;
-    const real t585 = t581 + t584;
-    const real t586 = t578 + t585;
-    const real t587 = t575 + t586;
-    const real t588 = t572 + t587;
-    const real t589 = t569 + t588;
-    const real t590 = t198 * t518;
-    const real t591 = H[4] * d_H[0];
-    const real t592 = H[0] * d_H[4];
-    const real t593 = t591 + t592;
-    const real t594 = H[9] * d_H[5];
-    const real t595 = H[5] * d_H[9];
-    const real t596 = t594 + t595;
-    const real t597 = t593 + t596;
-    const real t598 = H[14] * d_H[10];
-    const real t599 = H[10] * d_H[14];
-    const real t600 = t598 + t599;
-    const real t601 = t597 + t600;
-    const real t602 = H[19] * d_H[15];
-    const real t603 = H[15] * d_H[19];
-    const real t604 = t602 + t603;
-    const real t605 = t601 + t604;
-    const real t606 = H[24] * d_H[20];
-    const real t607 = H[20] * d_H[24];
-    const real t608 = t606 + t607;
-    const real t609 = t605 + t608;
-    const real t610 = H[29] * d_H[25];
-    const real t611 = H[25] * d_H[29];
-    const real t612 = t610 + t611;
-    const real t613 = t609 + t612;
-    const real t614 = t161 * t613;
-    const real t615 = t590 + t614;
-    const real t616 = t589 - t615;
-    const real t617 = t213 * t524;
-    const real t618 = H[29] * d_H[26];
-    const real t619 = H[26] * d_H[29];
-    const real t620 = t618 + t619;
-    const real t621 = H[24] * d_H[21];
-    const real t622 = H[21] * d_H[24];
-    const real t623 = t621 + t622;
-    const real t624 = H[19] * d_H[16];
-    const real t625 = H[16] * d_H[19];
-    const real t626 = t624 + t625;
-    const real t627 = H[14] * d_H[11];
-    const real t628 = H[11] * d_H[14];
-    const real t629 = t627 + t628;
-    const real t630 = H[9] * d_H[6];
-    const real t631 = H[6] * d_H[9];
-    const real t632 = t630 + t631;
-    const real t633 = H[4] * d_H[1];
-    const real t634 = H[1] * d_H[4];
-    const real t635 = t633 + t634;
-    const real t636 = t632 + t635;
-    const real t637 = t629 + t636;
-    const real t638 = t626 + t637;
-    const real t639 = t623 + t638;
-    const real t640 = t620 + t639;
-    const real t641 = t198 * t303;
-    const real t642 = t56 * t613;
-    const real t643 = t641 + t642;
-    const real t644 = t640 - t643;
-    const real t645 = t164 * t644;
-    const real t646 = t617 + t645;
-    const real t647 = t616 - t646;
-    const real t648 = t230 * t513;
-    const real t649 = H[29] * d_H[27];
-    const real t650 = H[27] * d_H[29];
-    const real t651 = t649 + t650;
-    const real t652 = H[24] * d_H[22];
-    const real t653 = H[22] * d_H[24];
-    const real t654 = t652 + t653;
-    const real t655 = H[19] * d_H[17];
-    const real t656 = H[17] * d_H[19];
-    const real t657 = t655 + t656;
-    const real t658 = H[14] * d_H[12];
-    const real t659 = H[12] * d_H[14];
-    const real t660 = t658 + t659;
-    const real t661 = H[9] * d_H[7];
-    const real t662 = H[7] * d_H[9];
-    const real t663 = t661 + t662;
-    const real t664 = H[4] * d_H[2];
-    const real t665 = H[2] * d_H[4];
-    const real t666 = t664 + t665;
-    const real t667 = t663 + t666;
-    const real t668 = t660 + t667;
-    const real t669 = t657 + t668;
-    const real t670 = t654 + t669;
-    const real t671 = t651 + t670;
-    const real t672 = t198 * t392;
-    const real t673 = t99 * t613;
-    const real t674 = t672 + t673;
-    const real t675 = t671 - t674;
-    const real t676 = t213 * t387;
-    const real t677 = t87 * t644;
-    const real t678 = t676 + t677;
-    const real t679 = t675 - t678;
-    const real t680 = t149 * t679;
-    const real t681 = t648 + t680;
-    const real t682 = t647 - t681;
-    const real t683 = t169 * t682;
-    const real t684 = t232 * t564;
-    const real t685 = t683 - t684;
-    const real t686 = t265 * t685;
-    const real t687 = t245 * d_H[0];
-    const real t688 = t11 * t613;
-    const real t689 = t198 * t31;
-    const real t690 = t688 - t689;
-    const real t691 = H[0] * t690;
-    const real t692 = t687 + t691;
-    const real t693 = d_H[4] - t692;
-    const real t694 = t59 * t644;
-    const real t695 = t213 * t332;
-    const real t696 = t694 - t695;
-    const real t697 = t61 * t696;
-    const real t698 = t248 * t308;
-    const real t699 = t697 + t698;
-    const real t700 = t693 - t699;
-    const real t701 = t104 * t679;
-    const real t702 = t230 * t427;
-    const real t703 = t701 - t702;
-    const real t704 = t108 * t703;
-    const real t705 = t251 * t399;
-    const real t706 = t704 + t705;
-    const real t707 = t700 - t706;
-    const real t708 = t175 * t685;
-    const real t709 = t233 * t532;
-    const real t710 = t708 + t709;
-    const real t711 = t707 - t710;
-    const real t712 = t256 * t711;
-    const real t713 = H[29] * d_H[29];
-    const real t714 = t713 + t713;
-    const real t715 = H[24] * d_H[24];
-    const real t716 = t715 + t715;
-    const real t717 = H[19] * d_H[19];
-    const real t718 = t717 + t717;
-    const real t719 = H[14] * d_H[14];
-    const real t720 = t719 + t719;
-    const real t721 = H[9] * d_H[9];
-    const real t722 = t721 + t721;
-    const real t723 = H[4] * d_H[4];
-    const real t724 = t723 + t723;
-    const real t725 = t722 + t724;
-    const real t726 = t720 + t725;
-    const real t727 = t718 + t726;
-    const real t728 = t716 + t727;
-    const real t729 = t714 + t728;
-    const real t730 = t245 * t613;
-    const real t731 = t198 * t690;
-    const real t732 = t730 + t731;
-    const real t733 = t729 - t732;
-    const real t734 = t248 * t644;
-    const real t735 = t213 * t696;
-    const real t736 = t734 + t735;
-    const real t737 = t733 - t736;
-    const real t738 = t251 * t679;
-    const real t739 = t230 * t703;
-    const real t740 = t738 + t739;
-    const real t741 = t737 - t740;
-    const real t742 = t233 * t682;
-    const real t743 = t232 * t685;
-    const real t744 = t742 + t743;
-    const real t745 = t741 - t744;
-    const real t746 = t256 * t745;
-    const real t747 = t746 / t255;
-    const real t748 = t264 * t747;
-    const real t749 = t712 - t748;
-    const real t750 = t233 * t749;
-    const real t751 = t686 + t750;
-    const real t752 = t566 - t751;
-    const real t753 = t149 * t752;
-    const real t754 = t514 + t753;
-    const real t755 = t429 - t754;
-    const real t756 = t265 * t703;
-    const real t757 = t251 * t749;
-    const real t758 = t756 + t757;
-    const real t759 = t755 - t758;
-    const real t760 = t87 * t759;
-    const real t761 = t388 + t760;
-    const real t762 = t334 - t761;
-    const real t763 = t267 * t524;
-    const real t764 = t164 * t752;
-    const real t765 = t763 + t764;
-    const real t766 = t762 - t765;
-    const real t767 = t265 * t696;
-    const real t768 = t248 * t749;
-    const real t769 = t767 + t768;
-    const real t770 = t766 - t769;
-    const real t771 = t56 * t770;
-    const real t772 = t304 + t771;
-    const real t773 = t33 - t772;
-    const real t774 = t271 * t392;
-    const real t775 = t99 * t759;
-    const real t776 = t774 + t775;
-    const real t777 = t773 - t776;
-    const real t778 = t267 * t518;
-    const real t779 = t161 * t752;
-    const real t780 = t778 + t779;
-    const real t781 = t777 - t780;
-    const real t782 = t265 * t690;
-    const real t783 = t245 * t749;
-    const real t784 = t782 + t783;
-    const real t785 = t781 - t784;
-    d_W[0] = t785;
-    const real t786 = t11 * d_H[5];
-    const real t787 = H[5] * t31;
-    const real t788 = t786 - t787;
-    const real t789 = H[5] * t56;
-    const real t790 = H[6] - t789;
-    const real t791 = t59 * t790;
-    const real t792 = H[5] * t99;
-    const real t793 = H[7] - t792;
-    const real t794 = t87 * t790;
-    const real t795 = t793 - t794;
-    const real t796 = t104 * t795;
-    const real t797 = H[5] * t161;
-    const real t798 = H[8] - t797;
-    const real t799 = t164 * t790;
-    const real t800 = t798 - t799;
-    const real t801 = t149 * t795;
-    const real t802 = t800 - t801;
-    const real t803 = t169 * t802;
-    const real t804 = H[5] * t245;
-    const real t805 = H[9] - t804;
-    const real t806 = t248 * t790;
-    const real t807 = t805 - t806;
-    const real t808 = t251 * t795;
-    const real t809 = t807 - t808;
-    const real t810 = t233 * t802;
-    const real t811 = t809 - t810;
-    const real t812 = t256 * t811;
-    const real t813 = t233 * t812;
-    const real t814 = t803 - t813;
-    const real t815 = t149 * t814;
-    const real t816 = t796 - t815;
-    const real t817 = t251 * t812;
-    const real t818 = t816 - t817;
-    const real t819 = t87 * t818;
-    const real t820 = t791 - t819;
-    const real t821 = t164 * t814;
-    const real t822 = t820 - t821;
-    const real t823 = t248 * t812;
-    const real t824 = t822 - t823;
-    const real t825 = t824 * t303;
-    const real t826 = t56 * d_H[5];
-    const real t827 = H[5] * t303;
-    const real t828 = t826 + t827;
-    const real t829 = d_H[6] - t828;
-    const real t830 = t59 * t829;
-    const real t831 = t790 * t332;
-    const real t832 = t830 - t831;
-    const real t833 = t818 * t387;
-    const real t834 = t99 * d_H[5];
-    const real t835 = H[5] * t392;
-    const real t836 = t834 + t835;
-    const real t837 = d_H[7] - t836;
-    const real t838 = t790 * t387;
-    const real t839 = t87 * t829;
-    const real t840 = t838 + t839;
-    const real t841 = t837 - t840;
-    const real t842 = t104 * t841;
-    const real t843 = t795 * t427;
-    const real t844 = t842 - t843;
-    const real t845 = t814 * t513;
-    const real t846 = t161 * d_H[5];
-    const real t847 = H[5] * t518;
-    const real t848 = t846 + t847;
-    const real t849 = d_H[8] - t848;
-    const real t850 = t790 * t524;
-    const real t851 = t164 * t829;
-    const real t852 = t850 + t851;
-    const real t853 = t849 - t852;
-    const real t854 = t795 * t513;
-    const real t855 = t149 * t841;
-    const real t856 = t854 + t855;
-    const real t857 = t853 - t856;
-    const real t858 = t169 * t857;
-    const real t859 = t802 * t564;
-    const real t860 = t858 - t859;
-    const real t861 = t812 * t685;
-    const real t862 = t245 * d_H[5];
-    const real t863 = H[5] * t690;
-    const real t864 = t862 + t863;
-    const real t865 = d_H[9] - t864;
-    const real t866 = t790 * t696;
-    const real t867 = t248 * t829;
-    const real t868 = t866 + t867;
-    const real t869 = t865 - t868;
-    const real t870 = t795 * t703;
-    const real t871 = t251 * t841;
-    const real t872 = t870 + t871;
-    const real t873 = t869 - t872;
-    const real t874 = t802 * t685;
-    const real t875 = t233 * t857;
-    const real t876 = t874 + t875;
-    const real t877 = t873 - t876;
-    const real t878 = t256 * t877;
-    const real t879 = t811 * t747;
-    const real t880 = t878 - t879;
-    const real t881 = t233 * t880;
-    const real t882 = t861 + t881;
-    const real t883 = t860 - t882;
-    const real t884 = t149 * t883;
-    const real t885 = t845 + t884;
-    const real t886 = t844 - t885;
-    const real t887 = t812 * t703;
-    const real t888 = t251 * t880;
-    const real t889 = t887 + t888;
-    const real t890 = t886 - t889;
-    const real t891 = t87 * t890;
-    const real t892 = t833 + t891;
-    const real t893 = t832 - t892;
-    const real t894 = t814 * t524;
-    const real t895 = t164 * t883;
-    const real t896 = t894 + t895;
-    const real t897 = t893 - t896;
-    const real t898 = t812 * t696;
-    const real t899 = t248 * t880;
-    const real t900 = t898 + t899;
-    const real t901 = t897 - t900;
-    const real t902 = t56 * t901;
-    const real t903 = t825 + t902;
-    const real t904 = t788 - t903;
-    const real t905 = t818 * t392;
-    const real t906 = t99 * t890;
-    const real t907 = t905 + t906;
-    const real t908 = t904 - t907;
-    const real t909 = t814 * t518;
-    const real t910 = t161 * t883;
-    const real t911 = t909 + t910;
-    const real t912 = t908 - t911;
-    const real t913 = t812 * t690;
-    const real t914 = t245 * t880;
-    const real t915 = t913 + t914;
-    const real t916 = t912 - t915;
-    d_W[1] = t916;
-    const real t917 = t11 * d_H[10];
-    const real t918 = H[10] * t31;
-    const real t919 = t917 - t918;
-    const real t920 = H[10] * t56;
-    const real t921 = H[11] - t920;
-    const real t922 = t59 * t921;
-    const real t923 = H[10] * t99;
-    const real t924 = H[12] - t923;
-    const real t925 = t87 * t921;
-    const real t926 = t924 - t925;
-    const real t927 = t104 * t926;
-    const real t928 = H[10] * t161;
-    const real t929 = H[13] - t928;
-    const real t930 = t164 * t921;
-    const real t931 = t929 - t930;
-    const real t932 = t149 * t926;
-    const real t933 = t931 - t932;
-    const real t934 = t169 * t933;
-    const real t935 = H[10] * t245;
-    const real t936 = H[14] - t935;
-    const real t937 = t248 * t921;
-    const real t938 = t936 - t937;
-    const real t939 = t251 * t926;
-    const real t940 = t938 - t939;
-    const real t941 = t233 * t933;
-    const real t942 = t940 - t941;
-    const real t943 = t256 * t942;
-    const real t944 = t233 * t943;
-    const real t945 = t934 - t944;
-    const real t946 = t149 * t945;
-    const real t947 = t927 - t946;
-    const real t948 = t251 * t943;
-    const real t949 = t947 - t948;
-    const real t950 = t87 * t949;
-    const real t951 = t922 - t950;
-    const real t952 = t164 * t945;
-    const real t953 = t951 - t952;
-    const real t954 = t248 * t943;
-    const real t955 = t953 - t954;
-    const real t956 = t955 * t303;
-    const real t957 = t56 * d_H[10];
-    const real t958 = H[10] * t303;
-    const real t959 = t957 + t958;
-    const real t960 = d_H[11] - t959;
-    const real t961 = t59 * t960;
-    const real t962 = t921 * t332;
-    const real t963 = t961 - t962;
-    const real t964 = t949 * t387;
-    const real t965 = t99 * d_H[10];
-    const real t966 = H[10] * t392;
-    const real t967 = t965 + t966;
-    const real t968 = d_H[12] - t967;
-    const real t969 = t921 * t387;
-    const real t970 = t87 * t960;
-    const real t971 = t969 + t970;
-    const real t972 = t968 - t971;
-    const real t973 = t104 * t972;
-    const real t974 = t926 * t427;
-    const real t975 = t973 - t974;
-    const real t976 = t945 * t513;
-    const real t977 = t161 * d_H[10];
-    const real t978 = H[10] * t518;
-    const real t979 = t977 + t978;
-    const real t980 = d_H[13] - t979;
-    const real t981 = t921 * t524;
-    const real t982 = t164 * t960;
-    const real t983 = t981 + t982;
-    const real t984 = t980 - t983;
-    const real t985 = t926 * t513;
-    const real t986 = t149 * t972;
-    const real t987 = t985 + t986;
-    const real t988 = t984 - t987;
-    const real t989 = t169 * t988;
-    const real t990 = t933 * t564;
-    const real t991 = t989 - t990;
-    const real t992 = t943 * t685;
-    const real t993 = t245 * d_H[10];
-    const real t994 = H[10] * t690;
-    const real t995 = t993 + t994;
-    const real t996 = d_H[14] - t995;
-    const real t997 = t921 * t696;
-    const real t998 = t248 * t960;
-    const real t999 = t997 + t998;
-    const real t1000 = t996 - t999;
-    const real t1001 = t926 * t703;
-    const real t1002 = t251 * t972;
-    const real t1003 = t1001 + t1002;
-    const real t1004 = t1000 - t1003;
-    const real t1005 = t933 * t685;
-    const real t1006 = t233 * t988;
-    const real t1007 = t1005 + t1006;
-    const real t1008 = t1004 - t1007;
-    const real t1009 = t256 * t1008;
-    const real t1010 = t942 * t747;
-    const real t1011 = t1009 - t1010;
-    const real t1012 = t233 * t1011;
-    const real t1013 = t992 + t1012;
-    const real t1014 = t991 - t1013;
-    const real t1015 = t149 * t1014;
-    const real t1016 = t976 + t1015;
-    const real t1017 = t975 - t1016;
-    const real t1018 = t943 * t703;
-    const real t1019 = t251 * t1011;
-    const real t1020 = t1018 + t1019;
-    const real t1021 = t1017 - t1020;
-    const real t1022 = t87 * t1021;
-    const real t1023 = t964 + t1022;
-    const real t1024 = t963 - t1023;
-    const real t1025 = t945 * t524;
-    const real t1026 = t164 * t1014;
-    const real t1027 = t1025 + t1026;
-    const real t1028 = t1024 - t1027;
-    const real t1029 = t943 * t696;
-    const real t1030 = t248 * t1011;
-    const real t1031 = t1029 + t1030;
-    const real t1032 = t1028 - t1031;
-    const real t1033 = t56 * t1032;
-    const real t1034 = t956 + t1033;
-    const real t1035 = t919 - t1034;
-    const real t1036 = t949 * t392;
-    const real t1037 = t99 * t1021;
-    const real t1038 = t1036 + t1037;
-    const real t1039 = t1035 - t1038;
-    const real t1040 = t945 * t518;
-    const real t1041 = t161 * t1014;
-    const real t1042 = t1040 + t1041;
-    const real t1043 = t1039 - t1042;
-    const real t1044 = t943 * t690;
-    const real t1045 = t245 * t1011;
-    const real t1046 = t1044 + t1045;
-    const real t1047 = t1043 - t1046;
-    d_W[2] = t1047;
-    const real t1048 = t11 * d_H[15];
-    const real t1049 = H[15] * t31;
-    const real t1050 = t1048 - t1049;
-    const real t1051 = H[15] * t56;
-    const real t1052 = H[16] - t1051;
-    const real t1053 = t59 * t1052;
-    const real t1054 = H[15] * t99;
-    const real t1055 = H[17] - t1054;
-    const real t1056 = t87 * t1052;
-    const real t1057 = t1055 - t1056;
-    const real t1058 = t104 * t1057;
-    const real t1059 = H[15] * t161;
-    const real t1060 = H[18] - t1059;
-    const real t1061 = t164 * t1052;
-    const real t1062 = t1060 - t1061;
-    const real t1063 = t149 * t1057;
-    const real t1064 = t1062 - t1063;
-    const real t1065 = t169 * t1064;
-    const real t1066 = H[15] * t245;
-    const real t1067 = H[19] - t1066;
-    const real t1068 = t248 * t1052;
-    const real t1069 = t1067 - t1068;
-    const real t1070 = t251 * t1057;
-    const real t1071 = t1069 - t1070;
-    const real t1072 = t233 * t1064;
-    const real t1073 = t1071 - t1072;
-    const real t1074 = t256 * t1073;
-    const real t1075 = t233 * t1074;
-    const real t1076 = t1065 - t1075;
-    const real t1077 = t149 * t1076;
-    const real t1078 = t1058 - t1077;
-    const real t1079 = t251 * t1074;
-    const real t1080 = t1078 - t1079;
-    const real t1081 = t87 * t1080;
-    const real t1082 = t1053 - t1081;
-    const real t1083 = t164 * t1076;
-    const real t1084 = t1082 - t1083;
-    const real t1085 = t248 * t1074;
-    const real t1086 = t1084 - t1085;
-    const real t1087 = t1086 * t303;
-    const real t1088 = t56 * d_H[15];
-    const real t1089 = H[15] * t303;
-    const real t1090 = t1088 + t1089;
-    const real t1091 = d_H[16] - t1090;
-    const real t1092 = t59 * t1091;
-    const real t1093 = t1052 * t332;
-    const real t1094 = t1092 - t1093;
-    const real t1095 = t1080 * t387;
-    const real t1096 = t99 * d_H[15];
-    const real t1097 = H[15] * t392;
-    const real t1098 = t1096 + t1097;
-    const real t1099 = d_H[17] - t1098;
-    const real t1100 = t1052 * t387;
-    const real t1101 = t87 * t1091;
-    const real t1102 = t1100 + t1101;
-    const real t1103 = t1099 - t1102;
-    const real t1104 = t104 * t1103;
-    const real t1105 = t1057 * t427;
-    const real t1106 = t1104 - t1105;
-    const real t1107 = t1076 * t513;
-    const real t1108 = t161 * d_H[15];
-    const real t1109 = H[15] * t518;
-    const real t1110 = t1108 + t1109;
-    const real t1111 = d_H[18] - t1110;
-    const real t1112 = t1052 * t524;
-    const real t1113 = t164 * t1091;
-    const real t1114 = t1112 + t1113;
-    const real t1115 = t1111 - t1114;
-    const real t1116 = t1057 * t513;
-    const real t1117 = t149 * t1103;
-    const real t1118 = t1116 + t1117;
-    const real t1119 = t1115 - t1118;
-    const real t1120 = t169 * t1119;
-    const real t1121 = t1064 * t564;
-    const real t1122 = t1120 - t1121;
-    const real t1123 = t1074 * t685;
-    const real t1124 = t245 * d_H[15];
-    const real t1125 = H[15] * t690;
-    const real t1126 = t1124 + t1125;
-    const real t1127 = d_H[19] - t1126;
-    const real t1128 = t1052 * t696;
-    const real t1129 = t248 * t1091;
-    const real t1130 = t1128 + t1129;
-    const real t1131 = t1127 - t1130;
-    const real t1132 = t1057 * t703;
-    const real t1133 = t251 * t1103;
-    const real t1134 = t1132 + t1133;
-    const real t1135 = t1131 - t1134;
-    const real t1136 = t1064 * t685;
-    const real t1137 = t233 * t1119;
-    const real t1138 = t1136 + t1137;
-    const real t1139 = t1135 - t1138;
-    const real t1140 = t256 * t1139;
-    const real t1141 = t1073 * t747;
-    const real t1142 = t1140 - t1141;
-    const real t1143 = t233 * t1142;
-    const real t1144 = t1123 + t1143;
-    const real t1145 = t1122 - t1144;
-    const real t1146 = t149 * t1145;
-    const real t1147 = t1107 + t1146;
-    const real t1148 = t1106 - t1147;
-    const real t1149 = t1074 * t703;
-    const real t1150 = t251 * t1142;
-    const real t1151 = t1149 + t1150;
-    const real t1152 = t1148 - t1151;
-    const real t1153 = t87 * t1152;
-    const real t1154 = t1095 + t1153;
-    const real t1155 = t1094 - t1154;
-    const real t1156 = t1076 * t524;
-    const real t1157 = t164 * t1145;
-    const real t1158 = t1156 + t1157;
-    const real t1159 = t1155 - t1158;
-    const real t1160 = t1074 * t696;
-    const real t1161 = t248 * t1142;
-    const real t1162 = t1160 + t1161;
-    const real t1163 = t1159 - t1162;
-    const real t1164 = t56 * t1163;
-    const real t1165 = t1087 + t1164;
-    const real t1166 = t1050 - t1165;
-    const real t1167 = t1080 * t392;
-    const real t1168 = t99 * t1152;
-    const real t1169 = t1167 + t1168;
-    const real t1170 = t1166 - t1169;
-    const real t1171 = t1076 * t518;
-    const real t1172 = t161 * t1145;
-    const real t1173 = t1171 + t1172;
-    const real t1174 = t1170 - t1173;
-    const real t1175 = t1074 * t690;
-    const real t1176 = t245 * t1142;
-    const real t1177 = t1175 + t1176;
-    const real t1178 = t1174 - t1177;
-    d_W[3] = t1178;
-    const real t1179 = t11 * d_H[20];
-    const real t1180 = H[20] * t31;
-    const real t1181 = t1179 - t1180;
-    const real t1182 = H[20] * t56;
-    const real t1183 = H[21] - t1182;
-    const real t1184 = t59 * t1183;
-    const real t1185 = H[20] * t99;
-    const real t1186 = H[22] - t1185;
-    const real t1187 = t87 * t1183;
-    const real t1188 = t1186 - t1187;
-    const real t1189 = t104 * t1188;
-    const real t1190 = H[20] * t161;
-    const real t1191 = H[23] - t1190;
-    const real t1192 = t164 * t1183;
-    const real t1193 = t1191 - t1192;
-    const real t1194 = t149 * t1188;
-    const real t1195 = t1193 - t1194;
-    const real t1196 = t169 * t1195;
-    const real t1197 = H[20] * t245;
-    const real t1198 = H[24] - t1197;
-    const real t1199 = t248 * t1183;
-    const real t1200 = t1198 - t1199;
-    const real t1201 = t251 * t1188;
-    const real t1202 = t1200 - t1201;
-    const real t1203 = t233 * t1195;
-    const real t1204 = t1202 - t1203;
-    const real t1205 = t256 * t1204;
-    const real t1206 = t233 * t1205;
-    const real t1207 = t1196 - t1206;
-    const real t1208 = t149 * t1207;
-    const real t1209 = t1189 - t1208;
-    const real t1210 = t251 * t1205;
-    const real t1211 = t1209 - t1210;
-    const real t1212 = t87 * t1211;
-    const real t1213 = t1184 - t1212;
-    const real t1214 = t164 * t1207;
-    const real t1215 = t1213 - t1214;
-    const real t1216 = t248 * t1205;
-    const real t1217 = t1215 - t1216;
-    const real t1218 = t1217 * t303;
-    const real t1219 = t56 * d_H[20];
-    const real t1220 = H[20] * t303;
-    const real t1221 = t1219 + t1220;
-    const real t1222 = d_H[21] - t1221;
-    const real t1223 = t59 * t1222;
-    const real t1224 = t1183 * t332;
-    const real t1225 = t1223 - t1224;
-    const real t1226 = t1211 * t387;
-    const real t1227 = t99 * d_H[20];
-    const real t1228 = H[20] * t392;
-    const real t1229 = t1227 + t1228;
-    const real t1230 = d_H[22] - t1229;
-    const real t1231 = t1183 * t387;
-    const real t1232 = t87 * t1222;
-    const real t1233 = t1231 + t1232;
-    const real t1234 = t1230 - t1233;
-    const real t1235 = t104 * t1234;
-    const real t1236 = t1188 * t427;
-    const real t1237 = t1235 - t1236;
-    const real t1238 = t1207 * t513;
-    const real t1239 = t161 * d_H[20];
-    const real t1240 = H[20] * t518;
-    const real t1241 = t1239 + t1240;
-    const real t1242 = d_H[23] - t1241;
-    const real t1243 = t1183 * t524;
-    const real t1244 = t164 * t1222;
-    const real t1245 = t1243 + t1244;
-    const real t1246 = t1242 - t1245;
-    const real t1247 = t1188 * t513;
-    const real t1248 = t149 * t1234;
-    const real t1249 = t1247 + t1248;
-    const real t1250 = t1246 - t1249;
-    const real t1251 = t169 * t1250;
-    const real t1252 = t1195 * t564;
-    const real t1253 = t1251 - t1252;
-    const real t1254 = t1205 * t685;
-    const real t1255 = t245 * d_H[20];
-    const real t1256 = H[20] * t690;
-    const real t1257 = t1255 + t1256;
-    const real t1258 = d_H[24] - t1257;
-    const real t1259 = t1183 * t696;
-    const real t1260 = t248 * t1222;
-    const real t1261 = t1259 + t1260;
-    const real t1262 = t1258 - t1261;
-    const real t1263 = t1188 * t703;
-    const real t1264 = t251 * t1234;
-    const real t1265 = t1263 + t1264;
-    const real t1266 = t1262 - t1265;
-    const real t1267 = t1195 * t685;
-    const real t1268 = t233 * t1250;
-    const real t1269 = t1267 + t1268;
-    const real t1270 = t1266 - t1269;
-    const real t1271 = t256 * t1270;
-    const real t1272 = t1204 * t747;
-    const real t1273 = t1271 - t1272;
-    const real t1274 = t233 * t1273;
-    const real t1275 = t1254 + t1274;
-    const real t1276 = t1253 - t1275;
-    const real t1277 = t149 * t1276;
-    const real t1278 = t1238 + t1277;
-    const real t1279 = t1237 - t1278;
-    const real t1280 = t1205 * t703;
-    const real t1281 = t251 * t1273;
-    const real t1282 = t1280 + t1281;
-    const real t1283 = t1279 - t1282;
-    const real t1284 = t87 * t1283;
-    const real t1285 = t1226 + t1284;
-    const real t1286 = t1225 - t1285;
-    const real t1287 = t1207 * t524;
-    const real t1288 = t164 * t1276;
-    const real t1289 = t1287 + t1288;
-    const real t1290 = t1286 - t1289;
-    const real t1291 = t1205 * t696;
-    const real t1292 = t248 * t1273;
-    const real t1293 = t1291 + t1292;
-    const real t1294 = t1290 - t1293;
-    const real t1295 = t56 * t1294;
-    const real t1296 = t1218 + t1295;
-    const real t1297 = t1181 - t1296;
-    const real t1298 = t1211 * t392;
-    const real t1299 = t99 * t1283;
-    const real t1300 = t1298 + t1299;
-    const real t1301 = t1297 - t1300;
-    const real t1302 = t1207 * t518;
-    const real t1303 = t161 * t1276;
-    const real t1304 = t1302 + t1303;
-    const real t1305 = t1301 - t1304;
-    const real t1306 = t1205 * t690;
-    const real t1307 = t245 * t1273;
-    const real t1308 = t1306 + t1307;
-    const real t1309 = t1305 - t1308;
-    d_W[4] = t1309;
-    const real t1310 = t11 * d_H[25];
-    const real t1311 = H[25] * t31;
-    const real t1312 = t1310 - t1311;
-    const real t1313 = H[25] * t56;
-    const real t1314 = H[26] - t1313;
-    const real t1315 = t59 * t1314;
-    const real t1316 = H[25] * t99;
-    const real t1317 = H[27] - t1316;
-    const real t1318 = t87 * t1314;
-    const real t1319 = t1317 - t1318;
-    const real t1320 = t104 * t1319;
-    const real t1321 = H[25] * t161;
-    const real t1322 = H[28] - t1321;
-    const real t1323 = t164 * t1314;
-    const real t1324 = t1322 - t1323;
-    const real t1325 = t149 * t1319;
-    const real t1326 = t1324 - t1325;
-    const real t1327 = t169 * t1326;
-    const real t1328 = H[25] * t245;
-    const real t1329 = H[29] - t1328;
-    const real t1330 = t248 * t1314;
-    const real t1331 = t1329 - t1330;
-    const real t1332 = t251 * t1319;
-    const real t1333 = t1331 - t1332;
-    const real t1334 = t233 * t1326;
-    const real t1335 = t1333 - t1334;
-    const real t1336 = t256 * t1335;
-    const real t1337 = t233 * t1336;
-    const real t1338 = t1327 - t1337;
-    const real t1339 = t149 * t1338;
-    const real t1340 = t1320 - t1339;
-    const real t1341 = t251 * t1336;
-    const real t1342 = t1340 - t1341;
-    const real t1343 = t87 * t1342;
-    const real t1344 = t1315 - t1343;
-    const real t1345 = t164 * t1338;
-    const real t1346 = t1344 - t1345;
-    const real t1347 = t248 * t1336;
-    const real t1348 = t1346 - t1347;
-    const real t1349 = t1348 * t303;
-    const real t1350 = t56 * d_H[25];
-    const real t1351 = H[25] * t303;
-    const real t1352 = t1350 + t1351;
-    const real t1353 = d_H[26] - t1352;
-    const real t1354 = t59 * t1353;
-    const real t1355 = t1314 * t332;
-    const real t1356 = t1354 - t1355;
-    const real t1357 = t1342 * t387;
-    const real t1358 = t99 * d_H[25];
-    const real t1359 = H[25] * t392;
-    const real t1360 = t1358 + t1359;
-    const real t1361 = d_H[27] - t1360;
-    const real t1362 = t1314 * t387;
-    const real t1363 = t87 * t1353;
-    const real t1364 = t1362 + t1363;
-    const real t1365 = t1361 - t1364;
-    const real t1366 = t104 * t1365;
-    const real t1367 = t1319 * t427;
-    const real t1368 = t1366 - t1367;
-    const real t1369 = t1338 * t513;
-    const real t1370 = t161 * d_H[25];
-    const real t1371 = H[25] * t518;
-    const real t1372 = t1370 + t1371;
-    const real t1373 = d_H[28] - t1372;
-    const real t1374 = t1314 * t524;
-    const real t1375 = t164 * t1353;
-    const real t1376 = t1374 + t1375;
-    const real t1377 = t1373 - t1376;
-    const real t1378 = t1319 * t513;
-    const real t1379 = t149 * t1365;
-    const real t1380 = t1378 + t1379;
-    const real t1381 = t1377 - t1380;
-    const real t1382 = t169 * t1381;
-    const real t1383 = t1326 * t564;
-    const real t1384 = t1382 - t1383;
-    const real t1385 = t1336 * t685;
-    const real t1386 = t245 * d_H[25];
-    const real t1387 = H[25] * t690;
-    const real t1388 = t1386 + t1387;
-    const real t1389 = d_H[29] - t1388;
-    const real t1390 = t1314 * t696;
-    const real t1391 = t248 * t1353;
-    const real t1392 = t1390 + t1391;
-    const real t1393 = t1389 - t1392;
-    const real t1394 = t1319 * t703;
-    const real t1395 = t251 * t1365;
-    const real t1396 = t1394 + t1395;
-    const real t1397 = t1393 - t1396;
-    const real t1398 = t1326 * t685;
-    const real t1399 = t233 * t1381;
-    const real t1400 = t1398 + t1399;
-    const real t1401 = t1397 - t1400;
-    const real t1402 = t256 * t1401;
-    const real t1403 = t1335 * t747;
-    const real t1404 = t1402 - t1403;
-    const real t1405 = t233 * t1404;
-    const real t1406 = t1385 + t1405;
-    const real t1407 = t1384 - t1406;
-    const real t1408 = t149 * t1407;
-    const real t1409 = t1369 + t1408;
-    const real t1410 = t1368 - t1409;
-    const real t1411 = t1336 * t703;
-    const real t1412 = t251 * t1404;
-    const real t1413 = t1411 + t1412;
-    const real t1414 = t1410 - t1413;
-    const real t1415 = t87 * t1414;
-    const real t1416 = t1357 + t1415;
-    const real t1417 = t1356 - t1416;
-    const real t1418 = t1338 * t524;
-    const real t1419 = t164 * t1407;
-    const real t1420 = t1418 + t1419;
-    const real t1421 = t1417 - t1420;
-    const real t1422 = t1336 * t696;
-    const real t1423 = t248 * t1404;
-    const real t1424 = t1422 + t1423;
-    const real t1425 = t1421 - t1424;
-    const real t1426 = t56 * t1425;
-    const real t1427 = t1349 + t1426;
-    const real t1428 = t1312 - t1427;
-    const real t1429 = t1342 * t392;
-    const real t1430 = t99 * t1414;
-    const real t1431 = t1429 + t1430;
-    const real t1432 = t1428 - t1431;
-    const real t1433 = t1338 * t518;
-    const real t1434 = t161 * t1407;
-    const real t1435 = t1433 + t1434;
-    const real t1436 = t1432 - t1435;
-    const real t1437 = t1336 * t690;
-    const real t1438 = t245 * t1404;
-    const real t1439 = t1437 + t1438;
-    const real t1440 = t1436 - t1439;
-    d_W[5] = t1440;
-    d_W[6] = t770;
-    d_W[7] = t901;
-    d_W[8] = t1032;
-    d_W[9] = t1163;
-    d_W[10] = t1294;
-    d_W[11] = t1425;
-    d_W[12] = t759;
-    d_W[13] = t890;
-    d_W[14] = t1021;
-    d_W[15] = t1152;
-    d_W[16] = t1283;
-    d_W[17] = t1414;
-    d_W[18] = t752;
-    d_W[19] = t883;
-    d_W[20] = t1014;
-    d_W[21] = t1145;
-    d_W[22] = t1276;
-    d_W[23] = t1407;
-    d_W[24] = t749;
-    d_W[25] = t880;
-    d_W[26] = t1011;
-    d_W[27] = t1142;
-    d_W[28] = t1273;
-    d_W[29] = t1404;
-    const real t1441 = sqrt(t10);
-    const real t1442 = fabs(H[0]);
-    const real t1443 = t1441 + t1442;
-    const real t1444 = t1441 * t1443;
-    const real t1445 = 0.0 < t1444;
-    const real t1446 = 1.0 / t1444;
-    const real t1447 = t1445 != 0 ? t1446 : 0.0;
-    const real t1448 = H[0] < 0.0;
-    const real t1449 = -t1441;
-    const real t1450 = t1448 != 0 ? t1449 : t1441;
-    const real t1451 = H[0] + t1450;
-    const real t1452 = H[4] * t1451;
-    const real t1453 = t192 + t1452;
-    const real t1454 = t191 + t1453;
-    const real t1455 = t190 + t1454;
-    const real t1456 = t189 + t1455;
-    const real t1457 = t188 + t1456;
-    const real t1458 = t1447 * t1457;
-    const real t1459 = H[25] * t1458;
-    const real t1460 = H[29] - t1459;
-    const real t1461 = H[1] * t1451;
-    const real t1462 = t49 + t1461;
-    const real t1463 = t48 + t1462;
-    const real t1464 = t47 + t1463;
-    const real t1465 = t46 + t1464;
-    const real t1466 = t45 + t1465;
-    const real t1467 = t1447 * t1466;
-    const real t1468 = H[25] * t1467;
-    const real t1469 = H[26] - t1468;
-    const real t1470 = t1469 * t1469;
-    const real t1471 = H[20] * t1467;
-    const real t1472 = H[21] - t1471;
-    const real t1473 = t1472 * t1472;
-    const real t1474 = H[15] * t1467;
-    const real t1475 = H[16] - t1474;
-    const real t1476 = t1475 * t1475;
-    const real t1477 = H[5] * t1467;
-    const real t1478 = H[6] - t1477;
-    const real t1479 = t1478 * t1478;
-    const real t1480 = H[10] * t1467;
-    const real t1481 = H[11] - t1480;
-    const real t1482 = t1481 * t1481;
-    const real t1483 = t1479 + t1482;
-    const real t1484 = t1476 + t1483;
-    const real t1485 = t1473 + t1484;
-    const real t1486 = t1470 + t1485;
-    const real t1487 = sqrt(t1486);
-    const real t1488 = fabs(t1478);
-    const real t1489 = t1487 + t1488;
-    const real t1490 = t1487 * t1489;
-    const real t1491 = 0.0 < t1490;
-    const real t1492 = 1.0 / t1490;
-    const real t1493 = t1491 != 0 ? t1492 : 0.0;
-    const real t1494 = t1460 * t1469;
-    const real t1495 = H[20] * t1458;
-    const real t1496 = H[24] - t1495;
-    const real t1497 = t1472 * t1496;
-    const real t1498 = H[15] * t1458;
-    const real t1499 = H[19] - t1498;
-    const real t1500 = t1475 * t1499;
-    const real t1501 = H[5] * t1458;
-    const real t1502 = H[9] - t1501;
-    const real t1503 = t1478 < 0.0;
-    const real t1504 = -t1487;
-    const real t1505 = t1503 != 0 ? t1504 : t1487;
-    const real t1506 = t1478 + t1505;
-    const real t1507 = t1502 * t1506;
-    const real t1508 = H[10] * t1458;
-    const real t1509 = H[14] - t1508;
-    const real t1510 = t1481 * t1509;
-    const real t1511 = t1507 + t1510;
-    const real t1512 = t1500 + t1511;
-    const real t1513 = t1497 + t1512;
-    const real t1514 = t1494 + t1513;
-    const real t1515 = t1493 * t1514;
-    const real t1516 = t1469 * t1515;
-    const real t1517 = t1460 - t1516;
-    const real t1518 = H[2] * t1451;
-    const real t1519 = t78 + t1518;
-    const real t1520 = t77 + t1519;
-    const real t1521 = t76 + t1520;
-    const real t1522 = t75 + t1521;
-    const real t1523 = t74 + t1522;
-    const real t1524 = t1447 * t1523;
-    const real t1525 = H[25] * t1524;
-    const real t1526 = H[27] - t1525;
-    const real t1527 = t1469 * t1526;
-    const real t1528 = H[20] * t1524;
-    const real t1529 = H[22] - t1528;
-    const real t1530 = t1472 * t1529;
-    const real t1531 = H[15] * t1524;
-    const real t1532 = H[17] - t1531;
-    const real t1533 = t1475 * t1532;
-    const real t1534 = H[5] * t1524;
-    const real t1535 = H[7] - t1534;
-    const real t1536 = t1506 * t1535;
-    const real t1537 = H[10] * t1524;
-    const real t1538 = H[12] - t1537;
-    const real t1539 = t1481 * t1538;
-    const real t1540 = t1536 + t1539;
-    const real t1541 = t1533 + t1540;
-    const real t1542 = t1530 + t1541;
-    const real t1543 = t1527 + t1542;
-    const real t1544 = t1493 * t1543;
-    const real t1545 = t1469 * t1544;
-    const real t1546 = t1526 - t1545;
-    const real t1547 = t1546 * t1546;
-    const real t1548 = t1472 * t1544;
-    const real t1549 = t1529 - t1548;
-    const real t1550 = t1549 * t1549;
-    const real t1551 = t1481 * t1544;
-    const real t1552 = t1538 - t1551;
-    const real t1553 = t1552 * t1552;
-    const real t1554 = t1475 * t1544;
-    const real t1555 = t1532 - t1554;
-    const real t1556 = t1555 * t1555;
-    const real t1557 = t1553 + t1556;
-    const real t1558 = t1550 + t1557;
-    const real t1559 = t1547 + t1558;
-    const real t1560 = sqrt(t1559);
-    const real t1561 = fabs(t1552);
-    const real t1562 = t1560 + t1561;
-    const real t1563 = t1560 * t1562;
-    const real t1564 = 0.0 < t1563;
-    const real t1565 = 1.0 / t1563;
-    const real t1566 = t1564 != 0 ? t1565 : 0.0;
-    const real t1567 = t1517 * t1546;
-    const real t1568 = t1472 * t1515;
-    const real t1569 = t1496 - t1568;
-    const real t1570 = t1549 * t1569;
-    const real t1571 = t1481 * t1515;
-    const real t1572 = t1509 - t1571;
-    const real t1573 = t1552 < 0.0;
-    const real t1574 = -t1560;
-    const real t1575 = t1573 != 0 ? t1574 : t1560;
-    const real t1576 = t1552 + t1575;
-    const real t1577 = t1572 * t1576;
-    const real t1578 = t1475 * t1515;
-    const real t1579 = t1499 - t1578;
-    const real t1580 = t1555 * t1579;
-    const real t1581 = t1577 + t1580;
-    const real t1582 = t1570 + t1581;
-    const real t1583 = t1567 + t1582;
-    const real t1584 = t1566 * t1583;
-    const real t1585 = t1546 * t1584;
-    const real t1586 = t1517 - t1585;
-    const real t1587 = H[3] * t1451;
-    const real t1588 = t125 + t1587;
-    const real t1589 = t124 + t1588;
-    const real t1590 = t123 + t1589;
-    const real t1591 = t122 + t1590;
-    const real t1592 = t121 + t1591;
-    const real t1593 = t1447 * t1592;
-    const real t1594 = H[25] * t1593;
-    const real t1595 = H[28] - t1594;
-    const real t1596 = t1469 * t1595;
-    const real t1597 = H[20] * t1593;
-    const real t1598 = H[23] - t1597;
-    const real t1599 = t1472 * t1598;
-    const real t1600 = H[15] * t1593;
-    const real t1601 = H[18] - t1600;
-    const real t1602 = t1475 * t1601;
-    const real t1603 = H[5] * t1593;
-    const real t1604 = H[8] - t1603;
-    const real t1605 = t1506 * t1604;
-    const real t1606 = H[10] * t1593;
-    const real t1607 = H[13] - t1606;
-    const real t1608 = t1481 * t1607;
-    const real t1609 = t1605 + t1608;
-    const real t1610 = t1602 + t1609;
-    const real t1611 = t1599 + t1610;
-    const real t1612 = t1596 + t1611;
-    const real t1613 = t1493 * t1612;
-    const real t1614 = t1469 * t1613;
-    const real t1615 = t1595 - t1614;
-    const real t1616 = t1546 * t1615;
-    const real t1617 = t1472 * t1613;
-    const real t1618 = t1598 - t1617;
-    const real t1619 = t1549 * t1618;
-    const real t1620 = t1481 * t1613;
-    const real t1621 = t1607 - t1620;
-    const real t1622 = t1576 * t1621;
-    const real t1623 = t1475 * t1613;
-    const real t1624 = t1601 - t1623;
-    const real t1625 = t1555 * t1624;
-    const real t1626 = t1622 + t1625;
-    const real t1627 = t1619 + t1626;
-    const real t1628 = t1616 + t1627;
-    const real t1629 = t1566 * t1628;
-    const real t1630 = t1546 * t1629;
-    const real t1631 = t1615 - t1630;
-    const real t1632 = t1631 * t1631;
-    const real t1633 = t1555 * t1629;
-    const real t1634 = t1624 - t1633;
-    const real t1635 = t1634 * t1634;
-    const real t1636 = t1549 * t1629;
-    const real t1637 = t1618 - t1636;
-    const real t1638 = t1637 * t1637;
-    const real t1639 = t1635 + t1638;
-    const real t1640 = t1632 + t1639;
-    const real t1641 = sqrt(t1640);
-    const real t1642 = fabs(t1634);
-    const real t1643 = t1641 + t1642;
-    const real t1644 = t1641 * t1643;
-    const real t1645 = 0.0 < t1644;
-    const real t1646 = 1.0 / t1644;
-    const real t1647 = t1645 != 0 ? t1646 : 0.0;
-    const real t1648 = t1586 * t1631;
-    const real t1649 = t1555 * t1584;
-    const real t1650 = t1579 - t1649;
-    const real t1651 = t1634 < 0.0;
-    const real t1652 = -t1641;
-    const real t1653 = t1651 != 0 ? t1652 : t1641;
-    const real t1654 = t1634 + t1653;
-    const real t1655 = t1650 * t1654;
-    const real t1656 = t1549 * t1584;
-    const real t1657 = t1569 - t1656;
-    const real t1658 = t1637 * t1657;
-    const real t1659 = t1655 + t1658;
-    const real t1660 = t1648 + t1659;
-    const real t1661 = t1647 * t1660;
-    const real t1662 = t1631 * t1661;
-    const real t1663 = t1586 - t1662;
-    const real t1664 = t1663 * t1663;
-    const real t1665 = t1637 * t1661;
-    const real t1666 = t1657 - t1665;
-    const real t1667 = t1666 * t1666;
-    const real t1668 = t1664 + t1667;
-    const real t1669 = sqrt(t1668);
-    const real t1670 = fabs(t1666);
-    const real t1671 = t1669 + t1670;
-    const real t1672 = t1669 * t1671;
-    const real t1673 = 0.0 < t1672;
-    const real t1674 = 1.0 / t1672;
-    const real t1675 = t1673 != 0 ? t1674 : 0.0;
-    const real t1676 = t1664 * t1675;
-    const real t1677 = 1.0 - t1676;
-    const real t1678 = t1631 * t1677;
-    const real t1679 = t1666 < 0.0;
-    const real t1680 = -t1669;
-    const real t1681 = t1679 != 0 ? t1680 : t1669;
-    const real t1682 = t1666 + t1681;
-    const real t1683 = t1675 * t1682;
-    const real t1684 = t1663 * t1683;
-    const real t1685 = t1637 * t1684;
-    const real t1686 = t1678 - t1685;
-    const real t1687 = t1647 * t1686;
-    const real t1688 = t1631 * t1687;
-    const real t1689 = t1677 - t1688;
-    const real t1690 = t1546 * t1689;
-    const real t1691 = t1654 * t1687;
-    const real t1692 = t1555 * t1691;
-    const real t1693 = t1637 * t1687;
-    const real t1694 = t1684 + t1693;
-    const real t1695 = t1549 * t1694;
-    const real t1696 = t1692 + t1695;
-    const real t1697 = t1690 - t1696;
-    const real t1698 = t1566 * t1697;
-    const real t1699 = t1546 * t1698;
-    const real t1700 = t1689 - t1699;
-    const real t1701 = t1469 * t1700;
-    const real t1702 = t1549 * t1698;
-    const real t1703 = t1694 + t1702;
-    const real t1704 = t1472 * t1703;
-    const real t1705 = t1576 * t1698;
-    const real t1706 = t1481 * t1705;
-    const real t1707 = t1555 * t1698;
-    const real t1708 = t1691 + t1707;
-    const real t1709 = t1475 * t1708;
-    const real t1710 = t1706 + t1709;
-    const real t1711 = t1704 + t1710;
-    const real t1712 = t1701 - t1711;
-    const real t1713 = t1493 * t1712;
-    const real t1714 = t1469 * t1713;
-    const real t1715 = t1700 - t1714;
-    const real t1716 = H[25] * t1715;
-    const real t1717 = t1472 * t1713;
-    const real t1718 = t1703 + t1717;
-    const real t1719 = H[20] * t1718;
-    const real t1720 = t1475 * t1713;
-    const real t1721 = t1708 + t1720;
-    const real t1722 = H[15] * t1721;
-    const real t1723 = t1506 * t1713;
-    const real t1724 = H[5] * t1723;
-    const real t1725 = t1481 * t1713;
-    const real t1726 = t1705 + t1725;
-    const real t1727 = H[10] * t1726;
-    const real t1728 = t1724 + t1727;
-    const real t1729 = t1722 + t1728;
-    const real t1730 = t1719 + t1729;
-    const real t1731 = t1716 - t1730;
-    const real t1732 = t1447 * t1731;
-    const real t1733 = t1441 * 2.0;
-    const real t1734 = t29 / t1733;
-    const real t1735 = -t1734;
-    const real t1736 = t1448 != 0 ? t1735 : t1734;
-    const real t1737 = d_H[0] + t1736;
-    const real t1738 = t1732 * t1737;
-    const real t1739 = t1443 * t1734;
-    const real t1740 = H[0] > 0 ? 1 : (H[0] < 0 ? -1 : H[0]);
-    const real t1741 = d_H[0] * t1740;
-    const real t1742 = t1734 + t1741;
-    const real t1743 = t1441 * t1742;
-    const real t1744 = t1739 + t1743;
-    const real t1745 = t1446 * t1744;
-    const real t1746 = t1745 / t1444;
-    const real t1747 = -t1746;
-    const real t1748 = t1445 != 0 ? t1747 : 0.0;
-    const real t1749 = t1731 * t1748;
-    const real t1750 = t1715 * d_H[25];
-    const real t1751 = t1458 * d_H[25];
-    const real t1752 = t1457 * t1748;
-    const real t1753 = t1451 * d_H[4];
-    const real t1754 = H[4] * t1737;
-    const real t1755 = t1753 + t1754;
-    const real t1756 = t596 + t1755;
-    const real t1757 = t600 + t1756;
-    const real t1758 = t604 + t1757;
-    const real t1759 = t608 + t1758;
-    const real t1760 = t612 + t1759;
-    const real t1761 = t1447 * t1760;
-    const real t1762 = t1752 + t1761;
-    const real t1763 = H[25] * t1762;
-    const real t1764 = t1751 + t1763;
-    const real t1765 = d_H[29] - t1764;
-    const real t1766 = t1467 * d_H[25];
-    const real t1767 = t1466 * t1748;
-    const real t1768 = t1451 * d_H[1];
-    const real t1769 = H[1] * t1737;
-    const real t1770 = t1768 + t1769;
-    const real t1771 = t283 + t1770;
-    const real t1772 = t287 + t1771;
-    const real t1773 = t291 + t1772;
-    const real t1774 = t295 + t1773;
-    const real t1775 = t299 + t1774;
-    const real t1776 = t1447 * t1775;
-    const real t1777 = t1767 + t1776;
-    const real t1778 = H[25] * t1777;
-    const real t1779 = t1766 + t1778;
-    const real t1780 = d_H[26] - t1779;
-    const real t1781 = t1515 * t1780;
-    const real t1782 = t1467 * d_H[10];
-    const real t1783 = H[10] * t1777;
-    const real t1784 = t1782 + t1783;
-    const real t1785 = d_H[11] - t1784;
-    const real t1786 = t1481 * t1785;
-    const real t1787 = t1786 + t1786;
-    const real t1788 = t1467 * d_H[5];
-    const real t1789 = H[5] * t1777;
-    const real t1790 = t1788 + t1789;
-    const real t1791 = d_H[6] - t1790;
-    const real t1792 = t1478 * t1791;
-    const real t1793 = t1792 + t1792;
-    const real t1794 = t1787 + t1793;
-    const real t1795 = t1467 * d_H[15];
-    const real t1796 = H[15] * t1777;
-    const real t1797 = t1795 + t1796;
-    const real t1798 = d_H[16] - t1797;
-    const real t1799 = t1475 * t1798;
-    const real t1800 = t1799 + t1799;
-    const real t1801 = t1794 + t1800;
-    const real t1802 = t1467 * d_H[20];
-    const real t1803 = H[20] * t1777;
-    const real t1804 = t1802 + t1803;
-    const real t1805 = d_H[21] - t1804;
-    const real t1806 = t1472 * t1805;
-    const real t1807 = t1806 + t1806;
-    const real t1808 = t1801 + t1807;
-    const real t1809 = t1469 * t1780;
-    const real t1810 = t1809 + t1809;
-    const real t1811 = t1808 + t1810;
-    const real t1812 = t1487 * 2.0;
-    const real t1813 = t1811 / t1812;
-    const real t1814 = t1489 * t1813;
-    const real t1815 = t1478 > 0 ? 1 : (t1478 < 0 ? -1 : t1478);
-    const real t1816 = t1791 * t1815;
-    const real t1817 = t1813 + t1816;
-    const real t1818 = t1487 * t1817;
-    const real t1819 = t1814 + t1818;
-    const real t1820 = t1492 * t1819;
-    const real t1821 = t1820 / t1490;
-    const real t1822 = -t1821;
-    const real t1823 = t1491 != 0 ? t1822 : 0.0;
-    const real t1824 = t1514 * t1823;
-    const real t1825 = t1509 * t1785;
-    const real t1826 = t1458 * d_H[10];
-    const real t1827 = H[10] * t1762;
-    const real t1828 = t1826 + t1827;
-    const real t1829 = d_H[14] - t1828;
-    const real t1830 = t1481 * t1829;
-    const real t1831 = t1825 + t1830;
-    const real t1832 = t1458 * d_H[5];
-    const real t1833 = H[5] * t1762;
-    const real t1834 = t1832 + t1833;
-    const real t1835 = d_H[9] - t1834;
-    const real t1836 = t1506 * t1835;
-    const real t1837 = -t1813;
-    const real t1838 = t1503 != 0 ? t1837 : t1813;
-    const real t1839 = t1791 + t1838;
-    const real t1840 = t1502 * t1839;
-    const real t1841 = t1836 + t1840;
-    const real t1842 = t1831 + t1841;
-    const real t1843 = t1499 * t1798;
-    const real t1844 = t1458 * d_H[15];
-    const real t1845 = H[15] * t1762;
-    const real t1846 = t1844 + t1845;
-    const real t1847 = d_H[19] - t1846;
-    const real t1848 = t1475 * t1847;
-    const real t1849 = t1843 + t1848;
-    const real t1850 = t1842 + t1849;
-    const real t1851 = t1496 * t1805;
-    const real t1852 = t1458 * d_H[20];
-    const real t1853 = H[20] * t1762;
-    const real t1854 = t1852 + t1853;
-    const real t1855 = d_H[24] - t1854;
-    const real t1856 = t1472 * t1855;
-    const real t1857 = t1851 + t1856;
-    const real t1858 = t1850 + t1857;
-    const real t1859 = t1469 * t1765;
-    const real t1860 = t1460 * t1780;
-    const real t1861 = t1859 + t1860;
-    const real t1862 = t1858 + t1861;
-    const real t1863 = t1493 * t1862;
-    const real t1864 = t1824 + t1863;
-    const real t1865 = t1469 * t1864;
-    const real t1866 = t1781 + t1865;
-    const real t1867 = t1765 - t1866;
-    const real t1868 = t1524 * d_H[25];
-    const real t1869 = t1523 * t1748;
-    const real t1870 = t1451 * d_H[2];
-    const real t1871 = H[2] * t1737;
-    const real t1872 = t1870 + t1871;
-    const real t1873 = t364 + t1872;
-    const real t1874 = t368 + t1873;
-    const real t1875 = t372 + t1874;
-    const real t1876 = t376 + t1875;
-    const real t1877 = t380 + t1876;
-    const real t1878 = t1447 * t1877;
-    const real t1879 = t1869 + t1878;
-    const real t1880 = H[25] * t1879;
-    const real t1881 = t1868 + t1880;
-    const real t1882 = d_H[27] - t1881;
-    const real t1883 = t1544 * t1780;
-    const real t1884 = t1543 * t1823;
-    const real t1885 = t1538 * t1785;
-    const real t1886 = t1524 * d_H[10];
-    const real t1887 = H[10] * t1879;
-    const real t1888 = t1886 + t1887;
-    const real t1889 = d_H[12] - t1888;
-    const real t1890 = t1481 * t1889;
-    const real t1891 = t1885 + t1890;
-    const real t1892 = t1535 * t1839;
-    const real t1893 = t1524 * d_H[5];
-    const real t1894 = H[5] * t1879;
-    const real t1895 = t1893 + t1894;
-    const real t1896 = d_H[7] - t1895;
-    const real t1897 = t1506 * t1896;
-    const real t1898 = t1892 + t1897;
-    const real t1899 = t1891 + t1898;
-    const real t1900 = t1532 * t1798;
-    const real t1901 = t1524 * d_H[15];
-    const real t1902 = H[15] * t1879;
-    const real t1903 = t1901 + t1902;
-    const real t1904 = d_H[17] - t1903;
-    const real t1905 = t1475 * t1904;
-    const real t1906 = t1900 + t1905;
-    const real t1907 = t1899 + t1906;
-    const real t1908 = t1529 * t1805;
-    const real t1909 = t1524 * d_H[20];
-    const real t1910 = H[20] * t1879;
-    const real t1911 = t1909 + t1910;
-    const real t1912 = d_H[22] - t1911;
-    const real t1913 = t1472 * t1912;
-    const real t1914 = t1908 + t1913;
-    const real t1915 = t1907 + t1914;
-    const real t1916 = t1526 * t1780;
-    const real t1917 = t1469 * t1882;
-    const real t1918 = t1916 + t1917;
-    const real t1919 = t1915 + t1918;
-    const real t1920 = t1493 * t1919;
-    const real t1921 = t1884 + t1920;
-    const real t1922 = t1469 * t1921;
-    const real t1923 = t1883 + t1922;
-    const real t1924 = t1882 - t1923;
-    const real t1925 = t1584 * t1924;
-    const real t1926 = t1544 * t1798;
-    const real t1927 = t1475 * t1921;
-    const real t1928 = t1926 + t1927;
-    const real t1929 = t1904 - t1928;
-    const real t1930 = t1555 * t1929;
-    const real t1931 = t1930 + t1930;
-    const real t1932 = t1544 * t1785;
-    const real t1933 = t1481 * t1921;
-    const real t1934 = t1932 + t1933;
-    const real t1935 = t1889 - t1934;
-    const real t1936 = t1552 * t1935;
-    const real t1937 = t1936 + t1936;
-    const real t1938 = t1931 + t1937;
-    const real t1939 = t1544 * t1805;
-    const real t1940 = t1472 * t1921;
-    const real t1941 = t1939 + t1940;
-    const real t1942 = t1912 - t1941;
-    const real t1943 = t1549 * t1942;
-    const real t1944 = t1943 + t1943;
-    const real t1945 = t1938 + t1944;
-    const real t1946 = t1546 * t1924;
-    const real t1947 = t1946 + t1946;
-    const real t1948 = t1945 + t1947;
-    const real t1949 = t1560 * 2.0;
-    const real t1950 = t1948 / t1949;
-    const real t1951 = t1562 * t1950;
-    const real t1952 = t1552 > 0 ? 1 : (t1552 < 0 ? -1 : t1552);
-    const real t1953 = t1935 * t1952;
-    const real t1954 = t1950 + t1953;
-    const real t1955 = t1560 * t1954;
-    const real t1956 = t1951 + t1955;
-    const real t1957 = t1565 * t1956;
-    const real t1958 = t1957 / t1563;
-    const real t1959 = -t1958;
-    const real t1960 = t1564 != 0 ? t1959 : 0.0;
-    const real t1961 = t1583 * t1960;
-    const real t1962 = t1579 * t1929;
-    const real t1963 = t1515 * t1798;
-    const real t1964 = t1475 * t1864;
-    const real t1965 = t1963 + t1964;
-    const real t1966 = t1847 - t1965;
-    const real t1967 = t1555 * t1966;
-    const real t1968 = t1962 + t1967;
-    const real t1969 = t1515 * t1785;
-    const real t1970 = t1481 * t1864;
-    const real t1971 = t1969 + t1970;
-    const real t1972 = t1829 - t1971;
-    const real t1973 = t1576 * t1972;
-    const real t1974 = -t1950;
-    const real t1975 = t1573 != 0 ? t1974 : t1950;
-    const real t1976 = t1935 + t1975;
-    const real t1977 = t1572 * t1976;
-    const real t1978 = t1973 + t1977;
-    const real t1979 = t1968 + t1978;
-    const real t1980 = t1569 * t1942;
-    const real t1981 = t1515 * t1805;
-    const real t1982 = t1472 * t1864;
-    const real t1983 = t1981 + t1982;
-    const real t1984 = t1855 - t1983;
-    const real t1985 = t1549 * t1984;
-    const real t1986 = t1980 + t1985;
-    const real t1987 = t1979 + t1986;
-    const real t1988 = t1546 * t1867;
-    const real t1989 = t1517 * t1924;
-    const real t1990 = t1988 + t1989;
-    const real t1991 = t1987 + t1990;
-    const real t1992 = t1566 * t1991;
-    const real t1993 = t1961 + t1992;
-    const real t1994 = t1546 * t1993;
-    const real t1995 = t1925 + t1994;
-    const real t1996 = t1867 - t1995;
-    const real t1997 = t1593 * d_H[25];
-    const real t1998 = t1592 * t1748;
-    const real t1999 = t1451 * d_H[3];
-    const real t2000 = H[3] * t1737;
-    const real t2001 = t1999 + t2000;
-    const real t2002 = t459 + t2001;
-    const real t2003 = t463 + t2002;
-    const real t2004 = t467 + t2003;
-    const real t2005 = t471 + t2004;
-    const real t2006 = t475 + t2005;
-    const real t2007 = t1447 * t2006;
-    const real t2008 = t1998 + t2007;
-    const real t2009 = H[25] * t2008;
-    const real t2010 = t1997 + t2009;
-    const real t2011 = d_H[28] - t2010;
-    const real t2012 = t1613 * t1780;
-    const real t2013 = t1612 * t1823;
-    const real t2014 = t1607 * t1785;
-    const real t2015 = t1593 * d_H[10];
-    const real t2016 = H[10] * t2008;
-    const real t2017 = t2015 + t2016;
-    const real t2018 = d_H[13] - t2017;
-    const real t2019 = t1481 * t2018;
-    const real t2020 = t2014 + t2019;
-    const real t2021 = t1604 * t1839;
-    const real t2022 = t1593 * d_H[5];
-    const real t2023 = H[5] * t2008;
-    const real t2024 = t2022 + t2023;
-    const real t2025 = d_H[8] - t2024;
-    const real t2026 = t1506 * t2025;
-    const real t2027 = t2021 + t2026;
-    const real t2028 = t2020 + t2027;
-    const real t2029 = t1601 * t1798;
-    const real t2030 = t1593 * d_H[15];
-    const real t2031 = H[15] * t2008;
-    const real t2032 = t2030 + t2031;
-    const real t2033 = d_H[18] - t2032;
-    const real t2034 = t1475 * t2033;
-    const real t2035 = t2029 + t2034;
-    const real t2036 = t2028 + t2035;
-    const real t2037 = t1598 * t1805;
-    const real t2038 = t1593 * d_H[20];
-    const real t2039 = H[20] * t2008;
-    const real t2040 = t2038 + t2039;
-    const real t2041 = d_H[23] - t2040;
-    const real t2042 = t1472 * t2041;
-    const real t2043 = t2037 + t2042;
-    const real t2044 = t2036 + t2043;
-    const real t2045 = t1595 * t1780;
-    const real t2046 = t1469 * t2011;
-    const real t2047 = t2045 + t2046;
-    const real t2048 = t2044 + t2047;
-    const real t2049 = t1493 * t2048;
-    const real t2050 = t2013 + t2049;
-    const real t2051 = t1469 * t2050;
-    const real t2052 = t2012 + t2051;
-    const real t2053 = t2011 - t2052;
-    const real t2054 = t1629 * t1924;
-    const real t2055 = t1628 * t1960;
-    const real t2056 = t1624 * t1929;
-    const real t2057 = t1613 * t1798;
-    const real t2058 = t1475 * t2050;
-    const real t2059 = t2057 + t2058;
-    const real t2060 = t2033 - t2059;
-    const real t2061 = t1555 * t2060;
-    const real t2062 = t2056 + t2061;
-    const real t2063 = t1621 * t1976;
-    const real t2064 = t1613 * t1785;
-    const real t2065 = t1481 * t2050;
-    const real t2066 = t2064 + t2065;
-    const real t2067 = t2018 - t2066;
-    const real t2068 = t1576 * t2067;
-    const real t2069 = t2063 + t2068;
-    const real t2070 = t2062 + t2069;
-    const real t2071 = t1618 * t1942;
-    const real t2072 = t1613 * t1805;
-    const real t2073 = t1472 * t2050;
-    const real t2074 = t2072 + t2073;
-    const real t2075 = t2041 - t2074;
-    const real t2076 = t1549 * t2075;
-    const real t2077 = t2071 + t2076;
-    const real t2078 = t2070 + t2077;
-    const real t2079 = t1615 * t1924;
-    const real t2080 = t1546 * t2053;
-    const real t2081 = t2079 + t2080;
-    const real t2082 = t2078 + t2081;
-    const real t2083 = t1566 * t2082;
-    const real t2084 = t2055 + t2083;
-    const real t2085 = t1546 * t2084;
-    const real t2086 = t2054 + t2085;
-    const real t2087 = t2053 - t2086;
-    const real t2088 = t1661 * t2087;
-    const real t2089 = t1629 * t1942;
-    const real t2090 = t1549 * t2084;
-    const real t2091 = t2089 + t2090;
-    const real t2092 = t2075 - t2091;
-    const real t2093 = t1637 * t2092;
-    const real t2094 = t2093 + t2093;
-    const real t2095 = t1629 * t1929;
-    const real t2096 = t1555 * t2084;
-    const real t2097 = t2095 + t2096;
-    const real t2098 = t2060 - t2097;
-    const real t2099 = t1634 * t2098;
-    const real t2100 = t2099 + t2099;
-    const real t2101 = t2094 + t2100;
-    const real t2102 = t1631 * t2087;
-    const real t2103 = t2102 + t2102;
-    const real t2104 = t2101 + t2103;
-    const real t2105 = t1641 * 2.0;
-    const real t2106 = t2104 / t2105;
-    const real t2107 = t1643 * t2106;
-    const real t2108 = t1634 > 0 ? 1 : (t1634 < 0 ? -1 : t1634);
-    const real t2109 = t2098 * t2108;
-    const real t2110 = t2106 + t2109;
-    const real t2111 = t1641 * t2110;
-    const real t2112 = t2107 + t2111;
-    const real t2113 = t1646 * t2112;
-    const real t2114 = t2113 / t1644;
-    const real t2115 = -t2114;
-    const real t2116 = t1645 != 0 ? t2115 : 0.0;
-    const real t2117 = t1660 * t2116;
-    const real t2118 = t1657 * t2092;
-    const real t2119 = t1584 * t1942;
-    const real t2120 = t1549 * t1993;
-    const real t2121 = t2119 + t2120;
-    const real t2122 = t1984 - t2121;
-    const real t2123 = t1637 * t2122;
-    const real t2124 = t2118 + t2123;
-    const real t2125 = t1584 * t1929;
-    const real t2126 = t1555 * t1993;
-    const real t2127 = t2125 + t2126;
-    const real t2128 = t1966 - t2127;
-    const real t2129 = t1654 * t2128;
-    const real t2130 = -t2106;
-    const real t2131 = t1651 != 0 ? t2130 : t2106;
-    const real t2132 = t2098 + t2131;
-    const real t2133 = t1650 * t2132;
-    const real t2134 = t2129 + t2133;
-    const real t2135 = t2124 + t2134;
-    const real t2136 = t1631 * t1996;
-    const real t2137 = t1586 * t2087;
-    const real t2138 = t2136 + t2137;
-    const real t2139 = t2135 + t2138;
-    const real t2140 = t1647 * t2139;
-    const real t2141 = t2117 + t2140;
-    const real t2142 = t1631 * t2141;
-    const real t2143 = t2088 + t2142;
-    const real t2144 = t1996 - t2143;
-    const real t2145 = t1663 * t2144;
-    const real t2146 = t2145 + t2145;
-    const real t2147 = t1675 * t2146;
-    const real t2148 = t1661 * t2092;
-    const real t2149 = t1637 * t2141;
-    const real t2150 = t2148 + t2149;
-    const real t2151 = t2122 - t2150;
-    const real t2152 = t1666 * t2151;
-    const real t2153 = t2152 + t2152;
-    const real t2154 = t2153 + t2146;
-    const real t2155 = t1669 * 2.0;
-    const real t2156 = t2154 / t2155;
-    const real t2157 = t1671 * t2156;
-    const real t2158 = t1666 > 0 ? 1 : (t1666 < 0 ? -1 : t1666);
-    const real t2159 = t2151 * t2158;
-    const real t2160 = t2156 + t2159;
-    const real t2161 = t1669 * t2160;
-    const real t2162 = t2157 + t2161;
-    const real t2163 = t1674 * t2162;
-    const real t2164 = t2163 / t1672;
-    const real t2165 = -t2164;
-    const real t2166 = t1673 != 0 ? t2165 : 0.0;
-    const real t2167 = t1664 * t2166;
-    const real t2168 = t2147 + t2167;
-    const real t2169 = t1687 * t2087;
-    const real t2170 = t1686 * t2116;
-    const real t2171 = t1677 * t2087;
-    const real t2172 = t1631 * t2168;
-    const real t2173 = t2171 - t2172;
-    const real t2174 = t1684 * t2092;
-    const real t2175 = t1683 * t2144;
-    const real t2176 = t1682 * t2166;
-    const real t2177 = -t2156;
-    const real t2178 = t1679 != 0 ? t2177 : t2156;
-    const real t2179 = t2151 + t2178;
-    const real t2180 = t1675 * t2179;
-    const real t2181 = t2176 + t2180;
-    const real t2182 = t1663 * t2181;
-    const real t2183 = t2175 + t2182;
-    const real t2184 = t1637 * t2183;
-    const real t2185 = t2174 + t2184;
-    const real t2186 = t2173 - t2185;
-    const real t2187 = t1647 * t2186;
-    const real t2188 = t2170 + t2187;
-    const real t2189 = t1631 * t2188;
-    const real t2190 = t2169 + t2189;
-    const real t2191 = t2168 + t2190;
-    const real t2192 = t1698 * t1924;
-    const real t2193 = t1697 * t1960;
-    const real t2194 = t1689 * t1924;
-    const real t2195 = t1546 * t2191;
-    const real t2196 = t2194 - t2195;
-    const real t2197 = t1694 * t1942;
-    const real t2198 = t1687 * t2092;
-    const real t2199 = t1637 * t2188;
-    const real t2200 = t2198 + t2199;
-    const real t2201 = t2183 + t2200;
-    const real t2202 = t1549 * t2201;
-    const real t2203 = t2197 + t2202;
-    const real t2204 = t1691 * t1929;
-    const real t2205 = t1687 * t2132;
-    const real t2206 = t1654 * t2188;
-    const real t2207 = t2205 + t2206;
-    const real t2208 = t1555 * t2207;
-    const real t2209 = t2204 + t2208;
-    const real t2210 = t2203 + t2209;
-    const real t2211 = t2196 - t2210;
-    const real t2212 = t1566 * t2211;
-    const real t2213 = t2193 + t2212;
-    const real t2214 = t1546 * t2213;
-    const real t2215 = t2192 + t2214;
-    const real t2216 = t2191 + t2215;
-    const real t2217 = t1713 * t1780;
-    const real t2218 = t1712 * t1823;
-    const real t2219 = t1700 * t1780;
-    const real t2220 = t1469 * t2216;
-    const real t2221 = t2219 - t2220;
-    const real t2222 = t1708 * t1798;
-    const real t2223 = t1698 * t1929;
-    const real t2224 = t1555 * t2213;
-    const real t2225 = t2223 + t2224;
-    const real t2226 = t2207 + t2225;
-    const real t2227 = t1475 * t2226;
-    const real t2228 = t2222 + t2227;
-    const real t2229 = t1705 * t1785;
-    const real t2230 = t1698 * t1976;
-    const real t2231 = t1576 * t2213;
-    const real t2232 = t2230 + t2231;
-    const real t2233 = t1481 * t2232;
-    const real t2234 = t2229 + t2233;
-    const real t2235 = t2228 + t2234;
-    const real t2236 = t1703 * t1805;
-    const real t2237 = t1698 * t1942;
-    const real t2238 = t1549 * t2213;
-    const real t2239 = t2237 + t2238;
-    const real t2240 = t2201 + t2239;
-    const real t2241 = t1472 * t2240;
-    const real t2242 = t2236 + t2241;
-    const real t2243 = t2235 + t2242;
-    const real t2244 = t2221 - t2243;
-    const real t2245 = t1493 * t2244;
-    const real t2246 = t2218 + t2245;
-    const real t2247 = t1469 * t2246;
-    const real t2248 = t2217 + t2247;
-    const real t2249 = t2216 + t2248;
-    const real t2250 = H[25] * t2249;
-    const real t2251 = t1750 - t2250;
-    const real t2252 = t1726 * d_H[10];
-    const real t2253 = t1713 * t1785;
-    const real t2254 = t1481 * t2246;
-    const real t2255 = t2253 + t2254;
-    const real t2256 = t2232 + t2255;
-    const real t2257 = H[10] * t2256;
-    const real t2258 = t2252 + t2257;
-    const real t2259 = t1723 * d_H[5];
-    const real t2260 = t1713 * t1839;
-    const real t2261 = t1506 * t2246;
-    const real t2262 = t2260 + t2261;
-    const real t2263 = H[5] * t2262;
-    const real t2264 = t2259 + t2263;
-    const real t2265 = t2258 + t2264;
-    const real t2266 = t1721 * d_H[15];
-    const real t2267 = t1713 * t1798;
-    const real t2268 = t1475 * t2246;
-    const real t2269 = t2267 + t2268;
-    const real t2270 = t2226 + t2269;
-    const real t2271 = H[15] * t2270;
-    const real t2272 = t2266 + t2271;
-    const real t2273 = t2265 + t2272;
-    const real t2274 = t1718 * d_H[20];
-    const real t2275 = t1713 * t1805;
-    const real t2276 = t1472 * t2246;
-    const real t2277 = t2275 + t2276;
-    const real t2278 = t2240 + t2277;
-    const real t2279 = H[20] * t2278;
-    const real t2280 = t2274 + t2279;
-    const real t2281 = t2273 + t2280;
-    const real t2282 = t2251 - t2281;
-    const real t2283 = t1447 * t2282;
-    const real t2284 = t1749 + t2283;
-    const real t2285 = t1451 * t2284;
-    const real t2286 = t1738 + t2285;
-    const real t2287 = -t2286;
-    d_W[30] = t2287;
-    const real t2288 = t1732 * d_H[5];
-    const real t2289 = H[5] * t2284;
-    const real t2290 = t2288 + t2289;
-    const real t2291 = t2262 + t2290;
-    const real t2292 = -t2291;
-    d_W[31] = t2292;
-    const real t2293 = t1732 * d_H[10];
-    const real t2294 = H[10] * t2284;
-    const real t2295 = t2293 + t2294;
-    const real t2296 = t2256 + t2295;
-    const real t2297 = -t2296;
-    d_W[32] = t2297;
-    const real t2298 = t1732 * d_H[15];
-    const real t2299 = H[15] * t2284;
-    const real t2300 = t2298 + t2299;
-    const real t2301 = t2270 + t2300;
-    const real t2302 = -t2301;
-    d_W[33] = t2302;
-    const real t2303 = t1732 * d_H[20];
-    const real t2304 = H[20] * t2284;
-    const real t2305 = t2303 + t2304;
-    const real t2306 = t2278 + t2305;
-    const real t2307 = -t2306;
-    d_W[34] = t2307;
-    const real t2308 = t1732 * d_H[25];
-    const real t2309 = H[25] * t2284;
-    const real t2310 = t2308 + t2309;
-    const real t2311 = t2249 + t2310;
-    const real t2312 = -t2311;
-    d_W[35] = t2312;
-    return 0;
+  real t10 = H[25] * H[25] + (H[20] * H[20] + (H[15] * H[15] + (H[10] * H[10] + (H[0] * H[0] + H[5]
+    * H[5]))));
+  real t11 = 1.0 / t10;
+  real t13 = H[5] * d_H[5];
+  real t15 = H[0] * d_H[0];
+  real t18 = H[10] * d_H[10];
+  real t21 = H[15] * d_H[15];
+  real t24 = H[20] * d_H[20];
+  real t27 = H[25] * d_H[25];
+  real t29 = t13 + t13 + (t15 + t15) + (t18 + t18) + (t21 + t21) + (t24 + t24) + (t27 + t27);
+  real t31 = t11 * t29 / t10;
+  real t45 = H[25] * H[26];
+  real t46 = H[20] * H[21];
+  real t47 = H[15] * H[16];
+  real t48 = H[10] * H[11];
+  real t49 = H[5] * H[6];
+  real t55 = t45 + (t46 + (t47 + (t48 + (t49 + H[0] * H[1]))));
+  real t56 = t55 * t11;
+  real t58 = H[1] * H[1] + H[6] * H[6] + H[11] * H[11] + H[16] * H[16] + H[21] * H[21] + H[26] *
+    H[26] - t55 * t56;
+  real t59 = 1.0 / t58;
+  real t61 = H[1] - H[0] * t56;
+  real t74 = H[25] * H[27];
+  real t75 = H[20] * H[22];
+  real t76 = H[15] * H[17];
+  real t77 = H[10] * H[12];
+  real t78 = H[5] * H[7];
+  real t84 = t74 + (t75 + (t76 + (t77 + (t78 + H[0] * H[2]))));
+  real t86 = H[1] * H[2] + H[6] * H[7] + H[11] * H[12] + H[16] * H[17] + H[21] * H[22] + H[26] *
+    H[27] - t56 * t84;
+  real t87 = t86 * t59;
+  real t99 = t11 * t84;
+  real t103 = H[2] * H[2] + H[7] * H[7] + H[12] * H[12] + H[17] * H[17] + H[22] * H[22] + H[27] *
+    H[27] - t84 * t99 - t86 * t87;
+  real t104 = 1.0 / t103;
+  real t108 = H[2] - H[0] * t99 - t87 * t61;
+  real t121 = H[25] * H[28];
+  real t122 = H[20] * H[23];
+  real t123 = H[15] * H[18];
+  real t124 = H[10] * H[13];
+  real t125 = H[5] * H[8];
+  real t131 = t121 + (t122 + (t123 + (t124 + (t125 + H[0] * H[3]))));
+  real t146 = H[1] * H[3] + H[6] * H[8] + H[11] * H[13] + H[16] * H[18] + H[21] * H[23] + H[26] *
+    H[28] - t56 * t131;
+  real t148 = H[2] * H[3] + H[7] * H[8] + H[12] * H[13] + H[17] * H[18] + H[22] * H[23] + H[27] *
+    H[28] - t99 * t131 - t87 * t146;
+  real t149 = t148 * t104;
+  real t161 = t11 * t131;
+  real t164 = t59 * t146;
+  real t168 = H[3] * H[3] + H[8] * H[8] + H[13] * H[13] + H[18] * H[18] + H[23] * H[23] + H[28] *
+    H[28] - t131 * t161 - t146 * t164 - t148 * t149;
+  real t169 = 1.0 / t168;
+  real t175 = H[3] - H[0] * t161 - t164 * t61 - t149 * t108;
+  real t188 = H[25] * H[29];
+  real t189 = H[20] * H[24];
+  real t190 = H[15] * H[19];
+  real t191 = H[10] * H[14];
+  real t192 = H[5] * H[9];
+  real t198 = t188 + (t189 + (t190 + (t191 + (t192 + H[0] * H[4]))));
+  real t213 = H[1] * H[4] + H[6] * H[9] + H[11] * H[14] + H[16] * H[19] + H[21] * H[24] + H[26] *
+    H[29] - t56 * t198;
+  real t230 = H[2] * H[4] + H[7] * H[9] + H[12] * H[14] + H[17] * H[19] + H[22] * H[24] + H[27] *
+    H[29] - t99 * t198 - t87 * t213;
+  real t232 = H[3] * H[4] + H[8] * H[9] + H[13] * H[14] + H[18] * H[19] + H[23] * H[24] + H[28] *
+    H[29] - t161 * t198 - t164 * t213 - t149 * t230;
+  real t233 = t232 * t169;
+  real t245 = t11 * t198;
+  real t248 = t59 * t213;
+  real t251 = t104 * t230;
+  real t255 = H[4] * H[4] + H[9] * H[9] + H[14] * H[14] + H[19] * H[19] + H[24] * H[24] + H[29] *
+    H[29] - t198 * t245 - t213 * t248 - t230 * t251 - t232 * t233;
+  real t256 = 1.0 / t255;
+  real t264 = H[4] - H[0] * t245 - t248 * t61 - t251 * t108 - t233 * t175;
+  real t265 = t256 * t264;
+  real t267 = t169 * t175 - t233 * t265;
+  real t271 = t104 * t108 - t149 * t267 - t251 * t265;
+  real t283 = H[6] * d_H[5] + H[5] * d_H[6];
+  real t287 = H[11] * d_H[10] + H[10] * d_H[11];
+  real t291 = H[16] * d_H[15] + H[15] * d_H[16];
+  real t295 = H[21] * d_H[20] + H[20] * d_H[21];
+  real t299 = H[26] * d_H[25] + H[25] * d_H[26];
+  real t300 = H[1] * d_H[0] + H[0] * d_H[1] + t283 + t287 + t291 + t295 + t299;
+  real t303 = t11 * t300 - t55 * t31;
+  real t308 = d_H[1] - (t56 * d_H[0] + H[0] * t303);
+  real t310 = H[26] * d_H[26];
+  real t312 = H[21] * d_H[21];
+  real t314 = H[16] * d_H[16];
+  real t316 = H[11] * d_H[11];
+  real t318 = H[6] * d_H[6];
+  real t320 = H[1] * d_H[1];
+  real t332 = t59 * (t310 + t310 + (t312 + t312 + (t314 + t314 + (t316 + t316 + (t318 + t318 + (t320
+    + t320))))) - (t56 * t300 + t55 * t303)) / t58;
+  real t364 = H[7] * d_H[5] + H[5] * d_H[7];
+  real t368 = H[12] * d_H[10] + H[10] * d_H[12];
+  real t372 = H[17] * d_H[15] + H[15] * d_H[17];
+  real t376 = H[22] * d_H[20] + H[20] * d_H[22];
+  real t380 = H[27] * d_H[25] + H[25] * d_H[27];
+  real t381 = H[2] * d_H[0] + H[0] * d_H[2] + t364 + t368 + t372 + t376 + t380;
+  real t384 = H[27] * d_H[26] + H[26] * d_H[27] + (H[22] * d_H[21] + H[21] * d_H[22] + (H[17] *
+    d_H[16] + H[16] * d_H[17] + (H[12] * d_H[11] + H[11] * d_H[12] + (H[7] * d_H[6] + H[6] * d_H[7]
+    + (H[2] * d_H[1] + H[1] * d_H[2]))))) - (t84 * t303 + t56 * t381);
+  real t387 = t59 * t384 - t86 * t332;
+  real t392 = t11 * t381 - t84 * t31;
+  real t399 = d_H[2] - (t99 * d_H[0] + H[0] * t392) - (t61 * t387 + t87 * t308);
+  real t401 = H[27] * d_H[27];
+  real t403 = H[22] * d_H[22];
+  real t405 = H[17] * d_H[17];
+  real t407 = H[12] * d_H[12];
+  real t409 = H[7] * d_H[7];
+  real t411 = H[2] * d_H[2];
+  real t427 = t104 * (t401 + t401 + (t403 + t403 + (t405 + t405 + (t407 + t407 + (t409 + t409 +
+    (t411 + t411))))) - (t99 * t381 + t84 * t392) - (t87 * t384 + t86 * t387)) / t103;
+  real t459 = H[8] * d_H[5] + H[5] * d_H[8];
+  real t463 = H[13] * d_H[10] + H[10] * d_H[13];
+  real t467 = H[18] * d_H[15] + H[15] * d_H[18];
+  real t471 = H[23] * d_H[20] + H[20] * d_H[23];
+  real t475 = H[28] * d_H[25] + H[25] * d_H[28];
+  real t476 = H[3] * d_H[0] + H[0] * d_H[3] + t459 + t463 + t467 + t471 + t475;
+  real t507 = H[28] * d_H[26] + H[26] * d_H[28] + (H[23] * d_H[21] + H[21] * d_H[23] + (H[18] *
+    d_H[16] + H[16] * d_H[18] + (H[13] * d_H[11] + H[11] * d_H[13] + (H[8] * d_H[6] + H[6] * d_H[8]
+    + (H[3] * d_H[1] + H[1] * d_H[3]))))) - (t131 * t303 + t56 * t476);
+  real t510 = H[28] * d_H[27] + H[27] * d_H[28] + (H[23] * d_H[22] + H[22] * d_H[23] + (H[18] *
+    d_H[17] + H[17] * d_H[18] + (H[13] * d_H[12] + H[12] * d_H[13] + (H[8] * d_H[7] + H[7] * d_H[8]
+    + (H[3] * d_H[2] + H[2] * d_H[3]))))) - (t131 * t392 + t99 * t476) - (t146 * t387 + t87 * t507);
+  real t513 = t104 * t510 - t148 * t427;
+  real t518 = t11 * t476 - t131 * t31;
+  real t524 = t59 * t507 - t146 * t332;
+  real t532 = d_H[3] - (t161 * d_H[0] + H[0] * t518) - (t61 * t524 + t164 * t308) - (t108 * t513 +
+    t149 * t399);
+  real t534 = H[28] * d_H[28];
+  real t536 = H[23] * d_H[23];
+  real t538 = H[18] * d_H[18];
+  real t540 = H[13] * d_H[13];
+  real t542 = H[8] * d_H[8];
+  real t544 = H[3] * d_H[3];
+  real t564 = t169 * (t534 + t534 + (t536 + t536 + (t538 + t538 + (t540 + t540 + (t542 + t542 +
+    (t544 + t544))))) - (t161 * t476 + t131 * t518) - (t164 * t507 + t146 * t524) - (t149 * t510 +
+    t148 * t513)) / t168;
+  real t596 = H[9] * d_H[5] + H[5] * d_H[9];
+  real t600 = H[14] * d_H[10] + H[10] * d_H[14];
+  real t604 = H[19] * d_H[15] + H[15] * d_H[19];
+  real t608 = H[24] * d_H[20] + H[20] * d_H[24];
+  real t612 = H[29] * d_H[25] + H[25] * d_H[29];
+  real t613 = H[4] * d_H[0] + H[0] * d_H[4] + t596 + t600 + t604 + t608 + t612;
+  real t644 = H[29] * d_H[26] + H[26] * d_H[29] + (H[24] * d_H[21] + H[21] * d_H[24] + (H[19] *
+    d_H[16] + H[16] * d_H[19] + (H[14] * d_H[11] + H[11] * d_H[14] + (H[9] * d_H[6] + H[6] * d_H[9]
+    + (H[4] * d_H[1] + H[1] * d_H[4]))))) - (t198 * t303 + t56 * t613);
+  real t679 = H[29] * d_H[27] + H[27] * d_H[29] + (H[24] * d_H[22] + H[22] * d_H[24] + (H[19] *
+    d_H[17] + H[17] * d_H[19] + (H[14] * d_H[12] + H[12] * d_H[14] + (H[9] * d_H[7] + H[7] * d_H[9]
+    + (H[4] * d_H[2] + H[2] * d_H[4]))))) - (t198 * t392 + t99 * t613) - (t213 * t387 + t87 * t644);
+  real t682 = H[29] * d_H[28] + H[28] * d_H[29] + (H[24] * d_H[23] + H[23] * d_H[24] + (H[19] *
+    d_H[18] + H[18] * d_H[19] + (H[14] * d_H[13] + H[13] * d_H[14] + (H[9] * d_H[8] + H[8] * d_H[9]
+    + (H[4] * d_H[3] + H[3] * d_H[4]))))) - (t198 * t518 + t161 * t613) - (t213 * t524 + t164 *
+    t644) - (t230 * t513 + t149 * t679);
+  real t685 = t169 * t682 - t232 * t564;
+  real t690 = t11 * t613 - t198 * t31;
+  real t696 = t59 * t644 - t213 * t332;
+  real t703 = t104 * t679 - t230 * t427;
+  real t713 = H[29] * d_H[29];
+  real t715 = H[24] * d_H[24];
+  real t717 = H[19] * d_H[19];
+  real t719 = H[14] * d_H[14];
+  real t721 = H[9] * d_H[9];
+  real t723 = H[4] * d_H[4];
+  real t747 = t256 * (t713 + t713 + (t715 + t715 + (t717 + t717 + (t719 + t719 + (t721 + t721 +
+    (t723 + t723))))) - (t245 * t613 + t198 * t690) - (t248 * t644 + t213 * t696) - (t251 * t679 +
+    t230 * t703) - (t233 * t682 + t232 * t685)) / t255;
+  real t749 = t256 * (d_H[4] - (t245 * d_H[0] + H[0] * t690) - (t61 * t696 + t248 * t308) - (t108 *
+    t703 + t251 * t399) - (t175 * t685 + t233 * t532)) - t264 * t747;
+  real t752 = t169 * t532 - t175 * t564 - (t265 * t685 + t233 * t749);
+  real t759 = t104 * t399 - t108 * t427 - (t267 * t513 + t149 * t752) - (t265 * t703 + t251 * t749);
+  real t770 = t59 * t308 - t61 * t332 - (t271 * t387 + t87 * t759) - (t267 * t524 + t164 * t752) -
+    (t265 * t696 + t248 * t749);
+  d_W[0] = t11 * d_H[0] - H[0] * t31 - ((t59 * t61 - t87 * t271 - t164 * t267 - t248 * t265) * t303
+    + t56 * t770) - (t271 * t392 + t99 * t759) - (t267 * t518 + t161 * t752) - (t265 * t690 + t245 *
+    t749);
+  real t790 = H[6] - H[5] * t56;
+  real t795 = H[7] - H[5] * t99 - t87 * t790;
+  real t802 = H[8] - H[5] * t161 - t164 * t790 - t149 * t795;
+  real t811 = H[9] - H[5] * t245 - t248 * t790 - t251 * t795 - t233 * t802;
+  real t812 = t256 * t811;
+  real t814 = t169 * t802 - t233 * t812;
+  real t818 = t104 * t795 - t149 * t814 - t251 * t812;
+  real t829 = d_H[6] - (t56 * d_H[5] + H[5] * t303);
+  real t841 = d_H[7] - (t99 * d_H[5] + H[5] * t392) - (t790 * t387 + t87 * t829);
+  real t857 = d_H[8] - (t161 * d_H[5] + H[5] * t518) - (t790 * t524 + t164 * t829) - (t795 * t513 +
+    t149 * t841);
+  real t880 = t256 * (d_H[9] - (t245 * d_H[5] + H[5] * t690) - (t790 * t696 + t248 * t829) - (t795 *
+    t703 + t251 * t841) - (t802 * t685 + t233 * t857)) - t811 * t747;
+  real t883 = t169 * t857 - t802 * t564 - (t812 * t685 + t233 * t880);
+  real t890 = t104 * t841 - t795 * t427 - (t814 * t513 + t149 * t883) - (t812 * t703 + t251 * t880);
+  real t901 = t59 * t829 - t790 * t332 - (t818 * t387 + t87 * t890) - (t814 * t524 + t164 * t883) -
+    (t812 * t696 + t248 * t880);
+  d_W[1] = t11 * d_H[5] - H[5] * t31 - ((t59 * t790 - t87 * t818 - t164 * t814 - t248 * t812) * t303
+    + t56 * t901) - (t818 * t392 + t99 * t890) - (t814 * t518 + t161 * t883) - (t812 * t690 + t245 *
+    t880);
+  real t921 = H[11] - H[10] * t56;
+  real t926 = H[12] - H[10] * t99 - t87 * t921;
+  real t933 = H[13] - H[10] * t161 - t164 * t921 - t149 * t926;
+  real t942 = H[14] - H[10] * t245 - t248 * t921 - t251 * t926 - t233 * t933;
+  real t943 = t256 * t942;
+  real t945 = t169 * t933 - t233 * t943;
+  real t949 = t104 * t926 - t149 * t945 - t251 * t943;
+  real t960 = d_H[11] - (t56 * d_H[10] + H[10] * t303);
+  real t972 = d_H[12] - (t99 * d_H[10] + H[10] * t392) - (t921 * t387 + t87 * t960);
+  real t988 = d_H[13] - (t161 * d_H[10] + H[10] * t518) - (t921 * t524 + t164 * t960) - (t926 * t513
+    + t149 * t972);
+  real t1011 = t256 * (d_H[14] - (t245 * d_H[10] + H[10] * t690) - (t921 * t696 + t248 * t960) -
+    (t926 * t703 + t251 * t972) - (t933 * t685 + t233 * t988)) - t942 * t747;
+  real t1014 = t169 * t988 - t933 * t564 - (t943 * t685 + t233 * t1011);
+  real t1021 = t104 * t972 - t926 * t427 - (t945 * t513 + t149 * t1014) - (t943 * t703 + t251 *
+    t1011);
+  real t1032 = t59 * t960 - t921 * t332 - (t949 * t387 + t87 * t1021) - (t945 * t524 + t164 * t1014)
+    - (t943 * t696 + t248 * t1011);
+  d_W[2] = t11 * d_H[10] - H[10] * t31 - ((t59 * t921 - t87 * t949 - t164 * t945 - t248 * t943) *
+    t303 + t56 * t1032) - (t949 * t392 + t99 * t1021) - (t945 * t518 + t161 * t1014) - (t943 * t690
+    + t245 * t1011);
+  real t1052 = H[16] - H[15] * t56;
+  real t1057 = H[17] - H[15] * t99 - t87 * t1052;
+  real t1064 = H[18] - H[15] * t161 - t164 * t1052 - t149 * t1057;
+  real t1073 = H[19] - H[15] * t245 - t248 * t1052 - t251 * t1057 - t233 * t1064;
+  real t1074 = t256 * t1073;
+  real t1076 = t169 * t1064 - t233 * t1074;
+  real t1080 = t104 * t1057 - t149 * t1076 - t251 * t1074;
+  real t1091 = d_H[16] - (t56 * d_H[15] + H[15] * t303);
+  real t1103 = d_H[17] - (t99 * d_H[15] + H[15] * t392) - (t1052 * t387 + t87 * t1091);
+  real t1119 = d_H[18] - (t161 * d_H[15] + H[15] * t518) - (t1052 * t524 + t164 * t1091) - (t1057 *
+    t513 + t149 * t1103);
+  real t1142 = t256 * (d_H[19] - (t245 * d_H[15] + H[15] * t690) - (t1052 * t696 + t248 * t1091) -
+    (t1057 * t703 + t251 * t1103) - (t1064 * t685 + t233 * t1119)) - t1073 * t747;
+  real t1145 = t169 * t1119 - t1064 * t564 - (t1074 * t685 + t233 * t1142);
+  real t1152 = t104 * t1103 - t1057 * t427 - (t1076 * t513 + t149 * t1145) - (t1074 * t703 + t251 *
+    t1142);
+  real t1163 = t59 * t1091 - t1052 * t332 - (t1080 * t387 + t87 * t1152) - (t1076 * t524 + t164 *
+    t1145) - (t1074 * t696 + t248 * t1142);
+  d_W[3] = t11 * d_H[15] - H[15] * t31 - ((t59 * t1052 - t87 * t1080 - t164 * t1076 - t248 * t1074)
+    * t303 + t56 * t1163) - (t1080 * t392 + t99 * t1152) - (t1076 * t518 + t161 * t1145) - (t1074 *
+    t690 + t245 * t1142);
+  real t1183 = H[21] - H[20] * t56;
+  real t1188 = H[22] - H[20] * t99 - t87 * t1183;
+  real t1195 = H[23] - H[20] * t161 - t164 * t1183 - t149 * t1188;
+  real t1204 = H[24] - H[20] * t245 - t248 * t1183 - t251 * t1188 - t233 * t1195;
+  real t1205 = t256 * t1204;
+  real t1207 = t169 * t1195 - t233 * t1205;
+  real t1211 = t104 * t1188 - t149 * t1207 - t251 * t1205;
+  real t1222 = d_H[21] - (t56 * d_H[20] + H[20] * t303);
+  real t1234 = d_H[22] - (t99 * d_H[20] + H[20] * t392) - (t1183 * t387 + t87 * t1222);
+  real t1250 = d_H[23] - (t161 * d_H[20] + H[20] * t518) - (t1183 * t524 + t164 * t1222) - (t1188 *
+    t513 + t149 * t1234);
+  real t1273 = t256 * (d_H[24] - (t245 * d_H[20] + H[20] * t690) - (t1183 * t696 + t248 * t1222) -
+    (t1188 * t703 + t251 * t1234) - (t1195 * t685 + t233 * t1250)) - t1204 * t747;
+  real t1276 = t169 * t1250 - t1195 * t564 - (t1205 * t685 + t233 * t1273);
+  real t1283 = t104 * t1234 - t1188 * t427 - (t1207 * t513 + t149 * t1276) - (t1205 * t703 + t251 *
+    t1273);
+  real t1294 = t59 * t1222 - t1183 * t332 - (t1211 * t387 + t87 * t1283) - (t1207 * t524 + t164 *
+    t1276) - (t1205 * t696 + t248 * t1273);
+  d_W[4] = t11 * d_H[20] - H[20] * t31 - ((t59 * t1183 - t87 * t1211 - t164 * t1207 - t248 * t1205)
+    * t303 + t56 * t1294) - (t1211 * t392 + t99 * t1283) - (t1207 * t518 + t161 * t1276) - (t1205 *
+    t690 + t245 * t1273);
+  real t1314 = H[26] - H[25] * t56;
+  real t1319 = H[27] - H[25] * t99 - t87 * t1314;
+  real t1326 = H[28] - H[25] * t161 - t164 * t1314 - t149 * t1319;
+  real t1335 = H[29] - H[25] * t245 - t248 * t1314 - t251 * t1319 - t233 * t1326;
+  real t1336 = t256 * t1335;
+  real t1338 = t169 * t1326 - t233 * t1336;
+  real t1342 = t104 * t1319 - t149 * t1338 - t251 * t1336;
+  real t1353 = d_H[26] - (t56 * d_H[25] + H[25] * t303);
+  real t1365 = d_H[27] - (t99 * d_H[25] + H[25] * t392) - (t1314 * t387 + t87 * t1353);
+  real t1381 = d_H[28] - (t161 * d_H[25] + H[25] * t518) - (t1314 * t524 + t164 * t1353) - (t1319 *
+    t513 + t149 * t1365);
+  real t1404 = t256 * (d_H[29] - (t245 * d_H[25] + H[25] * t690) - (t1314 * t696 + t248 * t1353) -
+    (t1319 * t703 + t251 * t1365) - (t1326 * t685 + t233 * t1381)) - t1335 * t747;
+  real t1407 = t169 * t1381 - t1326 * t564 - (t1336 * t685 + t233 * t1404);
+  real t1414 = t104 * t1365 - t1319 * t427 - (t1338 * t513 + t149 * t1407) - (t1336 * t703 + t251 *
+    t1404);
+  real t1425 = t59 * t1353 - t1314 * t332 - (t1342 * t387 + t87 * t1414) - (t1338 * t524 + t164 *
+    t1407) - (t1336 * t696 + t248 * t1404);
+  d_W[5] = t11 * d_H[25] - H[25] * t31 - ((t59 * t1314 - t87 * t1342 - t164 * t1338 - t248 * t1336)
+    * t303 + t56 * t1425) - (t1342 * t392 + t99 * t1414) - (t1338 * t518 + t161 * t1407) - (t1336 *
+    t690 + t245 * t1404);
+  d_W[6] = t770;
+  d_W[7] = t901;
+  d_W[8] = t1032;
+  d_W[9] = t1163;
+  d_W[10] = t1294;
+  d_W[11] = t1425;
+  d_W[12] = t759;
+  d_W[13] = t890;
+  d_W[14] = t1021;
+  d_W[15] = t1152;
+  d_W[16] = t1283;
+  d_W[17] = t1414;
+  d_W[18] = t752;
+  d_W[19] = t883;
+  d_W[20] = t1014;
+  d_W[21] = t1145;
+  d_W[22] = t1276;
+  d_W[23] = t1407;
+  d_W[24] = t749;
+  d_W[25] = t880;
+  d_W[26] = t1011;
+  d_W[27] = t1142;
+  d_W[28] = t1273;
+  d_W[29] = t1404;
+  real t1441 = sqrt(t10);
+  real t1443 = t1441 + (fabs(H[0]));
+  real t1444 = t1441 * t1443;
+  real t1445 = 0.0 < t1444;
+  real t1446 = 1.0 / t1444;
+  real t1447 = t1445 != 0 ? t1446 : 0.0;
+  real t1448 = H[0] < 0.0;
+  real t1449 = -t1441;
+  real t1451 = H[0] + (t1448 != 0 ? t1449 : t1441);
+  real t1457 = t188 + (t189 + (t190 + (t191 + (t192 + H[4] * t1451))));
+  real t1458 = t1447 * t1457;
+  real t1460 = H[29] - H[25] * t1458;
+  real t1466 = t45 + (t46 + (t47 + (t48 + (t49 + H[1] * t1451))));
+  real t1467 = t1447 * t1466;
+  real t1469 = H[26] - H[25] * t1467;
+  real t1472 = H[21] - H[20] * t1467;
+  real t1475 = H[16] - H[15] * t1467;
+  real t1478 = H[6] - H[5] * t1467;
+  real t1481 = H[11] - H[10] * t1467;
+  real t1487 = sqrt(t1469 * t1469 + (t1472 * t1472 + (t1475 * t1475 + (t1478 * t1478 + t1481 *
+    t1481))));
+  real t1489 = t1487 + (fabs(t1478));
+  real t1490 = t1487 * t1489;
+  real t1491 = 0.0 < t1490;
+  real t1492 = 1.0 / t1490;
+  real t1493 = t1491 != 0 ? t1492 : 0.0;
+  real t1496 = H[24] - H[20] * t1458;
+  real t1499 = H[19] - H[15] * t1458;
+  real t1502 = H[9] - H[5] * t1458;
+  real t1503 = t1478 < 0.0;
+  real t1504 = -t1487;
+  real t1506 = t1478 + (t1503 != 0 ? t1504 : t1487);
+  real t1509 = H[14] - H[10] * t1458;
+  real t1514 = t1460 * t1469 + (t1472 * t1496 + (t1475 * t1499 + (t1502 * t1506 + t1481 * t1509)));
+  real t1515 = t1493 * t1514;
+  real t1517 = t1460 - t1469 * t1515;
+  real t1523 = t74 + (t75 + (t76 + (t77 + (t78 + H[2] * t1451))));
+  real t1524 = t1447 * t1523;
+  real t1526 = H[27] - H[25] * t1524;
+  real t1529 = H[22] - H[20] * t1524;
+  real t1532 = H[17] - H[15] * t1524;
+  real t1535 = H[7] - H[5] * t1524;
+  real t1538 = H[12] - H[10] * t1524;
+  real t1543 = t1469 * t1526 + (t1472 * t1529 + (t1475 * t1532 + (t1506 * t1535 + t1481 * t1538)));
+  real t1544 = t1493 * t1543;
+  real t1546 = t1526 - t1469 * t1544;
+  real t1549 = t1529 - t1472 * t1544;
+  real t1552 = t1538 - t1481 * t1544;
+  real t1555 = t1532 - t1475 * t1544;
+  real t1560 = sqrt(t1546 * t1546 + (t1549 * t1549 + (t1552 * t1552 + t1555 * t1555)));
+  real t1562 = t1560 + (fabs(t1552));
+  real t1563 = t1560 * t1562;
+  real t1564 = 0.0 < t1563;
+  real t1565 = 1.0 / t1563;
+  real t1566 = t1564 != 0 ? t1565 : 0.0;
+  real t1569 = t1496 - t1472 * t1515;
+  real t1572 = t1509 - t1481 * t1515;
+  real t1573 = t1552 < 0.0;
+  real t1574 = -t1560;
+  real t1576 = t1552 + (t1573 != 0 ? t1574 : t1560);
+  real t1579 = t1499 - t1475 * t1515;
+  real t1583 = t1517 * t1546 + (t1549 * t1569 + (t1572 * t1576 + t1555 * t1579));
+  real t1584 = t1566 * t1583;
+  real t1586 = t1517 - t1546 * t1584;
+  real t1592 = t121 + (t122 + (t123 + (t124 + (t125 + H[3] * t1451))));
+  real t1593 = t1447 * t1592;
+  real t1595 = H[28] - H[25] * t1593;
+  real t1598 = H[23] - H[20] * t1593;
+  real t1601 = H[18] - H[15] * t1593;
+  real t1604 = H[8] - H[5] * t1593;
+  real t1607 = H[13] - H[10] * t1593;
+  real t1612 = t1469 * t1595 + (t1472 * t1598 + (t1475 * t1601 + (t1506 * t1604 + t1481 * t1607)));
+  real t1613 = t1493 * t1612;
+  real t1615 = t1595 - t1469 * t1613;
+  real t1618 = t1598 - t1472 * t1613;
+  real t1621 = t1607 - t1481 * t1613;
+  real t1624 = t1601 - t1475 * t1613;
+  real t1628 = t1546 * t1615 + (t1549 * t1618 + (t1576 * t1621 + t1555 * t1624));
+  real t1629 = t1566 * t1628;
+  real t1631 = t1615 - t1546 * t1629;
+  real t1634 = t1624 - t1555 * t1629;
+  real t1637 = t1618 - t1549 * t1629;
+  real t1641 = sqrt(t1631 * t1631 + (t1634 * t1634 + t1637 * t1637));
+  real t1643 = t1641 + (fabs(t1634));
+  real t1644 = t1641 * t1643;
+  real t1645 = 0.0 < t1644;
+  real t1646 = 1.0 / t1644;
+  real t1647 = t1645 != 0 ? t1646 : 0.0;
+  real t1650 = t1579 - t1555 * t1584;
+  real t1651 = t1634 < 0.0;
+  real t1652 = -t1641;
+  real t1654 = t1634 + (t1651 != 0 ? t1652 : t1641);
+  real t1657 = t1569 - t1549 * t1584;
+  real t1660 = t1586 * t1631 + (t1650 * t1654 + t1637 * t1657);
+  real t1661 = t1647 * t1660;
+  real t1663 = t1586 - t1631 * t1661;
+  real t1664 = t1663 * t1663;
+  real t1666 = t1657 - t1637 * t1661;
+  real t1669 = sqrt(t1664 + t1666 * t1666);
+  real t1671 = t1669 + (fabs(t1666));
+  real t1672 = t1669 * t1671;
+  real t1673 = 0.0 < t1672;
+  real t1674 = 1.0 / t1672;
+  real t1675 = t1673 != 0 ? t1674 : 0.0;
+  real t1677 = 1.0 - t1664 * t1675;
+  real t1679 = t1666 < 0.0;
+  real t1680 = -t1669;
+  real t1682 = t1666 + (t1679 != 0 ? t1680 : t1669);
+  real t1683 = t1675 * t1682;
+  real t1684 = t1663 * t1683;
+  real t1686 = t1631 * t1677 - t1637 * t1684;
+  real t1687 = t1647 * t1686;
+  real t1689 = t1677 - t1631 * t1687;
+  real t1691 = t1654 * t1687;
+  real t1694 = t1684 + t1637 * t1687;
+  real t1697 = t1546 * t1689 - (t1555 * t1691 + t1549 * t1694);
+  real t1698 = t1566 * t1697;
+  real t1700 = t1689 - t1546 * t1698;
+  real t1703 = t1694 + t1549 * t1698;
+  real t1705 = t1576 * t1698;
+  real t1708 = t1691 + t1555 * t1698;
+  real t1712 = t1469 * t1700 - (t1472 * t1703 + (t1481 * t1705 + t1475 * t1708));
+  real t1713 = t1493 * t1712;
+  real t1715 = t1700 - t1469 * t1713;
+  real t1718 = t1703 + t1472 * t1713;
+  real t1721 = t1708 + t1475 * t1713;
+  real t1723 = t1506 * t1713;
+  real t1726 = t1705 + t1481 * t1713;
+  real t1731 = H[25] * t1715 - (H[20] * t1718 + (H[15] * t1721 + (H[5] * t1723 + H[10] * t1726)));
+  real t1732 = t1447 * t1731;
+  real t1734 = t29 / (t1441 * 2.0);
+  real t1735 = -t1734;
+  real t1737 = d_H[0] + (t1448 != 0 ? t1735 : t1734);
+  real t1747 = -(t1446 * (t1443 * t1734 + t1441 * (t1734 + d_H[0] * (H[0] > 0 ? 1 : (H[0] < 0 ? -1 :
+    H[0])))) / t1444);
+  real t1748 = t1445 != 0 ? t1747 : 0.0;
+  real t1762 = t1457 * t1748 + t1447 * (t612 + (t608 + (t604 + (t600 + (t596 + (t1451 * d_H[4] +
+    H[4] * t1737))))));
+  real t1765 = d_H[29] - (t1458 * d_H[25] + H[25] * t1762);
+  real t1777 = t1466 * t1748 + t1447 * (t299 + (t295 + (t291 + (t287 + (t283 + (t1451 * d_H[1] +
+    H[1] * t1737))))));
+  real t1780 = d_H[26] - (t1467 * d_H[25] + H[25] * t1777);
+  real t1785 = d_H[11] - (t1467 * d_H[10] + H[10] * t1777);
+  real t1786 = t1481 * t1785;
+  real t1791 = d_H[6] - (t1467 * d_H[5] + H[5] * t1777);
+  real t1792 = t1478 * t1791;
+  real t1798 = d_H[16] - (t1467 * d_H[15] + H[15] * t1777);
+  real t1799 = t1475 * t1798;
+  real t1805 = d_H[21] - (t1467 * d_H[20] + H[20] * t1777);
+  real t1806 = t1472 * t1805;
+  real t1809 = t1469 * t1780;
+  real t1813 = (t1786 + t1786 + (t1792 + t1792) + (t1799 + t1799) + (t1806 + t1806) + (t1809 +
+    t1809)) / (t1487 * 2.0);
+  real t1822 = -(t1492 * (t1489 * t1813 + t1487 * (t1813 + t1791 * (t1478 > 0 ? 1 : (t1478 < 0 ? -1
+    : t1478)))) / t1490);
+  real t1823 = t1491 != 0 ? t1822 : 0.0;
+  real t1829 = d_H[14] - (t1458 * d_H[10] + H[10] * t1762);
+  real t1837 = -t1813;
+  real t1839 = t1791 + (t1503 != 0 ? t1837 : t1813);
+  real t1847 = d_H[19] - (t1458 * d_H[15] + H[15] * t1762);
+  real t1855 = d_H[24] - (t1458 * d_H[20] + H[20] * t1762);
+  real t1864 = t1514 * t1823 + t1493 * (t1509 * t1785 + t1481 * t1829 + (t1506 * (d_H[9] - (t1458 *
+    d_H[5] + H[5] * t1762)) + t1502 * t1839) + (t1499 * t1798 + t1475 * t1847) + (t1496 * t1805 +
+    t1472 * t1855) + (t1469 * t1765 + t1460 * t1780));
+  real t1867 = t1765 - (t1515 * t1780 + t1469 * t1864);
+  real t1879 = t1523 * t1748 + t1447 * (t380 + (t376 + (t372 + (t368 + (t364 + (t1451 * d_H[2] +
+    H[2] * t1737))))));
+  real t1882 = d_H[27] - (t1524 * d_H[25] + H[25] * t1879);
+  real t1889 = d_H[12] - (t1524 * d_H[10] + H[10] * t1879);
+  real t1904 = d_H[17] - (t1524 * d_H[15] + H[15] * t1879);
+  real t1912 = d_H[22] - (t1524 * d_H[20] + H[20] * t1879);
+  real t1921 = t1543 * t1823 + t1493 * (t1538 * t1785 + t1481 * t1889 + (t1535 * t1839 + t1506 *
+    (d_H[7] - (t1524 * d_H[5] + H[5] * t1879))) + (t1532 * t1798 + t1475 * t1904) + (t1529 * t1805 +
+    t1472 * t1912) + (t1526 * t1780 + t1469 * t1882));
+  real t1924 = t1882 - (t1544 * t1780 + t1469 * t1921);
+  real t1929 = t1904 - (t1544 * t1798 + t1475 * t1921);
+  real t1930 = t1555 * t1929;
+  real t1935 = t1889 - (t1544 * t1785 + t1481 * t1921);
+  real t1936 = t1552 * t1935;
+  real t1942 = t1912 - (t1544 * t1805 + t1472 * t1921);
+  real t1943 = t1549 * t1942;
+  real t1946 = t1546 * t1924;
+  real t1950 = (t1930 + t1930 + (t1936 + t1936) + (t1943 + t1943) + (t1946 + t1946)) / (t1560 *
+    2.0);
+  real t1959 = -(t1565 * (t1562 * t1950 + t1560 * (t1950 + t1935 * (t1552 > 0 ? 1 : (t1552 < 0 ? -1
+    : t1552)))) / t1563);
+  real t1960 = t1564 != 0 ? t1959 : 0.0;
+  real t1966 = t1847 - (t1515 * t1798 + t1475 * t1864);
+  real t1974 = -t1950;
+  real t1976 = t1935 + (t1573 != 0 ? t1974 : t1950);
+  real t1984 = t1855 - (t1515 * t1805 + t1472 * t1864);
+  real t1993 = t1583 * t1960 + t1566 * (t1579 * t1929 + t1555 * t1966 + (t1576 * (t1829 - (t1515 *
+    t1785 + t1481 * t1864)) + t1572 * t1976) + (t1569 * t1942 + t1549 * t1984) + (t1546 * t1867 +
+    t1517 * t1924));
+  real t1996 = t1867 - (t1584 * t1924 + t1546 * t1993);
+  real t2008 = t1592 * t1748 + t1447 * (t475 + (t471 + (t467 + (t463 + (t459 + (t1451 * d_H[3] +
+    H[3] * t1737))))));
+  real t2011 = d_H[28] - (t1593 * d_H[25] + H[25] * t2008);
+  real t2018 = d_H[13] - (t1593 * d_H[10] + H[10] * t2008);
+  real t2033 = d_H[18] - (t1593 * d_H[15] + H[15] * t2008);
+  real t2041 = d_H[23] - (t1593 * d_H[20] + H[20] * t2008);
+  real t2050 = t1612 * t1823 + t1493 * (t1607 * t1785 + t1481 * t2018 + (t1604 * t1839 + t1506 *
+    (d_H[8] - (t1593 * d_H[5] + H[5] * t2008))) + (t1601 * t1798 + t1475 * t2033) + (t1598 * t1805 +
+    t1472 * t2041) + (t1595 * t1780 + t1469 * t2011));
+  real t2053 = t2011 - (t1613 * t1780 + t1469 * t2050);
+  real t2060 = t2033 - (t1613 * t1798 + t1475 * t2050);
+  real t2075 = t2041 - (t1613 * t1805 + t1472 * t2050);
+  real t2084 = t1628 * t1960 + t1566 * (t1624 * t1929 + t1555 * t2060 + (t1621 * t1976 + t1576 *
+    (t2018 - (t1613 * t1785 + t1481 * t2050))) + (t1618 * t1942 + t1549 * t2075) + (t1615 * t1924 +
+    t1546 * t2053));
+  real t2087 = t2053 - (t1629 * t1924 + t1546 * t2084);
+  real t2092 = t2075 - (t1629 * t1942 + t1549 * t2084);
+  real t2093 = t1637 * t2092;
+  real t2098 = t2060 - (t1629 * t1929 + t1555 * t2084);
+  real t2099 = t1634 * t2098;
+  real t2102 = t1631 * t2087;
+  real t2106 = (t2093 + t2093 + (t2099 + t2099) + (t2102 + t2102)) / (t1641 * 2.0);
+  real t2115 = -(t1646 * (t1643 * t2106 + t1641 * (t2106 + t2098 * (t1634 > 0 ? 1 : (t1634 < 0 ? -1
+    : t1634)))) / t1644);
+  real t2116 = t1645 != 0 ? t2115 : 0.0;
+  real t2122 = t1984 - (t1584 * t1942 + t1549 * t1993);
+  real t2130 = -t2106;
+  real t2132 = t2098 + (t1651 != 0 ? t2130 : t2106);
+  real t2141 = t1660 * t2116 + t1647 * (t1657 * t2092 + t1637 * t2122 + (t1654 * (t1966 - (t1584 *
+    t1929 + t1555 * t1993)) + t1650 * t2132) + (t1631 * t1996 + t1586 * t2087));
+  real t2144 = t1996 - (t1661 * t2087 + t1631 * t2141);
+  real t2145 = t1663 * t2144;
+  real t2146 = t2145 + t2145;
+  real t2151 = t2122 - (t1661 * t2092 + t1637 * t2141);
+  real t2152 = t1666 * t2151;
+  real t2156 = (t2152 + t2152 + t2146) / (t1669 * 2.0);
+  real t2165 = -(t1674 * (t1671 * t2156 + t1669 * (t2156 + t2151 * (t1666 > 0 ? 1 : (t1666 < 0 ? -1
+    : t1666)))) / t1672);
+  real t2166 = t1673 != 0 ? t2165 : 0.0;
+  real t2168 = t1675 * t2146 + t1664 * t2166;
+  real t2177 = -t2156;
+  real t2183 = t1683 * t2144 + t1663 * (t1682 * t2166 + t1675 * (t2151 + (t1679 != 0 ? t2177 :
+    t2156)));
+  real t2188 = t1686 * t2116 + t1647 * (t1677 * t2087 - t1631 * t2168 - (t1684 * t2092 + t1637 *
+    t2183));
+  real t2191 = t2168 + (t1687 * t2087 + t1631 * t2188);
+  real t2201 = t2183 + (t1687 * t2092 + t1637 * t2188);
+  real t2207 = t1687 * t2132 + t1654 * t2188;
+  real t2213 = t1697 * t1960 + t1566 * (t1689 * t1924 - t1546 * t2191 - (t1694 * t1942 + t1549 *
+    t2201 + (t1691 * t1929 + t1555 * t2207)));
+  real t2216 = t2191 + (t1698 * t1924 + t1546 * t2213);
+  real t2226 = t2207 + (t1698 * t1929 + t1555 * t2213);
+  real t2232 = t1698 * t1976 + t1576 * t2213;
+  real t2240 = t2201 + (t1698 * t1942 + t1549 * t2213);
+  real t2246 = t1712 * t1823 + t1493 * (t1700 * t1780 - t1469 * t2216 - (t1708 * t1798 + t1475 *
+    t2226 + (t1705 * t1785 + t1481 * t2232) + (t1703 * t1805 + t1472 * t2240)));
+  real t2249 = t2216 + (t1713 * t1780 + t1469 * t2246);
+  real t2256 = t2232 + (t1713 * t1785 + t1481 * t2246);
+  real t2262 = t1713 * t1839 + t1506 * t2246;
+  real t2270 = t2226 + (t1713 * t1798 + t1475 * t2246);
+  real t2278 = t2240 + (t1713 * t1805 + t1472 * t2246);
+  real t2284 = t1731 * t1748 + t1447 * (t1715 * d_H[25] - H[25] * t2249 - (t1726 * d_H[10] + H[10] *
+    t2256 + (t1723 * d_H[5] + H[5] * t2262) + (t1721 * d_H[15] + H[15] * t2270) + (t1718 * d_H[20] +
+    H[20] * t2278)));
+  d_W[30] = -(t1732 * t1737 + t1451 * t2284);
+  d_W[31] = -(t2262 + (t1732 * d_H[5] + H[5] * t2284));
+  d_W[32] = -(t2256 + (t1732 * d_H[10] + H[10] * t2284));
+  d_W[33] = -(t2270 + (t1732 * d_H[15] + H[15] * t2284));
+  d_W[34] = -(t2278 + (t1732 * d_H[20] + H[20] * t2284));
+  d_W[35] = -(t2249 + (t1732 * d_H[25] + H[25] * t2284));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_complement_slope_inputs[] = {
-    {"H", 30, "", 0, 0},
-    {"d_H", 30, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_complement_slope, (in[0], in[1], out[0]))
 
 /* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -15484,49 +4076,14 @@ static const mstmm_port mstmm_sweep_generic5_complement_slope_outputs[] = {
  * in  d_z[5] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic5_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+int mstmm_sweep_generic5_add_known_part_slope(in_t y, in_t z, in_t d_y, in_t d_z, out_t d_l)
 {
-    const real t0 = z[4] * d_y[4];
-    const real t1 = y[4] * d_z[4];
-    const real t2 = t0 + t1;
-    const real t3 = z[3] * d_y[3];
-    const real t4 = y[3] * d_z[3];
-    const real t5 = t3 + t4;
-    const real t6 = z[2] * d_y[2];
-    const real t7 = y[2] * d_z[2];
-    const real t8 = t6 + t7;
-    const real t9 = z[1] * d_y[1];
-    const real t10 = y[1] * d_z[1];
-    const real t11 = t9 + t10;
-    const real t12 = z[0] * d_y[0];
-    const real t13 = y[0] * d_z[0];
-    const real t14 = t12 + t13;
-    const real t15 = t11 + t14;
-    const real t16 = t8 + t15;
-    const real t17 = t5 + t16;
-    const real t18 = t2 + t17;
-    const real t19 = -t18;
-    d_l[0] += t19;
-    return 0;
+  d_l[0] += -(z[4] * d_y[4] + y[4] * d_z[4] + (z[3] * d_y[3] + y[3] * d_z[3] + (z[2] * d_y[2] + y[2]
+    * d_z[2] + (z[1] * d_y[1] + y[1] * d_z[1] + (z[0] * d_y[0] + y[0] * d_z[0])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic5_add_known_part_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_add_known_part_slope_inputs[] = {
-    {"y", 5, "", 0, 0},
-    {"z", 5, "", 0, 0},
-    {"d_y", 5, "", 0, 0},
-    {"d_z", 5, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_add_known_part_slope_outputs[] = {
-    {"d_l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_add_known_part_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -15537,441 +4094,219 @@ static const mstmm_port mstmm_sweep_generic5_add_known_part_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[5] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic5_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+int mstmm_sweep_generic5_add_multiplier_effort_slope(in_t y, in_t x, in_t d_y, in_t d_x,
+    out_t d_y_0)
 {
-    const real t0 = x[0] * d_y[0];
-    const real t1 = y[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_y_0[0] += t2;
-    const real t3 = y[1] * d_x[0];
-    const real t4 = x[0] * d_y[1];
-    const real t5 = t3 + t4;
-    d_y_0[1] += t5;
-    const real t6 = y[2] * d_x[0];
-    const real t7 = x[0] * d_y[2];
-    const real t8 = t6 + t7;
-    d_y_0[2] += t8;
-    const real t9 = y[3] * d_x[0];
-    const real t10 = x[0] * d_y[3];
-    const real t11 = t9 + t10;
-    d_y_0[3] += t11;
-    const real t12 = y[4] * d_x[0];
-    const real t13 = x[0] * d_y[4];
-    const real t14 = t12 + t13;
-    d_y_0[4] += t14;
-    return 0;
+  d_y_0[0] += x[0] * d_y[0] + y[0] * d_x[0];
+  d_y_0[1] += y[1] * d_x[0] + x[0] * d_y[1];
+  d_y_0[2] += y[2] * d_x[0] + x[0] * d_y[2];
+  d_y_0[3] += y[3] * d_x[0] + x[0] * d_y[3];
+  d_y_0[4] += y[4] * d_x[0] + x[0] * d_y[4];
+  return 0;
 }
 
-static int mstmm_sweep_generic5_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic5_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_slope_inputs[] = {
-    {"y", 5, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_y", 5, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic5_add_multiplier_effort_slope_outputs[] = {
-    {"d_y_0", 5, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic5_add_multiplier_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic5_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic5_forward,
-        .call = mstmm_sweep_generic5_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_forward_inputs,
-        .outputs = mstmm_sweep_generic5_forward_outputs,
-        .ir_hash = "8b14be1eee1985d1270d77058ef9a2b25d6df1deeddb0efb4593dc00bd031aca",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic5_condense,
-        .call = mstmm_sweep_generic5_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic5_condense_inputs,
-        .outputs = mstmm_sweep_generic5_condense_outputs,
-        .ir_hash = "6ef7a08a23ea74de229dd7f3a9ce95411202a9b3b1715073fecccad96ac261fc",
-        .n_guards = 15,
-        .guards = mstmm_sweep_generic5_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic5_recover,
-        .call = mstmm_sweep_generic5_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_recover_inputs,
-        .outputs = mstmm_sweep_generic5_recover_outputs,
-        .ir_hash = "60859dcbb96b43398ce4d0a161d3fc24d0d89183cdc7617feea216e4d51639b2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic5_effort,
-        .call = mstmm_sweep_generic5_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_effort_inputs,
-        .outputs = mstmm_sweep_generic5_effort_outputs,
-        .ir_hash = "8f4c627ea346df0ea6a187de592e29cecc6555e3cfcc049963f642e90c1882f2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic5_project,
-        .call = mstmm_sweep_generic5_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_project_inputs,
-        .outputs = mstmm_sweep_generic5_project_outputs,
-        .ir_hash = "0c359d9d84790dd89d940884a751fa48e01be58bae8748dd93638628531dcea6",
-        .n_guards = 5,
-        .guards = mstmm_sweep_generic5_project_guards,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic5_factor,
-        .call = mstmm_sweep_generic5_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_factor_inputs,
-        .outputs = mstmm_sweep_generic5_factor_outputs,
-        .ir_hash = "547e408ee71c10aea2fd815a01de80100ae7689c496391f457dc4c021fa559eb",
-        .n_guards = 10,
-        .guards = mstmm_sweep_generic5_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic5_column_load,
-        .call = mstmm_sweep_generic5_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_column_load_inputs,
-        .outputs = mstmm_sweep_generic5_column_load_outputs,
-        .ir_hash = "9ff479be44a3cf0a75e56d5bfbd7757522ac60d5b815b46c92466a74c11bbbb5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic5_column_acceleration,
-        .call = mstmm_sweep_generic5_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic5_column_acceleration_outputs,
-        .ir_hash = "b274449953a5914550c77ee71eb8a80fa57eaf77029c55c08ac788e2484eb943",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic5_qr_eliminate,
-        .call = mstmm_sweep_generic5_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic5_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic5_qr_eliminate_outputs,
-        .ir_hash = "49a02c27ded1e8bdde9429c2ea28f7983a65395d2fbf5d50f5f717a45a2c7463",
-        .n_guards = 10,
-        .guards = mstmm_sweep_generic5_qr_eliminate_guards,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_carrier,
-        .call = mstmm_sweep_generic5_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_carrier_outputs,
-        .ir_hash = "3a1cd1b1c6935fe0c00d67ee37b00438b309b4c983614d127e4d81d7471941b2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_column,
-        .call = mstmm_sweep_generic5_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_column_outputs,
-        .ir_hash = "bd321d9ec37d27d1504b710ebef6a5faea7208d728cbfc65dad5f5b7b31d5bd4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_coordinate_change",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_coordinate_change,
-        .call = mstmm_sweep_generic5_tangent_coordinate_change_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_coordinate_change_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_coordinate_change_outputs,
-        .ir_hash = "e1004c92407e1aaa3ddbfcbbc15e63db08672d9cf9f125972c327286694f3202",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_steady",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_steady,
-        .call = mstmm_sweep_generic5_tangent_steady_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_tangent_steady_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_steady_outputs,
-        .ir_hash = "f308c3427161d62aa27dc8fa2b54e17fecbe6a668b5a5dc616e8f2e9818651b2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rotational",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_rotational,
-        .call = mstmm_sweep_generic5_tangent_rotational_call,
-        .n_inputs = 9,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_tangent_rotational_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_rotational_outputs,
-        .ir_hash = "3c4c09e87981254d6af74f1f2644875bf87550ef1ad12f7fa8c64a17fabc0eb3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rows",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_rows,
-        .call = mstmm_sweep_generic5_tangent_rows_call,
-        .n_inputs = 4,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic5_tangent_rows_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_rows_outputs,
-        .ir_hash = "cf142a1871975eba177bb6938abad0f14e929391d3c585e90b45695bb2f22aaa",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_reduce",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_reduce,
-        .call = mstmm_sweep_generic5_tangent_reduce_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_tangent_reduce_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_reduce_outputs,
-        .ir_hash = "a302f3efa4ebc1ce810d501229bab4d568aec722cc6701d36a36453ee5f95789",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_load,
-        .call = mstmm_sweep_generic5_tangent_load_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_load_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_load_outputs,
-        .ir_hash = "791cae013fdc5e7ca6954feadaabc3575e3fa75116d4c77dd1dcec2137ea3dbd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_solution,
-        .call = mstmm_sweep_generic5_tangent_solution_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_solution_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_solution_outputs,
-        .ir_hash = "9dea60e259445ef56dcc8a909ac6ef48720964cc31c5722bf06135a5a3e11771",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_load_with_increments,
-        .call = mstmm_sweep_generic5_tangent_load_with_increments_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_load_with_increments_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_load_with_increments_outputs,
-        .ir_hash = "1397b0804182095e49d70089abeea622affa0f40550ee2b9bfd3021496d8ef7c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic5_tangent_solution_with_increments,
-        .call = mstmm_sweep_generic5_tangent_solution_with_increments_call,
-        .n_inputs = 10,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic5_tangent_solution_with_increments_inputs,
-        .outputs = mstmm_sweep_generic5_tangent_solution_with_increments_outputs,
-        .ir_hash = "0ab3493442abf63730834a9cf7cfaa07fde254f30cb7dc68309869cba473609b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic5_complement,
-        .call = mstmm_sweep_generic5_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_complement_inputs,
-        .outputs = mstmm_sweep_generic5_complement_outputs,
-        .ir_hash = "36b06fca385445b88994c1fb7107d8a54a962c47cd20fd1603b8a8e34c568839",
-        .n_guards = 5,
-        .guards = mstmm_sweep_generic5_complement_guards,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_generic5_divide,
-        .call = mstmm_sweep_generic5_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_divide_inputs,
-        .outputs = mstmm_sweep_generic5_divide_outputs,
-        .ir_hash = "2978c5d66d774fedd56cfd3d9be83c435cedc1c51e5c7bc0fad44ae536882880",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_generic5_couple,
-        .call = mstmm_sweep_generic5_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_couple_inputs,
-        .outputs = mstmm_sweep_generic5_couple_outputs,
-        .ir_hash = "7a2f4ba59f5752a466f9a3a0b2943e8d7c93198acde23744e85a13ab06a9b426",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_generic5_add_known_part,
-        .call = mstmm_sweep_generic5_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_add_known_part_inputs,
-        .outputs = mstmm_sweep_generic5_add_known_part_outputs,
-        .ir_hash = "03a68435c595f8565e0fcf435bda65e99b72c844a71d9a1af1cc534c3bd6658b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_generic5_add_multiplier_effort,
-        .call = mstmm_sweep_generic5_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_generic5_add_multiplier_effort_outputs,
-        .ir_hash = "b7f48ed546dfefbf4127ee4e221fd9d53454405c3a90d42a5e41ef6ae9167653",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_load",
-        .function = (void (*)(void))mstmm_sweep_generic5_required_load,
-        .call = mstmm_sweep_generic5_required_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_required_load_inputs,
-        .outputs = mstmm_sweep_generic5_required_load_outputs,
-        .ir_hash = "db6d554523e572ab7dc5bbb28d998ca95e35b3748cb140f4ac78a7ac843911c2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_generic5_ground_column_load,
-        .call = mstmm_sweep_generic5_ground_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_ground_column_load_inputs,
-        .outputs = mstmm_sweep_generic5_ground_column_load_outputs,
-        .ir_hash = "084d158c2187e93422de6017b03cd8df3bab3f7599940b3ca9012c6b208e0884",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_forward_slope,
-        .call = mstmm_sweep_generic5_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic5_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic5_forward_slope_outputs,
-        .ir_hash = "a3a4401402f2468d85a1b9c3daa81913485f1837a42c56eaf8c4792029b92df4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_effort_slope,
-        .call = mstmm_sweep_generic5_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic5_effort_slope_outputs,
-        .ir_hash = "607a61a4c9273f00a41168b732a563fdbf3887a9ca947a87637335251adfbb84",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_complement_slope,
-        .call = mstmm_sweep_generic5_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic5_complement_slope_outputs,
-        .ir_hash = "d470ecc01082b7be4e6d98fdad669091260619489bbbde574e2ae63739b7ecfe",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_add_known_part_slope,
-        .call = mstmm_sweep_generic5_add_known_part_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_add_known_part_slope_inputs,
-        .outputs = mstmm_sweep_generic5_add_known_part_slope_outputs,
-        .ir_hash = "6d25b7fce096ab7d5b169fde2e2c4ded36c26ffa2180739a5d15e4a34dbb4021",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic5_add_multiplier_effort_slope,
-        .call = mstmm_sweep_generic5_add_multiplier_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic5_add_multiplier_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic5_add_multiplier_effort_slope_outputs,
-        .ir_hash = "eb4797fe57f117ab6ccdcbdfbfd6d5bc10467a9727d3e92a4cf76e5b34b33b31",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic5_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 30, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 5, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "5c1aedf1932e3d17a243bef775383d68ea201b169b7f7cdf45301080162b507a", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic5_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"J", 5, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 5, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 30, "", 0, 0}, {"g", 5, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "8dec41bb46f3128dbed2b54be40911d0f057b89f935e1d4c8927e50d676203a0", 15, (const
+    mstmm_guard[]){{1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 5 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic5_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"G", 30, "", 0, 0}, {"g", 5, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 5, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "02d6504c61e6e4fbc640ecf6ce2902b2a3407862e79feba19ac16cdd8e7a9496", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic5_effort), 2, 1, (const mstmm_port[]){{"H", 30, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 5, "N, N*m", 0, 0}},
+    "8bcdb55e6a6449a9db6eecf805e08c7f729d9351557708cf793cb6485675afba", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic5_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 5, "", 0, 0}},
+    "97a060fdeddfcf14eda81eceaddd419724d75f9d1c802280113d5495a6ac16a1", 5, (const mstmm_guard[]){{1,
+    "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"}}},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic5_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"J", 5, "kg*m2 or kg", 0, 0}, {"W", 25, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 25, "", 0,
+    0}, {"G", 30, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "9c0fe8be0b9e87a6a6443a74bec5129f6eaf8b3bda664b7bd783b99b01ca22b4", 10, (const
+    mstmm_guard[]){{1, "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 5 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic5_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"G", 30, "", 0,
+    0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 5, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 5,
+    "N, N*m", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "9da8557ab2423781c8b9a711b629d68f02cb02b7b5dd6e14064a4d98e750fe00", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic5_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"F", 25, "", 0,
+    0}, {"G", 30, "", 0, 0}, {"y", 5, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 5, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "fb2110de5c6e829ea698a7880921790835aa1a43955ba0130944ec6b2fb246b3", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic5_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 30, "", 0, 0}, {"J", 5, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 5, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 30, "", 0, 0}, {"g", 5, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "0f3b6fe93f997118442017b8ea5226905b8500015269f68f25bada2a2013db84", 10, (const
+    mstmm_guard[]){{1, "speed 1 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 5 moves no inertia: its acceleration is undetermined"}, {1,
+    "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"}}},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 30, "", 0, 0}, {"s", 5, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "ae4f1bdb1833dc5c6e5641944ae8a8e2ad450df1f422a7d6d4f4d73fc5ba648b", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 30, "", 0, 0}, {"s", 5, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 30, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    5, "", 0, 0}, {"J", 5, "kg*m2 or kg", 0, 0}, {"laws", 5, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 5, "", 0, 0}},
+    "1b0d2c1f765a6e7e15c857c25f07ceeea0a6743db5038df3ef332044a67659f9", 0, NULL},
+  {"tangent_coordinate_change", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_coordinate_change), 2,
+    2, (const mstmm_port[]){{"H", 30, "", 0, 0}, {"d_q", 5, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "6dd0a98ccf64d156f84f76aa2e482c2a7de648e141e40ba139b9920e9a53b26c", 0, NULL},
+  {"tangent_steady", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_steady), 11, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 30, "", 0, 0}, {"v", 3, "", 0,
+    0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 5, "", 0, 0},
+    {"d_s", 5, "", 0, 0}, {"J", 5, "kg*m2 or kg", 0, 0}, {"laws", 5, "", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 5, "", 0, 0}},
+    "fe5af7baab0ae9559426af1ec18b8bf01bb3b117255226688435b1a994917425", 0, NULL},
+  {"tangent_rotational", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_rotational), 9, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"H", 30, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 5, "", 0, 0}, {"d_s", 5, "", 0, 0}, {"J", 5,
+    "kg*m2 or kg", 0, 0}, {"laws", 5, "", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6,
+    "", 0, 0}, {"row", 5, "", 0, 0}},
+    "f7d56c756bcc9dc24cef5c79f9385a2c1a61fc4749cd7bf6984df6a807719619", 0, NULL},
+  {"tangent_rows", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_rows), 4, 4, (const
+    mstmm_port[]){{"H", 30, "", 0, 0}, {"B", 45, "", 0, 0}, {"W", 25, "", 0, 0}, {"S", 54, "", 0,
+    0}}, (const mstmm_port[]){{"K", 30, "", 0, 0}, {"right", 45, "", 0, 0}, {"D", 25, "", 0, 0},
+    {"one", 25, "", 0, 0}}, "a914bef3b55d861a97714bebe652ef191cb242797c51377b66e89bcb400311f7", 0,
+    NULL},
+  {"tangent_reduce", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_reduce), 4, 3, (const
+    mstmm_port[]){{"inverse", 25, "", 0, 0}, {"right", 45, "", 0, 0}, {"K", 30, "", 0, 0}, {"G", 30,
+    "", 0, 0}}, (const mstmm_port[]){{"gain", 45, "", 0, 0}, {"V", 30, "", 0, 0}, {"S", 54, "", 1,
+    0}}, "5adf33d6d9b7f016630fe1c2b403bcccfcc7fbe3cc03ce7ea26b1145051c1dc4", 0, NULL},
+  {"tangent_load", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_load), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"V", 30, "", 0,
+    0}, {"inverse", 25, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 5, "", 0, 0}}, (const
+    mstmm_port[]){{"y", 5, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "ba8c7473f8abb567b3a6e625cc1e7f6797412f9fc04866899213c097fe007f60", 0, NULL},
+  {"tangent_solution", MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_solution), 9, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 45, "", 0, 0}, {"gain", 45,
+    "", 0, 0}, {"y", 5, "", 0, 0}}, (const mstmm_port[]){{"x", 5, "", 0, 0}, {"z", 9, "", 0, 0}},
+    "77fc344505051c4e17c13dc325d249accfe066043b6d9f6c8ba06e822c420bda", 0, NULL},
+  {"tangent_load_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_load_with_increments), 8, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 30, "", 0, 0}, {"V", 30, "", 0,
+    0}, {"inverse", 25, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 5, "", 0, 0}, {"e_b", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 5, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "ec38e7523f9c8aa89fafb73879f6feaec12bc73116bfd71a463371b923dba596", 0, NULL},
+  {"tangent_solution_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic5_tangent_solution_with_increments), 10, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 45, "", 0, 0}, {"gain", 45,
+    "", 0, 0}, {"y", 5, "", 0, 0}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"x", 5, "", 0, 0},
+    {"z", 9, "", 0, 0}}, "a452556068aa17d41f1ceeab4a30c22fcaaf1e4701a9ae12df1d7edf23b3867e", 0,
+    NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic5_complement), 1, 1, (const mstmm_port[]){{"H",
+    30, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "e63419cec102fab8f75a96068ddb6e1f26f9baeb8694db046611f2bbfd031515", 5, (const mstmm_guard[]){{1,
+    "pivot 1 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 5 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 5 vanishes: a motion of the hinge is undetermined"}}},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_generic5_divide), 2, 1, (const mstmm_port[]){{"F", 25, "",
+    0, 0}, {"y", 5, "", 0, 0}}, (const mstmm_port[]){{"z", 5, "", 0, 0}},
+    "c5d76eee49153ce1da9af7bf6a005dd505a7f2f8463427a1d516701bb5cf6dd4", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_generic5_couple), 2, 1, (const mstmm_port[]){{"y", 5, "",
+    0, 0}, {"z", 5, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "fccd97c7182051e7e921c463eb708c0ac2471357feb4ecf18636c46b037e7c0e", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_generic5_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 5, "", 0, 0}, {"z", 5, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "c8f540670ee92dc25d302babdd0b49dec8ba7ed3e56745ea7f7d9ac2e97b1b29", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_generic5_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 5, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    5, "", 1, 0}}, "a7281793e790e4cf043f68675522c5494c2f4056eb2d5e9a40b29fe9f5186cdb", 0, NULL},
+  {"required_load", MSTMM_FUNCTIONS(mstmm_sweep_generic5_required_load), 3, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"H", 30, "", 0, 0}, {"udot", 5, "", 0, 0}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "fc975da6b78ccfd4cba4be1ad78fd098f6aa107628dcbd3dfe65fed83997fda9", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic5_ground_column_load), 3, 1, (const
+    mstmm_port[]){{"H", 30, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 5, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"y", 5, "N, N*m", 0, 0}},
+    "09b48b0e23cc2c54497312710085141c671a2d38fd2e8eeb4f62d3a1d9943343", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic5_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 30, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 5, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 30, "", 0,
+    0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 5, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "3acc23b90340fdeadbeee75c102de1b21bf1a060ec7ffa8feb40471204fc6956",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic5_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 30, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 30, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 5, "N, N*m", 0, 0}},
+    "8858333ad48cc92e7dd32c05765c971d95d1b2d1a6656e4441145a3936c65850", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic5_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 30, "", 0, 0}, {"d_H", 30, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "",
+    0, 0}}, "bd263de51887c49d7d1309b3ca142978c95879603f57db49ee4f972d803e7fc7", 0, NULL},
+  {"add_known_part_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic5_add_known_part_slope), 4, 1, (const
+    mstmm_port[]){{"y", 5, "", 0, 0}, {"z", 5, "", 0, 0}, {"d_y", 5, "", 0, 0}, {"d_z", 5, "", 0,
+    0}}, (const mstmm_port[]){{"d_l", 1, "", 1, 0}},
+    "ffbf5f20887f8e36b1cee6733e4c7fec0ab2644319bd215ab5511d3ca64871cf", 0, NULL},
+  {"add_multiplier_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic5_add_multiplier_effort_slope),
+    4, 1, (const mstmm_port[]){{"y", 5, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_y", 5, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_y_0", 5, "", 1, 0}},
+    "6be7a9e9156c254e1c5ad443ae1c4fe7f2150b0a269765865f9cf9f057862845", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic5 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic5",
-    .hash = "4030b4478db684a9d132e4f4643d15578f9275e2e092ee9d762d9a8566f48dd0",
+    .hash = "2f45d2fc396d694d2156a67b31e45b51844519932c8a708b051c53862ab46269",
     .nq = 0,
     .nu = 0,
     .np = 0,

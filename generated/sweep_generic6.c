@@ -10,105 +10,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_generic6;
-int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion);
-int mstmm_sweep_generic6_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I);
-int mstmm_sweep_generic6_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, real *restrict tau);
-int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot);
-int mstmm_sweep_generic6_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I);
-int mstmm_sweep_generic6_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_generic6_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q);
-int mstmm_sweep_generic6_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q);
-int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row);
-int mstmm_sweep_generic6_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x);
-int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row);
-int mstmm_sweep_generic6_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row);
-int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one);
-int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S);
-int mstmm_sweep_generic6_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z);
-int mstmm_sweep_generic6_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I);
-int mstmm_sweep_generic6_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z);
-int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W);
-int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij);
-int mstmm_sweep_generic6_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_generic6_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_generic6_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e);
-int mstmm_sweep_generic6_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y);
-int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion);
-int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau);
-int mstmm_sweep_generic6_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W);
-int mstmm_sweep_generic6_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l);
-int mstmm_sweep_generic6_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0);
-
 #ifndef MSTMM_TWO
 #define MSTMM_TWO
 /* Pairs of numbers, in a register and in an array. */
@@ -127,8 +28,6 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
 #endif
 
 /* bias motion outboard of a hinge with 6 speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -143,315 +42,73 @@ static inline __attribute__((always_inline, unused)) two_t mstmm_apart(const rea
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_sweep_generic6_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, real *restrict Rc, real *restrict r, real *restrict motion)
+int mstmm_sweep_generic6_forward(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w, in_t c,
+    in_t s, in_t motion_I, out_t Rc, out_t r, out_t motion)
 {
-    const real t0 = Rt[0] * R[0];
-    const real t1 = Rt[1] * R[3];
-    const real t2 = t0 + t1;
-    const real t3 = Rt[2] * R[6];
-    const real t4 = t2 + t3;
-    Rc[0] = t4;
-    const real t5 = Rt[0] * R[1];
-    const real t6 = Rt[1] * R[4];
-    const real t7 = t5 + t6;
-    const real t8 = Rt[2] * R[7];
-    const real t9 = t7 + t8;
-    Rc[1] = t9;
-    const real t10 = Rt[0] * R[2];
-    const real t11 = Rt[1] * R[5];
-    const real t12 = t10 + t11;
-    const real t13 = Rt[2] * R[8];
-    const real t14 = t12 + t13;
-    Rc[2] = t14;
-    const real t15 = Rt[3] * R[0];
-    const real t16 = Rt[4] * R[3];
-    const real t17 = t15 + t16;
-    const real t18 = Rt[5] * R[6];
-    const real t19 = t17 + t18;
-    Rc[3] = t19;
-    const real t20 = Rt[3] * R[1];
-    const real t21 = Rt[4] * R[4];
-    const real t22 = t20 + t21;
-    const real t23 = Rt[5] * R[7];
-    const real t24 = t22 + t23;
-    Rc[4] = t24;
-    const real t25 = Rt[3] * R[2];
-    const real t26 = Rt[4] * R[5];
-    const real t27 = t25 + t26;
-    const real t28 = Rt[5] * R[8];
-    const real t29 = t27 + t28;
-    Rc[5] = t29;
-    const real t30 = Rt[6] * R[0];
-    const real t31 = Rt[7] * R[3];
-    const real t32 = t30 + t31;
-    const real t33 = Rt[8] * R[6];
-    const real t34 = t32 + t33;
-    Rc[6] = t34;
-    const real t35 = Rt[6] * R[1];
-    const real t36 = Rt[7] * R[4];
-    const real t37 = t35 + t36;
-    const real t38 = Rt[8] * R[7];
-    const real t39 = t37 + t38;
-    Rc[7] = t39;
-    const real t40 = Rt[6] * R[2];
-    const real t41 = Rt[7] * R[5];
-    const real t42 = t40 + t41;
-    const real t43 = Rt[8] * R[8];
-    const real t44 = t42 + t43;
-    Rc[8] = t44;
-    const real t45 = Rt[0] * d[0];
-    const real t46 = Rt[1] * d[1];
-    const real t47 = t45 + t46;
-    const real t48 = Rt[2] * d[2];
-    const real t49 = t47 + t48;
-    const real t50 = ro[0] + t49;
-    r[0] = t50;
-    const real t51 = Rt[3] * d[0];
-    const real t52 = Rt[4] * d[1];
-    const real t53 = t51 + t52;
-    const real t54 = Rt[5] * d[2];
-    const real t55 = t53 + t54;
-    const real t56 = ro[1] + t55;
-    r[1] = t56;
-    const real t57 = Rt[6] * d[0];
-    const real t58 = Rt[7] * d[1];
-    const real t59 = t57 + t58;
-    const real t60 = Rt[8] * d[2];
-    const real t61 = t59 + t60;
-    const real t62 = ro[2] + t61;
-    r[2] = t62;
-    const real t63 = motion_I[0] * t4;
-    const real t64 = motion_I[1] * t19;
-    const real t65 = t63 + t64;
-    const real t66 = motion_I[2] * t34;
-    const real t67 = t65 + t66;
-    const real t68 = w[0] + t67;
-    motion[0] = t68;
-    const real t69 = motion_I[0] * t9;
-    const real t70 = motion_I[1] * t24;
-    const real t71 = t69 + t70;
-    const real t72 = motion_I[2] * t39;
-    const real t73 = t71 + t72;
-    const real t74 = w[1] + t73;
-    motion[1] = t74;
-    const real t75 = motion_I[0] * t14;
-    const real t76 = motion_I[1] * t29;
-    const real t77 = t75 + t76;
-    const real t78 = motion_I[2] * t44;
-    const real t79 = t77 + t78;
-    const real t80 = w[2] + t79;
-    motion[2] = t80;
-    const real t81 = motion_I[3] * t4;
-    const real t82 = motion_I[4] * t19;
-    const real t83 = t81 + t82;
-    const real t84 = motion_I[5] * t34;
-    const real t85 = t83 + t84;
-    const real t86 = H[18] * s[0];
-    const real t87 = H[19] * s[1];
-    const real t88 = t86 + t87;
-    const real t89 = H[20] * s[2];
-    const real t90 = t88 + t89;
-    const real t91 = H[21] * s[3];
-    const real t92 = t90 + t91;
-    const real t93 = H[22] * s[4];
-    const real t94 = t92 + t93;
-    const real t95 = H[23] * s[5];
-    const real t96 = t94 + t95;
-    const real t97 = c[3] + t96;
-    const real t98 = w[2] * t73;
-    const real t99 = w[1] * t79;
-    const real t100 = t98 - t99;
-    const real t101 = t97 + t100;
-    const real t102 = t85 + t101;
-    motion[3] = t102;
-    const real t103 = motion_I[3] * t9;
-    const real t104 = motion_I[4] * t24;
-    const real t105 = t103 + t104;
-    const real t106 = motion_I[5] * t39;
-    const real t107 = t105 + t106;
-    const real t108 = H[24] * s[0];
-    const real t109 = H[25] * s[1];
-    const real t110 = t108 + t109;
-    const real t111 = H[26] * s[2];
-    const real t112 = t110 + t111;
-    const real t113 = H[27] * s[3];
-    const real t114 = t112 + t113;
-    const real t115 = H[28] * s[4];
-    const real t116 = t114 + t115;
-    const real t117 = H[29] * s[5];
-    const real t118 = t116 + t117;
-    const real t119 = c[4] + t118;
-    const real t120 = w[0] * t79;
-    const real t121 = w[2] * t67;
-    const real t122 = t120 - t121;
-    const real t123 = t119 + t122;
-    const real t124 = t107 + t123;
-    motion[4] = t124;
-    const real t125 = motion_I[3] * t14;
-    const real t126 = motion_I[4] * t29;
-    const real t127 = t125 + t126;
-    const real t128 = motion_I[5] * t44;
-    const real t129 = t127 + t128;
-    const real t130 = H[30] * s[0];
-    const real t131 = H[31] * s[1];
-    const real t132 = t130 + t131;
-    const real t133 = H[32] * s[2];
-    const real t134 = t132 + t133;
-    const real t135 = H[33] * s[3];
-    const real t136 = t134 + t135;
-    const real t137 = H[34] * s[4];
-    const real t138 = t136 + t137;
-    const real t139 = H[35] * s[5];
-    const real t140 = t138 + t139;
-    const real t141 = c[5] + t140;
-    const real t142 = w[1] * t67;
-    const real t143 = w[0] * t73;
-    const real t144 = t142 - t143;
-    const real t145 = t141 + t144;
-    const real t146 = t129 + t145;
-    motion[5] = t146;
-    const real t147 = motion_I[0] * motion_I[1];
-    const real t148 = t147 - motion_I[5];
-    const real t149 = t56 * t148;
-    const real t150 = motion_I[1] * motion_I[1];
-    const real t151 = motion_I[2] * motion_I[2];
-    const real t152 = t150 + t151;
-    const real t153 = t50 * t152;
-    const real t154 = t149 - t153;
-    const real t155 = motion_I[0] * motion_I[2];
-    const real t156 = motion_I[4] + t155;
-    const real t157 = t62 * t156;
-    const real t158 = t154 + t157;
-    const real t159 = motion_I[6] + t158;
-    const real t160 = t4 * t159;
-    const real t161 = motion_I[5] + t147;
-    const real t162 = t50 * t161;
-    const real t163 = motion_I[0] * motion_I[0];
-    const real t164 = t151 + t163;
-    const real t165 = t56 * t164;
-    const real t166 = t162 - t165;
-    const real t167 = motion_I[1] * motion_I[2];
-    const real t168 = t167 - motion_I[3];
-    const real t169 = t62 * t168;
-    const real t170 = t166 + t169;
-    const real t171 = motion_I[7] + t170;
-    const real t172 = t19 * t171;
-    const real t173 = t160 + t172;
-    const real t174 = t155 - motion_I[4];
-    const real t175 = t50 * t174;
-    const real t176 = motion_I[3] + t167;
-    const real t177 = t56 * t176;
-    const real t178 = t175 + t177;
-    const real t179 = t150 + t163;
-    const real t180 = t62 * t179;
-    const real t181 = t178 - t180;
-    const real t182 = motion_I[8] + t181;
-    const real t183 = t34 * t182;
-    const real t184 = t173 + t183;
-    const real t185 = H[0] * s[0];
-    const real t186 = H[1] * s[1];
-    const real t187 = t185 + t186;
-    const real t188 = H[2] * s[2];
-    const real t189 = t187 + t188;
-    const real t190 = H[3] * s[3];
-    const real t191 = t189 + t190;
-    const real t192 = H[4] * s[4];
-    const real t193 = t191 + t192;
-    const real t194 = H[5] * s[5];
-    const real t195 = t193 + t194;
-    const real t196 = c[0] + t195;
-    const real t197 = v[2] * t73;
-    const real t198 = 2.0 * t197;
-    const real t199 = v[1] * t79;
-    const real t200 = 2.0 * t199;
-    const real t201 = t198 - t200;
-    const real t202 = t196 + t201;
-    const real t203 = t184 + t202;
-    motion[6] = t203;
-    const real t204 = t9 * t159;
-    const real t205 = t24 * t171;
-    const real t206 = t204 + t205;
-    const real t207 = t39 * t182;
-    const real t208 = t206 + t207;
-    const real t209 = H[6] * s[0];
-    const real t210 = H[7] * s[1];
-    const real t211 = t209 + t210;
-    const real t212 = H[8] * s[2];
-    const real t213 = t211 + t212;
-    const real t214 = H[9] * s[3];
-    const real t215 = t213 + t214;
-    const real t216 = H[10] * s[4];
-    const real t217 = t215 + t216;
-    const real t218 = H[11] * s[5];
-    const real t219 = t217 + t218;
-    const real t220 = c[1] + t219;
-    const real t221 = v[0] * t79;
-    const real t222 = 2.0 * t221;
-    const real t223 = v[2] * t67;
-    const real t224 = 2.0 * t223;
-    const real t225 = t222 - t224;
-    const real t226 = t220 + t225;
-    const real t227 = t208 + t226;
-    motion[7] = t227;
-    const real t228 = t14 * t159;
-    const real t229 = t29 * t171;
-    const real t230 = t228 + t229;
-    const real t231 = t44 * t182;
-    const real t232 = t230 + t231;
-    const real t233 = H[12] * s[0];
-    const real t234 = H[13] * s[1];
-    const real t235 = t233 + t234;
-    const real t236 = H[14] * s[2];
-    const real t237 = t235 + t236;
-    const real t238 = H[15] * s[3];
-    const real t239 = t237 + t238;
-    const real t240 = H[16] * s[4];
-    const real t241 = t239 + t240;
-    const real t242 = H[17] * s[5];
-    const real t243 = t241 + t242;
-    const real t244 = c[2] + t243;
-    const real t245 = v[1] * t67;
-    const real t246 = 2.0 * t245;
-    const real t247 = v[0] * t73;
-    const real t248 = 2.0 * t247;
-    const real t249 = t246 - t248;
-    const real t250 = t244 + t249;
-    const real t251 = t232 + t250;
-    motion[8] = t251;
-    return 0;
+  real t4 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  Rc[0] = t4;
+  real t9 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  Rc[1] = t9;
+  real t14 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  Rc[2] = t14;
+  real t19 = Rt[3] * R[0] + Rt[4] * R[3] + Rt[5] * R[6];
+  Rc[3] = t19;
+  real t24 = Rt[3] * R[1] + Rt[4] * R[4] + Rt[5] * R[7];
+  Rc[4] = t24;
+  real t29 = Rt[3] * R[2] + Rt[4] * R[5] + Rt[5] * R[8];
+  Rc[5] = t29;
+  real t34 = Rt[6] * R[0] + Rt[7] * R[3] + Rt[8] * R[6];
+  Rc[6] = t34;
+  real t39 = Rt[6] * R[1] + Rt[7] * R[4] + Rt[8] * R[7];
+  Rc[7] = t39;
+  real t44 = Rt[6] * R[2] + Rt[7] * R[5] + Rt[8] * R[8];
+  Rc[8] = t44;
+  real t50 = ro[0] + (Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2]);
+  r[0] = t50;
+  real t56 = ro[1] + (Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2]);
+  r[1] = t56;
+  real t62 = ro[2] + (Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2]);
+  r[2] = t62;
+  real t67 = motion_I[0] * t4 + motion_I[1] * t19 + motion_I[2] * t34;
+  motion[0] = w[0] + t67;
+  real t73 = motion_I[0] * t9 + motion_I[1] * t24 + motion_I[2] * t39;
+  motion[1] = w[1] + t73;
+  real t79 = motion_I[0] * t14 + motion_I[1] * t29 + motion_I[2] * t44;
+  motion[2] = w[2] + t79;
+  motion[3] = motion_I[3] * t4 + motion_I[4] * t19 + motion_I[5] * t34 + (c[3] + (H[18] * s[0] +
+    H[19] * s[1] + H[20] * s[2] + H[21] * s[3] + H[22] * s[4] + H[23] * s[5]) + (w[2] * t73 - w[1] *
+    t79));
+  motion[4] = motion_I[3] * t9 + motion_I[4] * t24 + motion_I[5] * t39 + (c[4] + (H[24] * s[0] +
+    H[25] * s[1] + H[26] * s[2] + H[27] * s[3] + H[28] * s[4] + H[29] * s[5]) + (w[0] * t79 - w[2] *
+    t67));
+  motion[5] = motion_I[3] * t14 + motion_I[4] * t29 + motion_I[5] * t44 + (c[5] + (H[30] * s[0] +
+    H[31] * s[1] + H[32] * s[2] + H[33] * s[3] + H[34] * s[4] + H[35] * s[5]) + (w[1] * t67 - w[0] *
+    t73));
+  real t147 = motion_I[0] * motion_I[1];
+  real t150 = motion_I[1] * motion_I[1];
+  real t151 = motion_I[2] * motion_I[2];
+  real t155 = motion_I[0] * motion_I[2];
+  real t159 = motion_I[6] + (t56 * (t147 - motion_I[5]) - t50 * (t150 + t151) + t62 * (motion_I[4] +
+    t155));
+  real t163 = motion_I[0] * motion_I[0];
+  real t167 = motion_I[1] * motion_I[2];
+  real t171 = motion_I[7] + (t50 * (motion_I[5] + t147) - t56 * (t151 + t163) + t62 * (t167 -
+    motion_I[3]));
+  real t182 = motion_I[8] + (t50 * (t155 - motion_I[4]) + t56 * (motion_I[3] + t167) - t62 * (t150 +
+    t163));
+  motion[6] = t4 * t159 + t19 * t171 + t34 * t182 + (c[0] + (H[0] * s[0] + H[1] * s[1] + H[2] * s[2]
+    + H[3] * s[3] + H[4] * s[4] + H[5] * s[5]) + (2.0 * (v[2] * t73) - 2.0 * (v[1] * t79)));
+  motion[7] = t9 * t159 + t24 * t171 + t39 * t182 + (c[1] + (H[6] * s[0] + H[7] * s[1] + H[8] * s[2]
+    + H[9] * s[3] + H[10] * s[4] + H[11] * s[5]) + (2.0 * (v[0] * t79) - 2.0 * (v[2] * t67)));
+  motion[8] = t14 * t159 + t29 * t171 + t44 * t182 + (c[2] + (H[12] * s[0] + H[13] * s[1] + H[14] *
+    s[2] + H[15] * s[3] + H[16] * s[4] + H[17] * s[5]) + (2.0 * (v[1] * t67) - 2.0 * (v[0] * t73)));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_forward_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_forward_outputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], out[0], out[1], out[2]))
 
 /* S and e carried across a hinge with 6 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the free coordinates
@@ -465,2232 +122,439 @@ static const mstmm_port mstmm_sweep_generic6_forward_outputs[] = {
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_condense(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict floor_,
-    const real *restrict S, const real *restrict e, const real *restrict tau, real *restrict G,
-    real *restrict g, real *restrict S_I, real *restrict e_I)
+int mstmm_sweep_generic6_condense(in_t Rc, in_t r, in_t H, in_t J, in_t floor_, in_t S, in_t e,
+    in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[6] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[6] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[12] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[18] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[24] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[30] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[6] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[6] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[12] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[18] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[24] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[30] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[12] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[6] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[12] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[18] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[24] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[30] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[18] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[6] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[12] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[18] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[24] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[30] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[24] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[6] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[12] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[18] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[24] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[30] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[30] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] + t76;
-    const real t78 = 0.0 < t77;
-    if (!(t78 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t79 = H[1] * S[0];
-    const real t80 = H[7] * S[1];
-    const real t81 = t79 + t80;
-    const real t82 = H[13] * S[2];
-    const real t83 = t81 + t82;
-    const real t84 = H[19] * S[3];
-    const real t85 = t83 + t84;
-    const real t86 = H[25] * S[4];
-    const real t87 = t85 + t86;
-    const real t88 = H[31] * S[5];
-    const real t89 = t87 + t88;
-    const real t90 = H[1] * t89;
-    const real t91 = H[1] * S[1];
-    const real t92 = H[7] * S[6];
-    const real t93 = t91 + t92;
-    const real t94 = H[13] * S[7];
-    const real t95 = t93 + t94;
-    const real t96 = H[19] * S[8];
-    const real t97 = t95 + t96;
-    const real t98 = H[25] * S[9];
-    const real t99 = t97 + t98;
-    const real t100 = H[31] * S[10];
-    const real t101 = t99 + t100;
-    const real t102 = H[7] * t101;
-    const real t103 = t90 + t102;
-    const real t104 = H[1] * S[2];
-    const real t105 = H[7] * S[7];
-    const real t106 = t104 + t105;
-    const real t107 = H[13] * S[11];
-    const real t108 = t106 + t107;
-    const real t109 = H[19] * S[12];
-    const real t110 = t108 + t109;
-    const real t111 = H[25] * S[13];
-    const real t112 = t110 + t111;
-    const real t113 = H[31] * S[14];
-    const real t114 = t112 + t113;
-    const real t115 = H[13] * t114;
-    const real t116 = t103 + t115;
-    const real t117 = H[1] * S[3];
-    const real t118 = H[7] * S[8];
-    const real t119 = t117 + t118;
-    const real t120 = H[13] * S[12];
-    const real t121 = t119 + t120;
-    const real t122 = H[19] * S[15];
-    const real t123 = t121 + t122;
-    const real t124 = H[25] * S[16];
-    const real t125 = t123 + t124;
-    const real t126 = H[31] * S[17];
-    const real t127 = t125 + t126;
-    const real t128 = H[19] * t127;
-    const real t129 = t116 + t128;
-    const real t130 = H[1] * S[4];
-    const real t131 = H[7] * S[9];
-    const real t132 = t130 + t131;
-    const real t133 = H[13] * S[13];
-    const real t134 = t132 + t133;
-    const real t135 = H[19] * S[16];
-    const real t136 = t134 + t135;
-    const real t137 = H[25] * S[18];
-    const real t138 = t136 + t137;
-    const real t139 = H[31] * S[19];
-    const real t140 = t138 + t139;
-    const real t141 = H[25] * t140;
-    const real t142 = t129 + t141;
-    const real t143 = H[1] * S[5];
-    const real t144 = H[7] * S[10];
-    const real t145 = t143 + t144;
-    const real t146 = H[13] * S[14];
-    const real t147 = t145 + t146;
-    const real t148 = H[19] * S[17];
-    const real t149 = t147 + t148;
-    const real t150 = H[25] * S[19];
-    const real t151 = t149 + t150;
-    const real t152 = H[31] * S[20];
-    const real t153 = t151 + t152;
-    const real t154 = H[31] * t153;
-    const real t155 = t142 + t154;
-    const real t156 = J[1] + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * t89;
-    const real t159 = H[6] * t101;
-    const real t160 = t158 + t159;
-    const real t161 = H[12] * t114;
-    const real t162 = t160 + t161;
-    const real t163 = H[18] * t127;
-    const real t164 = t162 + t163;
-    const real t165 = H[24] * t140;
-    const real t166 = t164 + t165;
-    const real t167 = H[30] * t153;
-    const real t168 = t166 + t167;
-    const real t169 = 1.0 / t77;
-    const real t170 = t168 * t169;
-    const real t171 = t168 * t170;
-    const real t172 = t156 - t171;
-    const real t173 = t157 < t172;
-    if (!(t173 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t174 = H[2] * S[0];
-    const real t175 = H[8] * S[1];
-    const real t176 = t174 + t175;
-    const real t177 = H[14] * S[2];
-    const real t178 = t176 + t177;
-    const real t179 = H[20] * S[3];
-    const real t180 = t178 + t179;
-    const real t181 = H[26] * S[4];
-    const real t182 = t180 + t181;
-    const real t183 = H[32] * S[5];
-    const real t184 = t182 + t183;
-    const real t185 = H[2] * t184;
-    const real t186 = H[2] * S[1];
-    const real t187 = H[8] * S[6];
-    const real t188 = t186 + t187;
-    const real t189 = H[14] * S[7];
-    const real t190 = t188 + t189;
-    const real t191 = H[20] * S[8];
-    const real t192 = t190 + t191;
-    const real t193 = H[26] * S[9];
-    const real t194 = t192 + t193;
-    const real t195 = H[32] * S[10];
-    const real t196 = t194 + t195;
-    const real t197 = H[8] * t196;
-    const real t198 = t185 + t197;
-    const real t199 = H[2] * S[2];
-    const real t200 = H[8] * S[7];
-    const real t201 = t199 + t200;
-    const real t202 = H[14] * S[11];
-    const real t203 = t201 + t202;
-    const real t204 = H[20] * S[12];
-    const real t205 = t203 + t204;
-    const real t206 = H[26] * S[13];
-    const real t207 = t205 + t206;
-    const real t208 = H[32] * S[14];
-    const real t209 = t207 + t208;
-    const real t210 = H[14] * t209;
-    const real t211 = t198 + t210;
-    const real t212 = H[2] * S[3];
-    const real t213 = H[8] * S[8];
-    const real t214 = t212 + t213;
-    const real t215 = H[14] * S[12];
-    const real t216 = t214 + t215;
-    const real t217 = H[20] * S[15];
-    const real t218 = t216 + t217;
-    const real t219 = H[26] * S[16];
-    const real t220 = t218 + t219;
-    const real t221 = H[32] * S[17];
-    const real t222 = t220 + t221;
-    const real t223 = H[20] * t222;
-    const real t224 = t211 + t223;
-    const real t225 = H[2] * S[4];
-    const real t226 = H[8] * S[9];
-    const real t227 = t225 + t226;
-    const real t228 = H[14] * S[13];
-    const real t229 = t227 + t228;
-    const real t230 = H[20] * S[16];
-    const real t231 = t229 + t230;
-    const real t232 = H[26] * S[18];
-    const real t233 = t231 + t232;
-    const real t234 = H[32] * S[19];
-    const real t235 = t233 + t234;
-    const real t236 = H[26] * t235;
-    const real t237 = t224 + t236;
-    const real t238 = H[2] * S[5];
-    const real t239 = H[8] * S[10];
-    const real t240 = t238 + t239;
-    const real t241 = H[14] * S[14];
-    const real t242 = t240 + t241;
-    const real t243 = H[20] * S[17];
-    const real t244 = t242 + t243;
-    const real t245 = H[26] * S[19];
-    const real t246 = t244 + t245;
-    const real t247 = H[32] * S[20];
-    const real t248 = t246 + t247;
-    const real t249 = H[32] * t248;
-    const real t250 = t237 + t249;
-    const real t251 = J[2] + t250;
-    const real t252 = t251 * ((real)1 / (real)10000000000000);
-    const real t253 = H[0] * t184;
-    const real t254 = H[6] * t196;
-    const real t255 = t253 + t254;
-    const real t256 = H[12] * t209;
-    const real t257 = t255 + t256;
-    const real t258 = H[18] * t222;
-    const real t259 = t257 + t258;
-    const real t260 = H[24] * t235;
-    const real t261 = t259 + t260;
-    const real t262 = H[30] * t248;
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t169;
-    const real t265 = t263 * t264;
-    const real t266 = t251 - t265;
-    const real t267 = H[1] * t184;
-    const real t268 = H[7] * t196;
-    const real t269 = t267 + t268;
-    const real t270 = H[13] * t209;
-    const real t271 = t269 + t270;
-    const real t272 = H[19] * t222;
-    const real t273 = t271 + t272;
-    const real t274 = H[25] * t235;
-    const real t275 = t273 + t274;
-    const real t276 = H[31] * t248;
-    const real t277 = t275 + t276;
-    const real t278 = t263 * t170;
-    const real t279 = t277 - t278;
-    const real t280 = 1.0 / t172;
-    const real t281 = t280 * t279;
-    const real t282 = t279 * t281;
-    const real t283 = t266 - t282;
-    const real t284 = t252 < t283;
-    if (!(t284 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t285 = H[3] * S[0];
-    const real t286 = H[9] * S[1];
-    const real t287 = t285 + t286;
-    const real t288 = H[15] * S[2];
-    const real t289 = t287 + t288;
-    const real t290 = H[21] * S[3];
-    const real t291 = t289 + t290;
-    const real t292 = H[27] * S[4];
-    const real t293 = t291 + t292;
-    const real t294 = H[33] * S[5];
-    const real t295 = t293 + t294;
-    const real t296 = H[3] * t295;
-    const real t297 = H[3] * S[1];
-    const real t298 = H[9] * S[6];
-    const real t299 = t297 + t298;
-    const real t300 = H[15] * S[7];
-    const real t301 = t299 + t300;
-    const real t302 = H[21] * S[8];
-    const real t303 = t301 + t302;
-    const real t304 = H[27] * S[9];
-    const real t305 = t303 + t304;
-    const real t306 = H[33] * S[10];
-    const real t307 = t305 + t306;
-    const real t308 = H[9] * t307;
-    const real t309 = t296 + t308;
-    const real t310 = H[3] * S[2];
-    const real t311 = H[9] * S[7];
-    const real t312 = t310 + t311;
-    const real t313 = H[15] * S[11];
-    const real t314 = t312 + t313;
-    const real t315 = H[21] * S[12];
-    const real t316 = t314 + t315;
-    const real t317 = H[27] * S[13];
-    const real t318 = t316 + t317;
-    const real t319 = H[33] * S[14];
-    const real t320 = t318 + t319;
-    const real t321 = H[15] * t320;
-    const real t322 = t309 + t321;
-    const real t323 = H[3] * S[3];
-    const real t324 = H[9] * S[8];
-    const real t325 = t323 + t324;
-    const real t326 = H[15] * S[12];
-    const real t327 = t325 + t326;
-    const real t328 = H[21] * S[15];
-    const real t329 = t327 + t328;
-    const real t330 = H[27] * S[16];
-    const real t331 = t329 + t330;
-    const real t332 = H[33] * S[17];
-    const real t333 = t331 + t332;
-    const real t334 = H[21] * t333;
-    const real t335 = t322 + t334;
-    const real t336 = H[3] * S[4];
-    const real t337 = H[9] * S[9];
-    const real t338 = t336 + t337;
-    const real t339 = H[15] * S[13];
-    const real t340 = t338 + t339;
-    const real t341 = H[21] * S[16];
-    const real t342 = t340 + t341;
-    const real t343 = H[27] * S[18];
-    const real t344 = t342 + t343;
-    const real t345 = H[33] * S[19];
-    const real t346 = t344 + t345;
-    const real t347 = H[27] * t346;
-    const real t348 = t335 + t347;
-    const real t349 = H[3] * S[5];
-    const real t350 = H[9] * S[10];
-    const real t351 = t349 + t350;
-    const real t352 = H[15] * S[14];
-    const real t353 = t351 + t352;
-    const real t354 = H[21] * S[17];
-    const real t355 = t353 + t354;
-    const real t356 = H[27] * S[19];
-    const real t357 = t355 + t356;
-    const real t358 = H[33] * S[20];
-    const real t359 = t357 + t358;
-    const real t360 = H[33] * t359;
-    const real t361 = t348 + t360;
-    const real t362 = J[3] + t361;
-    const real t363 = t362 * ((real)1 / (real)10000000000000);
-    const real t364 = H[0] * t295;
-    const real t365 = H[6] * t307;
-    const real t366 = t364 + t365;
-    const real t367 = H[12] * t320;
-    const real t368 = t366 + t367;
-    const real t369 = H[18] * t333;
-    const real t370 = t368 + t369;
-    const real t371 = H[24] * t346;
-    const real t372 = t370 + t371;
-    const real t373 = H[30] * t359;
-    const real t374 = t372 + t373;
-    const real t375 = t374 * t169;
-    const real t376 = t374 * t375;
-    const real t377 = t362 - t376;
-    const real t378 = H[1] * t295;
-    const real t379 = H[7] * t307;
-    const real t380 = t378 + t379;
-    const real t381 = H[13] * t320;
-    const real t382 = t380 + t381;
-    const real t383 = H[19] * t333;
-    const real t384 = t382 + t383;
-    const real t385 = H[25] * t346;
-    const real t386 = t384 + t385;
-    const real t387 = H[31] * t359;
-    const real t388 = t386 + t387;
-    const real t389 = t374 * t170;
-    const real t390 = t388 - t389;
-    const real t391 = t280 * t390;
-    const real t392 = t390 * t391;
-    const real t393 = t377 - t392;
-    const real t394 = H[2] * t295;
-    const real t395 = H[8] * t307;
-    const real t396 = t394 + t395;
-    const real t397 = H[14] * t320;
-    const real t398 = t396 + t397;
-    const real t399 = H[20] * t333;
-    const real t400 = t398 + t399;
-    const real t401 = H[26] * t346;
-    const real t402 = t400 + t401;
-    const real t403 = H[32] * t359;
-    const real t404 = t402 + t403;
-    const real t405 = t374 * t264;
-    const real t406 = t404 - t405;
-    const real t407 = t281 * t390;
-    const real t408 = t406 - t407;
-    const real t409 = 1.0 / t283;
-    const real t410 = t409 * t408;
-    const real t411 = t408 * t410;
-    const real t412 = t393 - t411;
-    const real t413 = t363 < t412;
-    if (!(t413 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t414 = H[4] * S[0];
-    const real t415 = H[10] * S[1];
-    const real t416 = t414 + t415;
-    const real t417 = H[16] * S[2];
-    const real t418 = t416 + t417;
-    const real t419 = H[22] * S[3];
-    const real t420 = t418 + t419;
-    const real t421 = H[28] * S[4];
-    const real t422 = t420 + t421;
-    const real t423 = H[34] * S[5];
-    const real t424 = t422 + t423;
-    const real t425 = H[4] * t424;
-    const real t426 = H[4] * S[1];
-    const real t427 = H[10] * S[6];
-    const real t428 = t426 + t427;
-    const real t429 = H[16] * S[7];
-    const real t430 = t428 + t429;
-    const real t431 = H[22] * S[8];
-    const real t432 = t430 + t431;
-    const real t433 = H[28] * S[9];
-    const real t434 = t432 + t433;
-    const real t435 = H[34] * S[10];
-    const real t436 = t434 + t435;
-    const real t437 = H[10] * t436;
-    const real t438 = t425 + t437;
-    const real t439 = H[4] * S[2];
-    const real t440 = H[10] * S[7];
-    const real t441 = t439 + t440;
-    const real t442 = H[16] * S[11];
-    const real t443 = t441 + t442;
-    const real t444 = H[22] * S[12];
-    const real t445 = t443 + t444;
-    const real t446 = H[28] * S[13];
-    const real t447 = t445 + t446;
-    const real t448 = H[34] * S[14];
-    const real t449 = t447 + t448;
-    const real t450 = H[16] * t449;
-    const real t451 = t438 + t450;
-    const real t452 = H[4] * S[3];
-    const real t453 = H[10] * S[8];
-    const real t454 = t452 + t453;
-    const real t455 = H[16] * S[12];
-    const real t456 = t454 + t455;
-    const real t457 = H[22] * S[15];
-    const real t458 = t456 + t457;
-    const real t459 = H[28] * S[16];
-    const real t460 = t458 + t459;
-    const real t461 = H[34] * S[17];
-    const real t462 = t460 + t461;
-    const real t463 = H[22] * t462;
-    const real t464 = t451 + t463;
-    const real t465 = H[4] * S[4];
-    const real t466 = H[10] * S[9];
-    const real t467 = t465 + t466;
-    const real t468 = H[16] * S[13];
-    const real t469 = t467 + t468;
-    const real t470 = H[22] * S[16];
-    const real t471 = t469 + t470;
-    const real t472 = H[28] * S[18];
-    const real t473 = t471 + t472;
-    const real t474 = H[34] * S[19];
-    const real t475 = t473 + t474;
-    const real t476 = H[28] * t475;
-    const real t477 = t464 + t476;
-    const real t478 = H[4] * S[5];
-    const real t479 = H[10] * S[10];
-    const real t480 = t478 + t479;
-    const real t481 = H[16] * S[14];
-    const real t482 = t480 + t481;
-    const real t483 = H[22] * S[17];
-    const real t484 = t482 + t483;
-    const real t485 = H[28] * S[19];
-    const real t486 = t484 + t485;
-    const real t487 = H[34] * S[20];
-    const real t488 = t486 + t487;
-    const real t489 = H[34] * t488;
-    const real t490 = t477 + t489;
-    const real t491 = J[4] + t490;
-    const real t492 = t491 * ((real)1 / (real)10000000000000);
-    const real t493 = H[0] * t424;
-    const real t494 = H[6] * t436;
-    const real t495 = t493 + t494;
-    const real t496 = H[12] * t449;
-    const real t497 = t495 + t496;
-    const real t498 = H[18] * t462;
-    const real t499 = t497 + t498;
-    const real t500 = H[24] * t475;
-    const real t501 = t499 + t500;
-    const real t502 = H[30] * t488;
-    const real t503 = t501 + t502;
-    const real t504 = t503 * t169;
-    const real t505 = t503 * t504;
-    const real t506 = t491 - t505;
-    const real t507 = H[1] * t424;
-    const real t508 = H[7] * t436;
-    const real t509 = t507 + t508;
-    const real t510 = H[13] * t449;
-    const real t511 = t509 + t510;
-    const real t512 = H[19] * t462;
-    const real t513 = t511 + t512;
-    const real t514 = H[25] * t475;
-    const real t515 = t513 + t514;
-    const real t516 = H[31] * t488;
-    const real t517 = t515 + t516;
-    const real t518 = t503 * t170;
-    const real t519 = t517 - t518;
-    const real t520 = t280 * t519;
-    const real t521 = t519 * t520;
-    const real t522 = t506 - t521;
-    const real t523 = H[2] * t424;
-    const real t524 = H[8] * t436;
-    const real t525 = t523 + t524;
-    const real t526 = H[14] * t449;
-    const real t527 = t525 + t526;
-    const real t528 = H[20] * t462;
-    const real t529 = t527 + t528;
-    const real t530 = H[26] * t475;
-    const real t531 = t529 + t530;
-    const real t532 = H[32] * t488;
-    const real t533 = t531 + t532;
-    const real t534 = t503 * t264;
-    const real t535 = t533 - t534;
-    const real t536 = t281 * t519;
-    const real t537 = t535 - t536;
-    const real t538 = t409 * t537;
-    const real t539 = t537 * t538;
-    const real t540 = t522 - t539;
-    const real t541 = H[3] * t424;
-    const real t542 = H[9] * t436;
-    const real t543 = t541 + t542;
-    const real t544 = H[15] * t449;
-    const real t545 = t543 + t544;
-    const real t546 = H[21] * t462;
-    const real t547 = t545 + t546;
-    const real t548 = H[27] * t475;
-    const real t549 = t547 + t548;
-    const real t550 = H[33] * t488;
-    const real t551 = t549 + t550;
-    const real t552 = t503 * t375;
-    const real t553 = t551 - t552;
-    const real t554 = t391 * t519;
-    const real t555 = t553 - t554;
-    const real t556 = t410 * t537;
-    const real t557 = t555 - t556;
-    const real t558 = 1.0 / t412;
-    const real t559 = t558 * t557;
-    const real t560 = t557 * t559;
-    const real t561 = t540 - t560;
-    const real t562 = t492 < t561;
-    if (!(t562 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t563 = H[5] * S[0];
-    const real t564 = H[11] * S[1];
-    const real t565 = t563 + t564;
-    const real t566 = H[17] * S[2];
-    const real t567 = t565 + t566;
-    const real t568 = H[23] * S[3];
-    const real t569 = t567 + t568;
-    const real t570 = H[29] * S[4];
-    const real t571 = t569 + t570;
-    const real t572 = H[35] * S[5];
-    const real t573 = t571 + t572;
-    const real t574 = H[5] * t573;
-    const real t575 = H[5] * S[1];
-    const real t576 = H[11] * S[6];
-    const real t577 = t575 + t576;
-    const real t578 = H[17] * S[7];
-    const real t579 = t577 + t578;
-    const real t580 = H[23] * S[8];
-    const real t581 = t579 + t580;
-    const real t582 = H[29] * S[9];
-    const real t583 = t581 + t582;
-    const real t584 = H[35] * S[10];
-    const real t585 = t583 + t584;
-    const real t586 = H[11] * t585;
-    const real t587 = t574 + t586;
-    const real t588 = H[5] * S[2];
-    const real t589 = H[11] * S[7];
-    const real t590 = t588 + t589;
-    const real t591 = H[17] * S[11];
-    const real t592 = t590 + t591;
-    const real t593 = H[23] * S[12];
-    const real t594 = t592 + t593;
-    const real t595 = H[29] * S[13];
-    const real t596 = t594 + t595;
-    const real t597 = H[35] * S[14];
-    const real t598 = t596 + t597;
-    const real t599 = H[17] * t598;
-    const real t600 = t587 + t599;
-    const real t601 = H[5] * S[3];
-    const real t602 = H[11] * S[8];
-    const real t603 = t601 + t602;
-    const real t604 = H[17] * S[12];
-    const real t605 = t603 + t604;
-    const real t606 = H[23] * S[15];
-    const real t607 = t605 + t606;
-    const real t608 = H[29] * S[16];
-    const real t609 = t607 + t608;
-    const real t610 = H[35] * S[17];
-    const real t611 = t609 + t610;
-    const real t612 = H[23] * t611;
-    const real t613 = t600 + t612;
-    const real t614 = H[5] * S[4];
-    const real t615 = H[11] * S[9];
-    const real t616 = t614 + t615;
-    const real t617 = H[17] * S[13];
-    const real t618 = t616 + t617;
-    const real t619 = H[23] * S[16];
-    const real t620 = t618 + t619;
-    const real t621 = H[29] * S[18];
-    const real t622 = t620 + t621;
-    const real t623 = H[35] * S[19];
-    const real t624 = t622 + t623;
-    const real t625 = H[29] * t624;
-    const real t626 = t613 + t625;
-    const real t627 = H[5] * S[5];
-    const real t628 = H[11] * S[10];
-    const real t629 = t627 + t628;
-    const real t630 = H[17] * S[14];
-    const real t631 = t629 + t630;
-    const real t632 = H[23] * S[17];
-    const real t633 = t631 + t632;
-    const real t634 = H[29] * S[19];
-    const real t635 = t633 + t634;
-    const real t636 = H[35] * S[20];
-    const real t637 = t635 + t636;
-    const real t638 = H[35] * t637;
-    const real t639 = t626 + t638;
-    const real t640 = J[5] + t639;
-    const real t641 = t640 * ((real)1 / (real)10000000000000);
-    const real t642 = H[0] * t573;
-    const real t643 = H[6] * t585;
-    const real t644 = t642 + t643;
-    const real t645 = H[12] * t598;
-    const real t646 = t644 + t645;
-    const real t647 = H[18] * t611;
-    const real t648 = t646 + t647;
-    const real t649 = H[24] * t624;
-    const real t650 = t648 + t649;
-    const real t651 = H[30] * t637;
-    const real t652 = t650 + t651;
-    const real t653 = t652 * t169;
-    const real t654 = t652 * t653;
-    const real t655 = t640 - t654;
-    const real t656 = H[1] * t573;
-    const real t657 = H[7] * t585;
-    const real t658 = t656 + t657;
-    const real t659 = H[13] * t598;
-    const real t660 = t658 + t659;
-    const real t661 = H[19] * t611;
-    const real t662 = t660 + t661;
-    const real t663 = H[25] * t624;
-    const real t664 = t662 + t663;
-    const real t665 = H[31] * t637;
-    const real t666 = t664 + t665;
-    const real t667 = t652 * t170;
-    const real t668 = t666 - t667;
-    const real t669 = t280 * t668;
-    const real t670 = t668 * t669;
-    const real t671 = t655 - t670;
-    const real t672 = H[2] * t573;
-    const real t673 = H[8] * t585;
-    const real t674 = t672 + t673;
-    const real t675 = H[14] * t598;
-    const real t676 = t674 + t675;
-    const real t677 = H[20] * t611;
-    const real t678 = t676 + t677;
-    const real t679 = H[26] * t624;
-    const real t680 = t678 + t679;
-    const real t681 = H[32] * t637;
-    const real t682 = t680 + t681;
-    const real t683 = t652 * t264;
-    const real t684 = t682 - t683;
-    const real t685 = t281 * t668;
-    const real t686 = t684 - t685;
-    const real t687 = t409 * t686;
-    const real t688 = t686 * t687;
-    const real t689 = t671 - t688;
-    const real t690 = H[3] * t573;
-    const real t691 = H[9] * t585;
-    const real t692 = t690 + t691;
-    const real t693 = H[15] * t598;
-    const real t694 = t692 + t693;
-    const real t695 = H[21] * t611;
-    const real t696 = t694 + t695;
-    const real t697 = H[27] * t624;
-    const real t698 = t696 + t697;
-    const real t699 = H[33] * t637;
-    const real t700 = t698 + t699;
-    const real t701 = t652 * t375;
-    const real t702 = t700 - t701;
-    const real t703 = t391 * t668;
-    const real t704 = t702 - t703;
-    const real t705 = t410 * t686;
-    const real t706 = t704 - t705;
-    const real t707 = t558 * t706;
-    const real t708 = t706 * t707;
-    const real t709 = t689 - t708;
-    const real t710 = H[4] * t573;
-    const real t711 = H[10] * t585;
-    const real t712 = t710 + t711;
-    const real t713 = H[16] * t598;
-    const real t714 = t712 + t713;
-    const real t715 = H[22] * t611;
-    const real t716 = t714 + t715;
-    const real t717 = H[28] * t624;
-    const real t718 = t716 + t717;
-    const real t719 = H[34] * t637;
-    const real t720 = t718 + t719;
-    const real t721 = t652 * t504;
-    const real t722 = t720 - t721;
-    const real t723 = t520 * t668;
-    const real t724 = t722 - t723;
-    const real t725 = t538 * t686;
-    const real t726 = t724 - t725;
-    const real t727 = t559 * t706;
-    const real t728 = t726 - t727;
-    const real t729 = 1.0 / t561;
-    const real t730 = t729 * t728;
-    const real t731 = t728 * t730;
-    const real t732 = t709 - t731;
-    const real t733 = t641 < t732;
-    if (!(t733 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t78 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t173 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t284 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t413 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t562 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    if (!(t733 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t734 = H[12] * H[12];
-    const real t735 = H[0] * H[0];
-    const real t736 = H[6] * H[6];
-    const real t737 = t735 + t736;
-    const real t738 = t734 + t737;
-    const real t739 = 0.0 < floor_[0];
-    const real t740 = S[0] + S[6];
-    const real t741 = S[11] + t740;
-    const real t742 = ((real)1 / (real)300000000000000) * t741;
-    const real t743 = t739 != 0 ? floor_[0] : t742;
-    const real t744 = t738 * t743;
-    const real t745 = H[30] * H[30];
-    const real t746 = H[18] * H[18];
-    const real t747 = H[24] * H[24];
-    const real t748 = t746 + t747;
-    const real t749 = t745 + t748;
-    const real t750 = 0.0 < floor_[1];
-    const real t751 = S[15] + S[18];
-    const real t752 = S[20] + t751;
-    const real t753 = ((real)1 / (real)300000000000000) * t752;
-    const real t754 = t750 != 0 ? floor_[1] : t753;
-    const real t755 = t749 * t754;
-    const real t756 = t744 + t755;
-    const real t757 = t756 < t77;
-    if (!(t757 != 0)) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
-    const real t758 = H[13] * H[13];
-    const real t759 = H[1] * H[1];
-    const real t760 = H[7] * H[7];
-    const real t761 = t759 + t760;
-    const real t762 = t758 + t761;
-    const real t763 = t743 * t762;
-    const real t764 = H[31] * H[31];
-    const real t765 = H[19] * H[19];
-    const real t766 = H[25] * H[25];
-    const real t767 = t765 + t766;
-    const real t768 = t764 + t767;
-    const real t769 = t754 * t768;
-    const real t770 = t763 + t769;
-    const real t771 = t770 < t156;
-    if (!(t771 != 0)) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
-    const real t772 = H[14] * H[14];
-    const real t773 = H[2] * H[2];
-    const real t774 = H[8] * H[8];
-    const real t775 = t773 + t774;
-    const real t776 = t772 + t775;
-    const real t777 = t743 * t776;
-    const real t778 = H[32] * H[32];
-    const real t779 = H[20] * H[20];
-    const real t780 = H[26] * H[26];
-    const real t781 = t779 + t780;
-    const real t782 = t778 + t781;
-    const real t783 = t754 * t782;
-    const real t784 = t777 + t783;
-    const real t785 = t784 < t251;
-    if (!(t785 != 0)) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
-    const real t786 = H[15] * H[15];
-    const real t787 = H[3] * H[3];
-    const real t788 = H[9] * H[9];
-    const real t789 = t787 + t788;
-    const real t790 = t786 + t789;
-    const real t791 = t743 * t790;
-    const real t792 = H[33] * H[33];
-    const real t793 = H[21] * H[21];
-    const real t794 = H[27] * H[27];
-    const real t795 = t793 + t794;
-    const real t796 = t792 + t795;
-    const real t797 = t754 * t796;
-    const real t798 = t791 + t797;
-    const real t799 = t798 < t362;
-    if (!(t799 != 0)) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
-    const real t800 = H[16] * H[16];
-    const real t801 = H[4] * H[4];
-    const real t802 = H[10] * H[10];
-    const real t803 = t801 + t802;
-    const real t804 = t800 + t803;
-    const real t805 = t743 * t804;
-    const real t806 = H[34] * H[34];
-    const real t807 = H[22] * H[22];
-    const real t808 = H[28] * H[28];
-    const real t809 = t807 + t808;
-    const real t810 = t806 + t809;
-    const real t811 = t754 * t810;
-    const real t812 = t805 + t811;
-    const real t813 = t812 < t491;
-    if (!(t813 != 0)) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
-    const real t814 = H[17] * H[17];
-    const real t815 = H[5] * H[5];
-    const real t816 = H[11] * H[11];
-    const real t817 = t815 + t816;
-    const real t818 = t814 + t817;
-    const real t819 = t743 * t818;
-    const real t820 = H[35] * H[35];
-    const real t821 = H[23] * H[23];
-    const real t822 = H[29] * H[29];
-    const real t823 = t821 + t822;
-    const real t824 = t820 + t823;
-    const real t825 = t754 * t824;
-    const real t826 = t819 + t825;
-    const real t827 = t826 < t640;
-    if (!(t827 != 0)) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
-    const real t828 = t10 * t169;
-    const real t829 = t10 * t170;
-    const real t830 = t89 - t829;
-    const real t831 = t280 * t830;
-    const real t832 = t10 * t264;
-    const real t833 = t184 - t832;
-    const real t834 = t281 * t830;
-    const real t835 = t833 - t834;
-    const real t836 = t409 * t835;
-    const real t837 = t10 * t375;
-    const real t838 = t295 - t837;
-    const real t839 = t391 * t830;
-    const real t840 = t838 - t839;
-    const real t841 = t410 * t835;
-    const real t842 = t840 - t841;
-    const real t843 = t558 * t842;
-    const real t844 = t10 * t504;
-    const real t845 = t424 - t844;
-    const real t846 = t520 * t830;
-    const real t847 = t845 - t846;
-    const real t848 = t538 * t835;
-    const real t849 = t847 - t848;
-    const real t850 = t559 * t842;
-    const real t851 = t849 - t850;
-    const real t852 = t729 * t851;
-    const real t853 = 1.0 / t732;
-    const real t854 = t10 * t653;
-    const real t855 = t573 - t854;
-    const real t856 = t669 * t830;
-    const real t857 = t855 - t856;
-    const real t858 = t687 * t835;
-    const real t859 = t857 - t858;
-    const real t860 = t707 * t842;
-    const real t861 = t859 - t860;
-    const real t862 = t730 * t851;
-    const real t863 = t861 - t862;
-    const real t864 = t853 * t863;
-    const real t865 = t730 * t864;
-    const real t866 = t852 - t865;
-    const real t867 = t559 * t866;
-    const real t868 = t843 - t867;
-    const real t869 = t707 * t864;
-    const real t870 = t868 - t869;
-    const real t871 = t410 * t870;
-    const real t872 = t836 - t871;
-    const real t873 = t538 * t866;
-    const real t874 = t872 - t873;
-    const real t875 = t687 * t864;
-    const real t876 = t874 - t875;
-    const real t877 = t281 * t876;
-    const real t878 = t831 - t877;
-    const real t879 = t391 * t870;
-    const real t880 = t878 - t879;
-    const real t881 = t520 * t866;
-    const real t882 = t880 - t881;
-    const real t883 = t669 * t864;
-    const real t884 = t882 - t883;
-    const real t885 = t170 * t884;
-    const real t886 = t828 - t885;
-    const real t887 = t264 * t876;
-    const real t888 = t886 - t887;
-    const real t889 = t375 * t870;
-    const real t890 = t888 - t889;
-    const real t891 = t504 * t866;
-    const real t892 = t890 - t891;
-    const real t893 = t653 * t864;
-    const real t894 = t892 - t893;
-    G[0] = t894;
-    const real t895 = t22 * t169;
-    const real t896 = t22 * t170;
-    const real t897 = t101 - t896;
-    const real t898 = t280 * t897;
-    const real t899 = t22 * t264;
-    const real t900 = t196 - t899;
-    const real t901 = t281 * t897;
-    const real t902 = t900 - t901;
-    const real t903 = t409 * t902;
-    const real t904 = t22 * t375;
-    const real t905 = t307 - t904;
-    const real t906 = t391 * t897;
-    const real t907 = t905 - t906;
-    const real t908 = t410 * t902;
-    const real t909 = t907 - t908;
-    const real t910 = t558 * t909;
-    const real t911 = t22 * t504;
-    const real t912 = t436 - t911;
-    const real t913 = t520 * t897;
-    const real t914 = t912 - t913;
-    const real t915 = t538 * t902;
-    const real t916 = t914 - t915;
-    const real t917 = t559 * t909;
-    const real t918 = t916 - t917;
-    const real t919 = t729 * t918;
-    const real t920 = t22 * t653;
-    const real t921 = t585 - t920;
-    const real t922 = t669 * t897;
-    const real t923 = t921 - t922;
-    const real t924 = t687 * t902;
-    const real t925 = t923 - t924;
-    const real t926 = t707 * t909;
-    const real t927 = t925 - t926;
-    const real t928 = t730 * t918;
-    const real t929 = t927 - t928;
-    const real t930 = t853 * t929;
-    const real t931 = t730 * t930;
-    const real t932 = t919 - t931;
-    const real t933 = t559 * t932;
-    const real t934 = t910 - t933;
-    const real t935 = t707 * t930;
-    const real t936 = t934 - t935;
-    const real t937 = t410 * t936;
-    const real t938 = t903 - t937;
-    const real t939 = t538 * t932;
-    const real t940 = t938 - t939;
-    const real t941 = t687 * t930;
-    const real t942 = t940 - t941;
-    const real t943 = t281 * t942;
-    const real t944 = t898 - t943;
-    const real t945 = t391 * t936;
-    const real t946 = t944 - t945;
-    const real t947 = t520 * t932;
-    const real t948 = t946 - t947;
-    const real t949 = t669 * t930;
-    const real t950 = t948 - t949;
-    const real t951 = t170 * t950;
-    const real t952 = t895 - t951;
-    const real t953 = t264 * t942;
-    const real t954 = t952 - t953;
-    const real t955 = t375 * t936;
-    const real t956 = t954 - t955;
-    const real t957 = t504 * t932;
-    const real t958 = t956 - t957;
-    const real t959 = t653 * t930;
-    const real t960 = t958 - t959;
-    G[1] = t960;
-    const real t961 = t35 * t169;
-    const real t962 = t35 * t170;
-    const real t963 = t114 - t962;
-    const real t964 = t280 * t963;
-    const real t965 = t35 * t264;
-    const real t966 = t209 - t965;
-    const real t967 = t281 * t963;
-    const real t968 = t966 - t967;
-    const real t969 = t409 * t968;
-    const real t970 = t35 * t375;
-    const real t971 = t320 - t970;
-    const real t972 = t391 * t963;
-    const real t973 = t971 - t972;
-    const real t974 = t410 * t968;
-    const real t975 = t973 - t974;
-    const real t976 = t558 * t975;
-    const real t977 = t35 * t504;
-    const real t978 = t449 - t977;
-    const real t979 = t520 * t963;
-    const real t980 = t978 - t979;
-    const real t981 = t538 * t968;
-    const real t982 = t980 - t981;
-    const real t983 = t559 * t975;
-    const real t984 = t982 - t983;
-    const real t985 = t729 * t984;
-    const real t986 = t35 * t653;
-    const real t987 = t598 - t986;
-    const real t988 = t669 * t963;
-    const real t989 = t987 - t988;
-    const real t990 = t687 * t968;
-    const real t991 = t989 - t990;
-    const real t992 = t707 * t975;
-    const real t993 = t991 - t992;
-    const real t994 = t730 * t984;
-    const real t995 = t993 - t994;
-    const real t996 = t853 * t995;
-    const real t997 = t730 * t996;
-    const real t998 = t985 - t997;
-    const real t999 = t559 * t998;
-    const real t1000 = t976 - t999;
-    const real t1001 = t707 * t996;
-    const real t1002 = t1000 - t1001;
-    const real t1003 = t410 * t1002;
-    const real t1004 = t969 - t1003;
-    const real t1005 = t538 * t998;
-    const real t1006 = t1004 - t1005;
-    const real t1007 = t687 * t996;
-    const real t1008 = t1006 - t1007;
-    const real t1009 = t281 * t1008;
-    const real t1010 = t964 - t1009;
-    const real t1011 = t391 * t1002;
-    const real t1012 = t1010 - t1011;
-    const real t1013 = t520 * t998;
-    const real t1014 = t1012 - t1013;
-    const real t1015 = t669 * t996;
-    const real t1016 = t1014 - t1015;
-    const real t1017 = t170 * t1016;
-    const real t1018 = t961 - t1017;
-    const real t1019 = t264 * t1008;
-    const real t1020 = t1018 - t1019;
-    const real t1021 = t375 * t1002;
-    const real t1022 = t1020 - t1021;
-    const real t1023 = t504 * t998;
-    const real t1024 = t1022 - t1023;
-    const real t1025 = t653 * t996;
-    const real t1026 = t1024 - t1025;
-    G[2] = t1026;
-    const real t1027 = t48 * t169;
-    const real t1028 = t48 * t170;
-    const real t1029 = t127 - t1028;
-    const real t1030 = t280 * t1029;
-    const real t1031 = t48 * t264;
-    const real t1032 = t222 - t1031;
-    const real t1033 = t281 * t1029;
-    const real t1034 = t1032 - t1033;
-    const real t1035 = t409 * t1034;
-    const real t1036 = t48 * t375;
-    const real t1037 = t333 - t1036;
-    const real t1038 = t391 * t1029;
-    const real t1039 = t1037 - t1038;
-    const real t1040 = t410 * t1034;
-    const real t1041 = t1039 - t1040;
-    const real t1042 = t558 * t1041;
-    const real t1043 = t48 * t504;
-    const real t1044 = t462 - t1043;
-    const real t1045 = t520 * t1029;
-    const real t1046 = t1044 - t1045;
-    const real t1047 = t538 * t1034;
-    const real t1048 = t1046 - t1047;
-    const real t1049 = t559 * t1041;
-    const real t1050 = t1048 - t1049;
-    const real t1051 = t729 * t1050;
-    const real t1052 = t48 * t653;
-    const real t1053 = t611 - t1052;
-    const real t1054 = t669 * t1029;
-    const real t1055 = t1053 - t1054;
-    const real t1056 = t687 * t1034;
-    const real t1057 = t1055 - t1056;
-    const real t1058 = t707 * t1041;
-    const real t1059 = t1057 - t1058;
-    const real t1060 = t730 * t1050;
-    const real t1061 = t1059 - t1060;
-    const real t1062 = t853 * t1061;
-    const real t1063 = t730 * t1062;
-    const real t1064 = t1051 - t1063;
-    const real t1065 = t559 * t1064;
-    const real t1066 = t1042 - t1065;
-    const real t1067 = t707 * t1062;
-    const real t1068 = t1066 - t1067;
-    const real t1069 = t410 * t1068;
-    const real t1070 = t1035 - t1069;
-    const real t1071 = t538 * t1064;
-    const real t1072 = t1070 - t1071;
-    const real t1073 = t687 * t1062;
-    const real t1074 = t1072 - t1073;
-    const real t1075 = t281 * t1074;
-    const real t1076 = t1030 - t1075;
-    const real t1077 = t391 * t1068;
-    const real t1078 = t1076 - t1077;
-    const real t1079 = t520 * t1064;
-    const real t1080 = t1078 - t1079;
-    const real t1081 = t669 * t1062;
-    const real t1082 = t1080 - t1081;
-    const real t1083 = t170 * t1082;
-    const real t1084 = t1027 - t1083;
-    const real t1085 = t264 * t1074;
-    const real t1086 = t1084 - t1085;
-    const real t1087 = t375 * t1068;
-    const real t1088 = t1086 - t1087;
-    const real t1089 = t504 * t1064;
-    const real t1090 = t1088 - t1089;
-    const real t1091 = t653 * t1062;
-    const real t1092 = t1090 - t1091;
-    G[3] = t1092;
-    const real t1093 = t61 * t169;
-    const real t1094 = t61 * t170;
-    const real t1095 = t140 - t1094;
-    const real t1096 = t280 * t1095;
-    const real t1097 = t61 * t264;
-    const real t1098 = t235 - t1097;
-    const real t1099 = t281 * t1095;
-    const real t1100 = t1098 - t1099;
-    const real t1101 = t409 * t1100;
-    const real t1102 = t61 * t375;
-    const real t1103 = t346 - t1102;
-    const real t1104 = t391 * t1095;
-    const real t1105 = t1103 - t1104;
-    const real t1106 = t410 * t1100;
-    const real t1107 = t1105 - t1106;
-    const real t1108 = t558 * t1107;
-    const real t1109 = t61 * t504;
-    const real t1110 = t475 - t1109;
-    const real t1111 = t520 * t1095;
-    const real t1112 = t1110 - t1111;
-    const real t1113 = t538 * t1100;
-    const real t1114 = t1112 - t1113;
-    const real t1115 = t559 * t1107;
-    const real t1116 = t1114 - t1115;
-    const real t1117 = t729 * t1116;
-    const real t1118 = t61 * t653;
-    const real t1119 = t624 - t1118;
-    const real t1120 = t669 * t1095;
-    const real t1121 = t1119 - t1120;
-    const real t1122 = t687 * t1100;
-    const real t1123 = t1121 - t1122;
-    const real t1124 = t707 * t1107;
-    const real t1125 = t1123 - t1124;
-    const real t1126 = t730 * t1116;
-    const real t1127 = t1125 - t1126;
-    const real t1128 = t853 * t1127;
-    const real t1129 = t730 * t1128;
-    const real t1130 = t1117 - t1129;
-    const real t1131 = t559 * t1130;
-    const real t1132 = t1108 - t1131;
-    const real t1133 = t707 * t1128;
-    const real t1134 = t1132 - t1133;
-    const real t1135 = t410 * t1134;
-    const real t1136 = t1101 - t1135;
-    const real t1137 = t538 * t1130;
-    const real t1138 = t1136 - t1137;
-    const real t1139 = t687 * t1128;
-    const real t1140 = t1138 - t1139;
-    const real t1141 = t281 * t1140;
-    const real t1142 = t1096 - t1141;
-    const real t1143 = t391 * t1134;
-    const real t1144 = t1142 - t1143;
-    const real t1145 = t520 * t1130;
-    const real t1146 = t1144 - t1145;
-    const real t1147 = t669 * t1128;
-    const real t1148 = t1146 - t1147;
-    const real t1149 = t170 * t1148;
-    const real t1150 = t1093 - t1149;
-    const real t1151 = t264 * t1140;
-    const real t1152 = t1150 - t1151;
-    const real t1153 = t375 * t1134;
-    const real t1154 = t1152 - t1153;
-    const real t1155 = t504 * t1130;
-    const real t1156 = t1154 - t1155;
-    const real t1157 = t653 * t1128;
-    const real t1158 = t1156 - t1157;
-    G[4] = t1158;
-    const real t1159 = t74 * t169;
-    const real t1160 = t74 * t170;
-    const real t1161 = t153 - t1160;
-    const real t1162 = t280 * t1161;
-    const real t1163 = t74 * t264;
-    const real t1164 = t248 - t1163;
-    const real t1165 = t281 * t1161;
-    const real t1166 = t1164 - t1165;
-    const real t1167 = t409 * t1166;
-    const real t1168 = t74 * t375;
-    const real t1169 = t359 - t1168;
-    const real t1170 = t391 * t1161;
-    const real t1171 = t1169 - t1170;
-    const real t1172 = t410 * t1166;
-    const real t1173 = t1171 - t1172;
-    const real t1174 = t558 * t1173;
-    const real t1175 = t74 * t504;
-    const real t1176 = t488 - t1175;
-    const real t1177 = t520 * t1161;
-    const real t1178 = t1176 - t1177;
-    const real t1179 = t538 * t1166;
-    const real t1180 = t1178 - t1179;
-    const real t1181 = t559 * t1173;
-    const real t1182 = t1180 - t1181;
-    const real t1183 = t729 * t1182;
-    const real t1184 = t74 * t653;
-    const real t1185 = t637 - t1184;
-    const real t1186 = t669 * t1161;
-    const real t1187 = t1185 - t1186;
-    const real t1188 = t687 * t1166;
-    const real t1189 = t1187 - t1188;
-    const real t1190 = t707 * t1173;
-    const real t1191 = t1189 - t1190;
-    const real t1192 = t730 * t1182;
-    const real t1193 = t1191 - t1192;
-    const real t1194 = t853 * t1193;
-    const real t1195 = t730 * t1194;
-    const real t1196 = t1183 - t1195;
-    const real t1197 = t559 * t1196;
-    const real t1198 = t1174 - t1197;
-    const real t1199 = t707 * t1194;
-    const real t1200 = t1198 - t1199;
-    const real t1201 = t410 * t1200;
-    const real t1202 = t1167 - t1201;
-    const real t1203 = t538 * t1196;
-    const real t1204 = t1202 - t1203;
-    const real t1205 = t687 * t1194;
-    const real t1206 = t1204 - t1205;
-    const real t1207 = t281 * t1206;
-    const real t1208 = t1162 - t1207;
-    const real t1209 = t391 * t1200;
-    const real t1210 = t1208 - t1209;
-    const real t1211 = t520 * t1196;
-    const real t1212 = t1210 - t1211;
-    const real t1213 = t669 * t1194;
-    const real t1214 = t1212 - t1213;
-    const real t1215 = t170 * t1214;
-    const real t1216 = t1159 - t1215;
-    const real t1217 = t264 * t1206;
-    const real t1218 = t1216 - t1217;
-    const real t1219 = t375 * t1200;
-    const real t1220 = t1218 - t1219;
-    const real t1221 = t504 * t1196;
-    const real t1222 = t1220 - t1221;
-    const real t1223 = t653 * t1194;
-    const real t1224 = t1222 - t1223;
-    G[5] = t1224;
-    G[6] = t884;
-    G[7] = t950;
-    G[8] = t1016;
-    G[9] = t1082;
-    G[10] = t1148;
-    G[11] = t1214;
-    G[12] = t876;
-    G[13] = t942;
-    G[14] = t1008;
-    G[15] = t1074;
-    G[16] = t1140;
-    G[17] = t1206;
-    G[18] = t870;
-    G[19] = t936;
-    G[20] = t1002;
-    G[21] = t1068;
-    G[22] = t1134;
-    G[23] = t1200;
-    G[24] = t866;
-    G[25] = t932;
-    G[26] = t998;
-    G[27] = t1064;
-    G[28] = t1130;
-    G[29] = t1196;
-    G[30] = t864;
-    G[31] = t930;
-    G[32] = t996;
-    G[33] = t1062;
-    G[34] = t1128;
-    G[35] = t1194;
-    const real t1225 = H[0] * e[0];
-    const real t1226 = H[6] * e[1];
-    const real t1227 = t1225 + t1226;
-    const real t1228 = H[12] * e[2];
-    const real t1229 = t1227 + t1228;
-    const real t1230 = H[18] * e[3];
-    const real t1231 = t1229 + t1230;
-    const real t1232 = H[24] * e[4];
-    const real t1233 = t1231 + t1232;
-    const real t1234 = H[30] * e[5];
-    const real t1235 = t1233 + t1234;
-    const real t1236 = tau[0] - t1235;
-    const real t1237 = t169 * t1236;
-    const real t1238 = H[1] * e[0];
-    const real t1239 = H[7] * e[1];
-    const real t1240 = t1238 + t1239;
-    const real t1241 = H[13] * e[2];
-    const real t1242 = t1240 + t1241;
-    const real t1243 = H[19] * e[3];
-    const real t1244 = t1242 + t1243;
-    const real t1245 = H[25] * e[4];
-    const real t1246 = t1244 + t1245;
-    const real t1247 = H[31] * e[5];
-    const real t1248 = t1246 + t1247;
-    const real t1249 = tau[1] - t1248;
-    const real t1250 = t170 * t1236;
-    const real t1251 = t1249 - t1250;
-    const real t1252 = t280 * t1251;
-    const real t1253 = H[2] * e[0];
-    const real t1254 = H[8] * e[1];
-    const real t1255 = t1253 + t1254;
-    const real t1256 = H[14] * e[2];
-    const real t1257 = t1255 + t1256;
-    const real t1258 = H[20] * e[3];
-    const real t1259 = t1257 + t1258;
-    const real t1260 = H[26] * e[4];
-    const real t1261 = t1259 + t1260;
-    const real t1262 = H[32] * e[5];
-    const real t1263 = t1261 + t1262;
-    const real t1264 = tau[2] - t1263;
-    const real t1265 = t264 * t1236;
-    const real t1266 = t1264 - t1265;
-    const real t1267 = t281 * t1251;
-    const real t1268 = t1266 - t1267;
-    const real t1269 = t409 * t1268;
-    const real t1270 = H[3] * e[0];
-    const real t1271 = H[9] * e[1];
-    const real t1272 = t1270 + t1271;
-    const real t1273 = H[15] * e[2];
-    const real t1274 = t1272 + t1273;
-    const real t1275 = H[21] * e[3];
-    const real t1276 = t1274 + t1275;
-    const real t1277 = H[27] * e[4];
-    const real t1278 = t1276 + t1277;
-    const real t1279 = H[33] * e[5];
-    const real t1280 = t1278 + t1279;
-    const real t1281 = tau[3] - t1280;
-    const real t1282 = t375 * t1236;
-    const real t1283 = t1281 - t1282;
-    const real t1284 = t391 * t1251;
-    const real t1285 = t1283 - t1284;
-    const real t1286 = t410 * t1268;
-    const real t1287 = t1285 - t1286;
-    const real t1288 = t558 * t1287;
-    const real t1289 = H[4] * e[0];
-    const real t1290 = H[10] * e[1];
-    const real t1291 = t1289 + t1290;
-    const real t1292 = H[16] * e[2];
-    const real t1293 = t1291 + t1292;
-    const real t1294 = H[22] * e[3];
-    const real t1295 = t1293 + t1294;
-    const real t1296 = H[28] * e[4];
-    const real t1297 = t1295 + t1296;
-    const real t1298 = H[34] * e[5];
-    const real t1299 = t1297 + t1298;
-    const real t1300 = tau[4] - t1299;
-    const real t1301 = t504 * t1236;
-    const real t1302 = t1300 - t1301;
-    const real t1303 = t520 * t1251;
-    const real t1304 = t1302 - t1303;
-    const real t1305 = t538 * t1268;
-    const real t1306 = t1304 - t1305;
-    const real t1307 = t559 * t1287;
-    const real t1308 = t1306 - t1307;
-    const real t1309 = t729 * t1308;
-    const real t1310 = H[5] * e[0];
-    const real t1311 = H[11] * e[1];
-    const real t1312 = t1310 + t1311;
-    const real t1313 = H[17] * e[2];
-    const real t1314 = t1312 + t1313;
-    const real t1315 = H[23] * e[3];
-    const real t1316 = t1314 + t1315;
-    const real t1317 = H[29] * e[4];
-    const real t1318 = t1316 + t1317;
-    const real t1319 = H[35] * e[5];
-    const real t1320 = t1318 + t1319;
-    const real t1321 = tau[5] - t1320;
-    const real t1322 = t653 * t1236;
-    const real t1323 = t1321 - t1322;
-    const real t1324 = t669 * t1251;
-    const real t1325 = t1323 - t1324;
-    const real t1326 = t687 * t1268;
-    const real t1327 = t1325 - t1326;
-    const real t1328 = t707 * t1287;
-    const real t1329 = t1327 - t1328;
-    const real t1330 = t730 * t1308;
-    const real t1331 = t1329 - t1330;
-    const real t1332 = t853 * t1331;
-    const real t1333 = t730 * t1332;
-    const real t1334 = t1309 - t1333;
-    const real t1335 = t559 * t1334;
-    const real t1336 = t1288 - t1335;
-    const real t1337 = t707 * t1332;
-    const real t1338 = t1336 - t1337;
-    const real t1339 = t410 * t1338;
-    const real t1340 = t1269 - t1339;
-    const real t1341 = t538 * t1334;
-    const real t1342 = t1340 - t1341;
-    const real t1343 = t687 * t1332;
-    const real t1344 = t1342 - t1343;
-    const real t1345 = t281 * t1344;
-    const real t1346 = t1252 - t1345;
-    const real t1347 = t391 * t1338;
-    const real t1348 = t1346 - t1347;
-    const real t1349 = t520 * t1334;
-    const real t1350 = t1348 - t1349;
-    const real t1351 = t669 * t1332;
-    const real t1352 = t1350 - t1351;
-    const real t1353 = t170 * t1352;
-    const real t1354 = t1237 - t1353;
-    const real t1355 = t264 * t1344;
-    const real t1356 = t1354 - t1355;
-    const real t1357 = t375 * t1338;
-    const real t1358 = t1356 - t1357;
-    const real t1359 = t504 * t1334;
-    const real t1360 = t1358 - t1359;
-    const real t1361 = t653 * t1332;
-    const real t1362 = t1360 - t1361;
-    g[0] = t1362;
-    g[1] = t1352;
-    g[2] = t1344;
-    g[3] = t1338;
-    g[4] = t1334;
-    g[5] = t1332;
-    const real t1363 = t10 * t894;
-    const real t1364 = t89 * t884;
-    const real t1365 = t1363 + t1364;
-    const real t1366 = t184 * t876;
-    const real t1367 = t1365 + t1366;
-    const real t1368 = t295 * t870;
-    const real t1369 = t1367 + t1368;
-    const real t1370 = t424 * t866;
-    const real t1371 = t1369 + t1370;
-    const real t1372 = t573 * t864;
-    const real t1373 = t1371 + t1372;
-    const real t1374 = S[0] - t1373;
-    const real t1375 = Rc[0] * t1374;
-    const real t1376 = t10 * t960;
-    const real t1377 = t89 * t950;
-    const real t1378 = t1376 + t1377;
-    const real t1379 = t184 * t942;
-    const real t1380 = t1378 + t1379;
-    const real t1381 = t295 * t936;
-    const real t1382 = t1380 + t1381;
-    const real t1383 = t424 * t932;
-    const real t1384 = t1382 + t1383;
-    const real t1385 = t573 * t930;
-    const real t1386 = t1384 + t1385;
-    const real t1387 = S[1] - t1386;
-    const real t1388 = Rc[1] * t1387;
-    const real t1389 = t1375 + t1388;
-    const real t1390 = t10 * t1026;
-    const real t1391 = t89 * t1016;
-    const real t1392 = t1390 + t1391;
-    const real t1393 = t184 * t1008;
-    const real t1394 = t1392 + t1393;
-    const real t1395 = t295 * t1002;
-    const real t1396 = t1394 + t1395;
-    const real t1397 = t424 * t998;
-    const real t1398 = t1396 + t1397;
-    const real t1399 = t573 * t996;
-    const real t1400 = t1398 + t1399;
-    const real t1401 = S[2] - t1400;
-    const real t1402 = Rc[2] * t1401;
-    const real t1403 = t1389 + t1402;
-    const real t1404 = Rc[0] * t1403;
-    const real t1405 = Rc[0] * t1387;
-    const real t1406 = t22 * t960;
-    const real t1407 = t101 * t950;
-    const real t1408 = t1406 + t1407;
-    const real t1409 = t196 * t942;
-    const real t1410 = t1408 + t1409;
-    const real t1411 = t307 * t936;
-    const real t1412 = t1410 + t1411;
-    const real t1413 = t436 * t932;
-    const real t1414 = t1412 + t1413;
-    const real t1415 = t585 * t930;
-    const real t1416 = t1414 + t1415;
-    const real t1417 = S[6] - t1416;
-    const real t1418 = Rc[1] * t1417;
-    const real t1419 = t1405 + t1418;
-    const real t1420 = t22 * t1026;
-    const real t1421 = t101 * t1016;
-    const real t1422 = t1420 + t1421;
-    const real t1423 = t196 * t1008;
-    const real t1424 = t1422 + t1423;
-    const real t1425 = t307 * t1002;
-    const real t1426 = t1424 + t1425;
-    const real t1427 = t436 * t998;
-    const real t1428 = t1426 + t1427;
-    const real t1429 = t585 * t996;
-    const real t1430 = t1428 + t1429;
-    const real t1431 = S[7] - t1430;
-    const real t1432 = Rc[2] * t1431;
-    const real t1433 = t1419 + t1432;
-    const real t1434 = Rc[1] * t1433;
-    const real t1435 = t1404 + t1434;
-    const real t1436 = Rc[0] * t1401;
-    const real t1437 = Rc[1] * t1431;
-    const real t1438 = t1436 + t1437;
-    const real t1439 = t35 * t1026;
-    const real t1440 = t114 * t1016;
-    const real t1441 = t1439 + t1440;
-    const real t1442 = t209 * t1008;
-    const real t1443 = t1441 + t1442;
-    const real t1444 = t320 * t1002;
-    const real t1445 = t1443 + t1444;
-    const real t1446 = t449 * t998;
-    const real t1447 = t1445 + t1446;
-    const real t1448 = t598 * t996;
-    const real t1449 = t1447 + t1448;
-    const real t1450 = S[11] - t1449;
-    const real t1451 = Rc[2] * t1450;
-    const real t1452 = t1438 + t1451;
-    const real t1453 = Rc[2] * t1452;
-    const real t1454 = t1435 + t1453;
-    S_I[0] += t1454;
-    const real t1455 = Rc[3] * t1403;
-    const real t1456 = Rc[4] * t1433;
-    const real t1457 = t1455 + t1456;
-    const real t1458 = Rc[5] * t1452;
-    const real t1459 = t1457 + t1458;
-    S_I[1] += t1459;
-    const real t1460 = Rc[6] * t1403;
-    const real t1461 = Rc[7] * t1433;
-    const real t1462 = t1460 + t1461;
-    const real t1463 = Rc[8] * t1452;
-    const real t1464 = t1462 + t1463;
-    S_I[2] += t1464;
-    const real t1465 = t10 * t1092;
-    const real t1466 = t89 * t1082;
-    const real t1467 = t1465 + t1466;
-    const real t1468 = t184 * t1074;
-    const real t1469 = t1467 + t1468;
-    const real t1470 = t295 * t1068;
-    const real t1471 = t1469 + t1470;
-    const real t1472 = t424 * t1064;
-    const real t1473 = t1471 + t1472;
-    const real t1474 = t573 * t1062;
-    const real t1475 = t1473 + t1474;
-    const real t1476 = S[3] - t1475;
-    const real t1477 = Rc[0] * t1476;
-    const real t1478 = t22 * t1092;
-    const real t1479 = t101 * t1082;
-    const real t1480 = t1478 + t1479;
-    const real t1481 = t196 * t1074;
-    const real t1482 = t1480 + t1481;
-    const real t1483 = t307 * t1068;
-    const real t1484 = t1482 + t1483;
-    const real t1485 = t436 * t1064;
-    const real t1486 = t1484 + t1485;
-    const real t1487 = t585 * t1062;
-    const real t1488 = t1486 + t1487;
-    const real t1489 = S[8] - t1488;
-    const real t1490 = Rc[1] * t1489;
-    const real t1491 = t1477 + t1490;
-    const real t1492 = t35 * t1092;
-    const real t1493 = t114 * t1082;
-    const real t1494 = t1492 + t1493;
-    const real t1495 = t209 * t1074;
-    const real t1496 = t1494 + t1495;
-    const real t1497 = t320 * t1068;
-    const real t1498 = t1496 + t1497;
-    const real t1499 = t449 * t1064;
-    const real t1500 = t1498 + t1499;
-    const real t1501 = t598 * t1062;
-    const real t1502 = t1500 + t1501;
-    const real t1503 = S[12] - t1502;
-    const real t1504 = Rc[2] * t1503;
-    const real t1505 = t1491 + t1504;
-    const real t1506 = Rc[0] * t1505;
-    const real t1507 = t10 * t1158;
-    const real t1508 = t89 * t1148;
-    const real t1509 = t1507 + t1508;
-    const real t1510 = t184 * t1140;
-    const real t1511 = t1509 + t1510;
-    const real t1512 = t295 * t1134;
-    const real t1513 = t1511 + t1512;
-    const real t1514 = t424 * t1130;
-    const real t1515 = t1513 + t1514;
-    const real t1516 = t573 * t1128;
-    const real t1517 = t1515 + t1516;
-    const real t1518 = S[4] - t1517;
-    const real t1519 = Rc[0] * t1518;
-    const real t1520 = t22 * t1158;
-    const real t1521 = t101 * t1148;
-    const real t1522 = t1520 + t1521;
-    const real t1523 = t196 * t1140;
-    const real t1524 = t1522 + t1523;
-    const real t1525 = t307 * t1134;
-    const real t1526 = t1524 + t1525;
-    const real t1527 = t436 * t1130;
-    const real t1528 = t1526 + t1527;
-    const real t1529 = t585 * t1128;
-    const real t1530 = t1528 + t1529;
-    const real t1531 = S[9] - t1530;
-    const real t1532 = Rc[1] * t1531;
-    const real t1533 = t1519 + t1532;
-    const real t1534 = t35 * t1158;
-    const real t1535 = t114 * t1148;
-    const real t1536 = t1534 + t1535;
-    const real t1537 = t209 * t1140;
-    const real t1538 = t1536 + t1537;
-    const real t1539 = t320 * t1134;
-    const real t1540 = t1538 + t1539;
-    const real t1541 = t449 * t1130;
-    const real t1542 = t1540 + t1541;
-    const real t1543 = t598 * t1128;
-    const real t1544 = t1542 + t1543;
-    const real t1545 = S[13] - t1544;
-    const real t1546 = Rc[2] * t1545;
-    const real t1547 = t1533 + t1546;
-    const real t1548 = Rc[1] * t1547;
-    const real t1549 = t1506 + t1548;
-    const real t1550 = t10 * t1224;
-    const real t1551 = t89 * t1214;
-    const real t1552 = t1550 + t1551;
-    const real t1553 = t184 * t1206;
-    const real t1554 = t1552 + t1553;
-    const real t1555 = t295 * t1200;
-    const real t1556 = t1554 + t1555;
-    const real t1557 = t424 * t1196;
-    const real t1558 = t1556 + t1557;
-    const real t1559 = t573 * t1194;
-    const real t1560 = t1558 + t1559;
-    const real t1561 = S[5] - t1560;
-    const real t1562 = Rc[0] * t1561;
-    const real t1563 = t22 * t1224;
-    const real t1564 = t101 * t1214;
-    const real t1565 = t1563 + t1564;
-    const real t1566 = t196 * t1206;
-    const real t1567 = t1565 + t1566;
-    const real t1568 = t307 * t1200;
-    const real t1569 = t1567 + t1568;
-    const real t1570 = t436 * t1196;
-    const real t1571 = t1569 + t1570;
-    const real t1572 = t585 * t1194;
-    const real t1573 = t1571 + t1572;
-    const real t1574 = S[10] - t1573;
-    const real t1575 = Rc[1] * t1574;
-    const real t1576 = t1562 + t1575;
-    const real t1577 = t35 * t1224;
-    const real t1578 = t114 * t1214;
-    const real t1579 = t1577 + t1578;
-    const real t1580 = t209 * t1206;
-    const real t1581 = t1579 + t1580;
-    const real t1582 = t320 * t1200;
-    const real t1583 = t1581 + t1582;
-    const real t1584 = t449 * t1196;
-    const real t1585 = t1583 + t1584;
-    const real t1586 = t598 * t1194;
-    const real t1587 = t1585 + t1586;
-    const real t1588 = S[14] - t1587;
-    const real t1589 = Rc[2] * t1588;
-    const real t1590 = t1576 + t1589;
-    const real t1591 = Rc[2] * t1590;
-    const real t1592 = t1549 + t1591;
-    const real t1593 = r[1] * t1464;
-    const real t1594 = r[2] * t1459;
-    const real t1595 = t1593 - t1594;
-    const real t1596 = t1592 + t1595;
-    S_I[3] += t1596;
-    const real t1597 = Rc[3] * t1505;
-    const real t1598 = Rc[4] * t1547;
-    const real t1599 = t1597 + t1598;
-    const real t1600 = Rc[5] * t1590;
-    const real t1601 = t1599 + t1600;
-    const real t1602 = r[2] * t1454;
-    const real t1603 = r[0] * t1464;
-    const real t1604 = t1602 - t1603;
-    const real t1605 = t1601 + t1604;
-    S_I[4] += t1605;
-    const real t1606 = Rc[6] * t1505;
-    const real t1607 = Rc[7] * t1547;
-    const real t1608 = t1606 + t1607;
-    const real t1609 = Rc[8] * t1590;
-    const real t1610 = t1608 + t1609;
-    const real t1611 = r[0] * t1459;
-    const real t1612 = r[1] * t1454;
-    const real t1613 = t1611 - t1612;
-    const real t1614 = t1610 + t1613;
-    S_I[5] += t1614;
-    const real t1615 = Rc[3] * t1374;
-    const real t1616 = Rc[4] * t1387;
-    const real t1617 = t1615 + t1616;
-    const real t1618 = Rc[5] * t1401;
-    const real t1619 = t1617 + t1618;
-    const real t1620 = Rc[3] * t1619;
-    const real t1621 = Rc[3] * t1387;
-    const real t1622 = Rc[4] * t1417;
-    const real t1623 = t1621 + t1622;
-    const real t1624 = Rc[5] * t1431;
-    const real t1625 = t1623 + t1624;
-    const real t1626 = Rc[4] * t1625;
-    const real t1627 = t1620 + t1626;
-    const real t1628 = Rc[3] * t1401;
-    const real t1629 = Rc[4] * t1431;
-    const real t1630 = t1628 + t1629;
-    const real t1631 = Rc[5] * t1450;
-    const real t1632 = t1630 + t1631;
-    const real t1633 = Rc[5] * t1632;
-    const real t1634 = t1627 + t1633;
-    S_I[6] += t1634;
-    const real t1635 = Rc[6] * t1619;
-    const real t1636 = Rc[7] * t1625;
-    const real t1637 = t1635 + t1636;
-    const real t1638 = Rc[8] * t1632;
-    const real t1639 = t1637 + t1638;
-    S_I[7] += t1639;
-    const real t1640 = Rc[3] * t1476;
-    const real t1641 = Rc[4] * t1489;
-    const real t1642 = t1640 + t1641;
-    const real t1643 = Rc[5] * t1503;
-    const real t1644 = t1642 + t1643;
-    const real t1645 = Rc[0] * t1644;
-    const real t1646 = Rc[3] * t1518;
-    const real t1647 = Rc[4] * t1531;
-    const real t1648 = t1646 + t1647;
-    const real t1649 = Rc[5] * t1545;
-    const real t1650 = t1648 + t1649;
-    const real t1651 = Rc[1] * t1650;
-    const real t1652 = t1645 + t1651;
-    const real t1653 = Rc[3] * t1561;
-    const real t1654 = Rc[4] * t1574;
-    const real t1655 = t1653 + t1654;
-    const real t1656 = Rc[5] * t1588;
-    const real t1657 = t1655 + t1656;
-    const real t1658 = Rc[2] * t1657;
-    const real t1659 = t1652 + t1658;
-    const real t1660 = r[1] * t1639;
-    const real t1661 = r[2] * t1634;
-    const real t1662 = t1660 - t1661;
-    const real t1663 = t1659 + t1662;
-    S_I[8] += t1663;
-    const real t1664 = Rc[3] * t1644;
-    const real t1665 = Rc[4] * t1650;
-    const real t1666 = t1664 + t1665;
-    const real t1667 = Rc[5] * t1657;
-    const real t1668 = t1666 + t1667;
-    const real t1669 = r[0] * t1639;
-    const real t1670 = t1594 - t1669;
-    const real t1671 = t1668 + t1670;
-    S_I[9] += t1671;
-    const real t1672 = Rc[6] * t1644;
-    const real t1673 = Rc[7] * t1650;
-    const real t1674 = t1672 + t1673;
-    const real t1675 = Rc[8] * t1657;
-    const real t1676 = t1674 + t1675;
-    const real t1677 = r[0] * t1634;
-    const real t1678 = r[1] * t1459;
-    const real t1679 = t1677 - t1678;
-    const real t1680 = t1676 + t1679;
-    S_I[10] += t1680;
-    const real t1681 = Rc[6] * t1374;
-    const real t1682 = Rc[7] * t1387;
-    const real t1683 = t1681 + t1682;
-    const real t1684 = Rc[8] * t1401;
-    const real t1685 = t1683 + t1684;
-    const real t1686 = Rc[6] * t1685;
-    const real t1687 = Rc[6] * t1387;
-    const real t1688 = Rc[7] * t1417;
-    const real t1689 = t1687 + t1688;
-    const real t1690 = Rc[8] * t1431;
-    const real t1691 = t1689 + t1690;
-    const real t1692 = Rc[7] * t1691;
-    const real t1693 = t1686 + t1692;
-    const real t1694 = Rc[6] * t1401;
-    const real t1695 = Rc[7] * t1431;
-    const real t1696 = t1694 + t1695;
-    const real t1697 = Rc[8] * t1450;
-    const real t1698 = t1696 + t1697;
-    const real t1699 = Rc[8] * t1698;
-    const real t1700 = t1693 + t1699;
-    S_I[11] += t1700;
-    const real t1701 = Rc[6] * t1476;
-    const real t1702 = Rc[7] * t1489;
-    const real t1703 = t1701 + t1702;
-    const real t1704 = Rc[8] * t1503;
-    const real t1705 = t1703 + t1704;
-    const real t1706 = Rc[0] * t1705;
-    const real t1707 = Rc[6] * t1518;
-    const real t1708 = Rc[7] * t1531;
-    const real t1709 = t1707 + t1708;
-    const real t1710 = Rc[8] * t1545;
-    const real t1711 = t1709 + t1710;
-    const real t1712 = Rc[1] * t1711;
-    const real t1713 = t1706 + t1712;
-    const real t1714 = Rc[6] * t1561;
-    const real t1715 = Rc[7] * t1574;
-    const real t1716 = t1714 + t1715;
-    const real t1717 = Rc[8] * t1588;
-    const real t1718 = t1716 + t1717;
-    const real t1719 = Rc[2] * t1718;
-    const real t1720 = t1713 + t1719;
-    const real t1721 = r[1] * t1700;
-    const real t1722 = r[2] * t1639;
-    const real t1723 = t1721 - t1722;
-    const real t1724 = t1720 + t1723;
-    S_I[12] += t1724;
-    const real t1725 = Rc[3] * t1705;
-    const real t1726 = Rc[4] * t1711;
-    const real t1727 = t1725 + t1726;
-    const real t1728 = Rc[5] * t1718;
-    const real t1729 = t1727 + t1728;
-    const real t1730 = r[2] * t1464;
-    const real t1731 = r[0] * t1700;
-    const real t1732 = t1730 - t1731;
-    const real t1733 = t1729 + t1732;
-    S_I[13] += t1733;
-    const real t1734 = Rc[6] * t1705;
-    const real t1735 = Rc[7] * t1711;
-    const real t1736 = t1734 + t1735;
-    const real t1737 = Rc[8] * t1718;
-    const real t1738 = t1736 + t1737;
-    const real t1739 = t1669 - t1593;
-    const real t1740 = t1738 + t1739;
-    S_I[14] += t1740;
-    const real t1741 = t48 * t1092;
-    const real t1742 = t127 * t1082;
-    const real t1743 = t1741 + t1742;
-    const real t1744 = t222 * t1074;
-    const real t1745 = t1743 + t1744;
-    const real t1746 = t333 * t1068;
-    const real t1747 = t1745 + t1746;
-    const real t1748 = t462 * t1064;
-    const real t1749 = t1747 + t1748;
-    const real t1750 = t611 * t1062;
-    const real t1751 = t1749 + t1750;
-    const real t1752 = S[15] - t1751;
-    const real t1753 = Rc[0] * t1752;
-    const real t1754 = t48 * t1158;
-    const real t1755 = t127 * t1148;
-    const real t1756 = t1754 + t1755;
-    const real t1757 = t222 * t1140;
-    const real t1758 = t1756 + t1757;
-    const real t1759 = t333 * t1134;
-    const real t1760 = t1758 + t1759;
-    const real t1761 = t462 * t1130;
-    const real t1762 = t1760 + t1761;
-    const real t1763 = t611 * t1128;
-    const real t1764 = t1762 + t1763;
-    const real t1765 = S[16] - t1764;
-    const real t1766 = Rc[1] * t1765;
-    const real t1767 = t1753 + t1766;
-    const real t1768 = t48 * t1224;
-    const real t1769 = t127 * t1214;
-    const real t1770 = t1768 + t1769;
-    const real t1771 = t222 * t1206;
-    const real t1772 = t1770 + t1771;
-    const real t1773 = t333 * t1200;
-    const real t1774 = t1772 + t1773;
-    const real t1775 = t462 * t1196;
-    const real t1776 = t1774 + t1775;
-    const real t1777 = t611 * t1194;
-    const real t1778 = t1776 + t1777;
-    const real t1779 = S[17] - t1778;
-    const real t1780 = Rc[2] * t1779;
-    const real t1781 = t1767 + t1780;
-    const real t1782 = Rc[0] * t1781;
-    const real t1783 = Rc[0] * t1765;
-    const real t1784 = t61 * t1158;
-    const real t1785 = t140 * t1148;
-    const real t1786 = t1784 + t1785;
-    const real t1787 = t235 * t1140;
-    const real t1788 = t1786 + t1787;
-    const real t1789 = t346 * t1134;
-    const real t1790 = t1788 + t1789;
-    const real t1791 = t475 * t1130;
-    const real t1792 = t1790 + t1791;
-    const real t1793 = t624 * t1128;
-    const real t1794 = t1792 + t1793;
-    const real t1795 = S[18] - t1794;
-    const real t1796 = Rc[1] * t1795;
-    const real t1797 = t1783 + t1796;
-    const real t1798 = t61 * t1224;
-    const real t1799 = t140 * t1214;
-    const real t1800 = t1798 + t1799;
-    const real t1801 = t235 * t1206;
-    const real t1802 = t1800 + t1801;
-    const real t1803 = t346 * t1200;
-    const real t1804 = t1802 + t1803;
-    const real t1805 = t475 * t1196;
-    const real t1806 = t1804 + t1805;
-    const real t1807 = t624 * t1194;
-    const real t1808 = t1806 + t1807;
-    const real t1809 = S[19] - t1808;
-    const real t1810 = Rc[2] * t1809;
-    const real t1811 = t1797 + t1810;
-    const real t1812 = Rc[1] * t1811;
-    const real t1813 = t1782 + t1812;
-    const real t1814 = Rc[0] * t1779;
-    const real t1815 = Rc[1] * t1809;
-    const real t1816 = t1814 + t1815;
-    const real t1817 = t74 * t1224;
-    const real t1818 = t153 * t1214;
-    const real t1819 = t1817 + t1818;
-    const real t1820 = t248 * t1206;
-    const real t1821 = t1819 + t1820;
-    const real t1822 = t359 * t1200;
-    const real t1823 = t1821 + t1822;
-    const real t1824 = t488 * t1196;
-    const real t1825 = t1823 + t1824;
-    const real t1826 = t637 * t1194;
-    const real t1827 = t1825 + t1826;
-    const real t1828 = S[20] - t1827;
-    const real t1829 = Rc[2] * t1828;
-    const real t1830 = t1816 + t1829;
-    const real t1831 = Rc[2] * t1830;
-    const real t1832 = t1813 + t1831;
-    const real t1833 = r[1] * t1724;
-    const real t1834 = r[2] * t1663;
-    const real t1835 = t1833 - t1834;
-    const real t1836 = r[1] * t1720;
-    const real t1837 = r[2] * t1659;
-    const real t1838 = t1836 - t1837;
-    const real t1839 = t1835 + t1838;
-    const real t1840 = t1832 + t1839;
-    S_I[15] += t1840;
-    const real t1841 = Rc[3] * t1781;
-    const real t1842 = Rc[4] * t1811;
-    const real t1843 = t1841 + t1842;
-    const real t1844 = Rc[5] * t1830;
-    const real t1845 = t1843 + t1844;
-    const real t1846 = r[1] * t1733;
-    const real t1847 = r[2] * t1671;
-    const real t1848 = t1846 - t1847;
-    const real t1849 = r[2] * t1592;
-    const real t1850 = r[0] * t1720;
-    const real t1851 = t1849 - t1850;
-    const real t1852 = t1848 + t1851;
-    const real t1853 = t1845 + t1852;
-    S_I[16] += t1853;
-    const real t1854 = Rc[6] * t1781;
-    const real t1855 = Rc[7] * t1811;
-    const real t1856 = t1854 + t1855;
-    const real t1857 = Rc[8] * t1830;
-    const real t1858 = t1856 + t1857;
-    const real t1859 = r[1] * t1740;
-    const real t1860 = r[2] * t1680;
-    const real t1861 = t1859 - t1860;
-    const real t1862 = r[0] * t1659;
-    const real t1863 = r[1] * t1592;
-    const real t1864 = t1862 - t1863;
-    const real t1865 = t1861 + t1864;
-    const real t1866 = t1858 + t1865;
-    S_I[17] += t1866;
-    const real t1867 = Rc[3] * t1752;
-    const real t1868 = Rc[4] * t1765;
-    const real t1869 = t1867 + t1868;
-    const real t1870 = Rc[5] * t1779;
-    const real t1871 = t1869 + t1870;
-    const real t1872 = Rc[3] * t1871;
-    const real t1873 = Rc[3] * t1765;
-    const real t1874 = Rc[4] * t1795;
-    const real t1875 = t1873 + t1874;
-    const real t1876 = Rc[5] * t1809;
-    const real t1877 = t1875 + t1876;
-    const real t1878 = Rc[4] * t1877;
-    const real t1879 = t1872 + t1878;
-    const real t1880 = Rc[3] * t1779;
-    const real t1881 = Rc[4] * t1809;
-    const real t1882 = t1880 + t1881;
-    const real t1883 = Rc[5] * t1828;
-    const real t1884 = t1882 + t1883;
-    const real t1885 = Rc[5] * t1884;
-    const real t1886 = t1879 + t1885;
-    const real t1887 = r[2] * t1605;
-    const real t1888 = r[0] * t1733;
-    const real t1889 = t1887 - t1888;
-    const real t1890 = r[2] * t1601;
-    const real t1891 = r[0] * t1729;
-    const real t1892 = t1890 - t1891;
-    const real t1893 = t1889 + t1892;
-    const real t1894 = t1886 + t1893;
-    S_I[18] += t1894;
-    const real t1895 = Rc[6] * t1871;
-    const real t1896 = Rc[7] * t1877;
-    const real t1897 = t1895 + t1896;
-    const real t1898 = Rc[8] * t1884;
-    const real t1899 = t1897 + t1898;
-    const real t1900 = r[2] * t1614;
-    const real t1901 = r[0] * t1740;
-    const real t1902 = t1900 - t1901;
-    const real t1903 = r[0] * t1668;
-    const real t1904 = r[1] * t1601;
-    const real t1905 = t1903 - t1904;
-    const real t1906 = t1902 + t1905;
-    const real t1907 = t1899 + t1906;
-    S_I[19] += t1907;
-    const real t1908 = Rc[6] * t1752;
-    const real t1909 = Rc[7] * t1765;
-    const real t1910 = t1908 + t1909;
-    const real t1911 = Rc[8] * t1779;
-    const real t1912 = t1910 + t1911;
-    const real t1913 = Rc[6] * t1912;
-    const real t1914 = Rc[6] * t1765;
-    const real t1915 = Rc[7] * t1795;
-    const real t1916 = t1914 + t1915;
-    const real t1917 = Rc[8] * t1809;
-    const real t1918 = t1916 + t1917;
-    const real t1919 = Rc[7] * t1918;
-    const real t1920 = t1913 + t1919;
-    const real t1921 = Rc[6] * t1779;
-    const real t1922 = Rc[7] * t1809;
-    const real t1923 = t1921 + t1922;
-    const real t1924 = Rc[8] * t1828;
-    const real t1925 = t1923 + t1924;
-    const real t1926 = Rc[8] * t1925;
-    const real t1927 = t1920 + t1926;
-    const real t1928 = r[0] * t1680;
-    const real t1929 = r[1] * t1614;
-    const real t1930 = t1928 - t1929;
-    const real t1931 = r[0] * t1676;
-    const real t1932 = r[1] * t1610;
-    const real t1933 = t1931 - t1932;
-    const real t1934 = t1930 + t1933;
-    const real t1935 = t1927 + t1934;
-    S_I[20] += t1935;
-    const real t1936 = t10 * t1362;
-    const real t1937 = t89 * t1352;
-    const real t1938 = t1936 + t1937;
-    const real t1939 = t184 * t1344;
-    const real t1940 = t1938 + t1939;
-    const real t1941 = t295 * t1338;
-    const real t1942 = t1940 + t1941;
-    const real t1943 = t424 * t1334;
-    const real t1944 = t1942 + t1943;
-    const real t1945 = t573 * t1332;
-    const real t1946 = t1944 + t1945;
-    const real t1947 = e[0] + t1946;
-    const real t1948 = Rc[0] * t1947;
-    const real t1949 = t22 * t1362;
-    const real t1950 = t101 * t1352;
-    const real t1951 = t1949 + t1950;
-    const real t1952 = t196 * t1344;
-    const real t1953 = t1951 + t1952;
-    const real t1954 = t307 * t1338;
-    const real t1955 = t1953 + t1954;
-    const real t1956 = t436 * t1334;
-    const real t1957 = t1955 + t1956;
-    const real t1958 = t585 * t1332;
-    const real t1959 = t1957 + t1958;
-    const real t1960 = e[1] + t1959;
-    const real t1961 = Rc[1] * t1960;
-    const real t1962 = t1948 + t1961;
-    const real t1963 = t35 * t1362;
-    const real t1964 = t114 * t1352;
-    const real t1965 = t1963 + t1964;
-    const real t1966 = t209 * t1344;
-    const real t1967 = t1965 + t1966;
-    const real t1968 = t320 * t1338;
-    const real t1969 = t1967 + t1968;
-    const real t1970 = t449 * t1334;
-    const real t1971 = t1969 + t1970;
-    const real t1972 = t598 * t1332;
-    const real t1973 = t1971 + t1972;
-    const real t1974 = e[2] + t1973;
-    const real t1975 = Rc[2] * t1974;
-    const real t1976 = t1962 + t1975;
-    e_I[0] += t1976;
-    const real t1977 = Rc[3] * t1947;
-    const real t1978 = Rc[4] * t1960;
-    const real t1979 = t1977 + t1978;
-    const real t1980 = Rc[5] * t1974;
-    const real t1981 = t1979 + t1980;
-    e_I[1] += t1981;
-    const real t1982 = Rc[6] * t1947;
-    const real t1983 = Rc[7] * t1960;
-    const real t1984 = t1982 + t1983;
-    const real t1985 = Rc[8] * t1974;
-    const real t1986 = t1984 + t1985;
-    e_I[2] += t1986;
-    const real t1987 = t48 * t1362;
-    const real t1988 = t127 * t1352;
-    const real t1989 = t1987 + t1988;
-    const real t1990 = t222 * t1344;
-    const real t1991 = t1989 + t1990;
-    const real t1992 = t333 * t1338;
-    const real t1993 = t1991 + t1992;
-    const real t1994 = t462 * t1334;
-    const real t1995 = t1993 + t1994;
-    const real t1996 = t611 * t1332;
-    const real t1997 = t1995 + t1996;
-    const real t1998 = e[3] + t1997;
-    const real t1999 = Rc[0] * t1998;
-    const real t2000 = t61 * t1362;
-    const real t2001 = t140 * t1352;
-    const real t2002 = t2000 + t2001;
-    const real t2003 = t235 * t1344;
-    const real t2004 = t2002 + t2003;
-    const real t2005 = t346 * t1338;
-    const real t2006 = t2004 + t2005;
-    const real t2007 = t475 * t1334;
-    const real t2008 = t2006 + t2007;
-    const real t2009 = t624 * t1332;
-    const real t2010 = t2008 + t2009;
-    const real t2011 = e[4] + t2010;
-    const real t2012 = Rc[1] * t2011;
-    const real t2013 = t1999 + t2012;
-    const real t2014 = t74 * t1362;
-    const real t2015 = t153 * t1352;
-    const real t2016 = t2014 + t2015;
-    const real t2017 = t248 * t1344;
-    const real t2018 = t2016 + t2017;
-    const real t2019 = t359 * t1338;
-    const real t2020 = t2018 + t2019;
-    const real t2021 = t488 * t1334;
-    const real t2022 = t2020 + t2021;
-    const real t2023 = t637 * t1332;
-    const real t2024 = t2022 + t2023;
-    const real t2025 = e[5] + t2024;
-    const real t2026 = Rc[2] * t2025;
-    const real t2027 = t2013 + t2026;
-    const real t2028 = Rc[6] * r[1];
-    const real t2029 = Rc[3] * r[2];
-    const real t2030 = t2028 - t2029;
-    const real t2031 = t1947 * t2030;
-    const real t2032 = Rc[7] * r[1];
-    const real t2033 = Rc[4] * r[2];
-    const real t2034 = t2032 - t2033;
-    const real t2035 = t1960 * t2034;
-    const real t2036 = t2031 + t2035;
-    const real t2037 = Rc[8] * r[1];
-    const real t2038 = Rc[5] * r[2];
-    const real t2039 = t2037 - t2038;
-    const real t2040 = t1974 * t2039;
-    const real t2041 = t2036 + t2040;
-    const real t2042 = t2027 + t2041;
-    e_I[3] += t2042;
-    const real t2043 = Rc[3] * t1998;
-    const real t2044 = Rc[4] * t2011;
-    const real t2045 = t2043 + t2044;
-    const real t2046 = Rc[5] * t2025;
-    const real t2047 = t2045 + t2046;
-    const real t2048 = Rc[0] * r[2];
-    const real t2049 = Rc[6] * r[0];
-    const real t2050 = t2048 - t2049;
-    const real t2051 = t1947 * t2050;
-    const real t2052 = Rc[1] * r[2];
-    const real t2053 = Rc[7] * r[0];
-    const real t2054 = t2052 - t2053;
-    const real t2055 = t1960 * t2054;
-    const real t2056 = t2051 + t2055;
-    const real t2057 = Rc[2] * r[2];
-    const real t2058 = Rc[8] * r[0];
-    const real t2059 = t2057 - t2058;
-    const real t2060 = t1974 * t2059;
-    const real t2061 = t2056 + t2060;
-    const real t2062 = t2047 + t2061;
-    e_I[4] += t2062;
-    const real t2063 = Rc[6] * t1998;
-    const real t2064 = Rc[7] * t2011;
-    const real t2065 = t2063 + t2064;
-    const real t2066 = Rc[8] * t2025;
-    const real t2067 = t2065 + t2066;
-    const real t2068 = Rc[3] * r[0];
-    const real t2069 = Rc[0] * r[1];
-    const real t2070 = t2068 - t2069;
-    const real t2071 = t1947 * t2070;
-    const real t2072 = Rc[4] * r[0];
-    const real t2073 = Rc[1] * r[1];
-    const real t2074 = t2072 - t2073;
-    const real t2075 = t1960 * t2074;
-    const real t2076 = t2071 + t2075;
-    const real t2077 = Rc[5] * r[0];
-    const real t2078 = Rc[2] * r[1];
-    const real t2079 = t2077 - t2078;
-    const real t2080 = t1974 * t2079;
-    const real t2081 = t2076 + t2080;
-    const real t2082 = t2067 + t2081;
-    e_I[5] += t2082;
-    return 0;
+  real t10 = H[0] * S[0] + H[6] * S[1] + H[12] * S[2] + H[18] * S[3] + H[24] * S[4] + H[30] * S[5];
+  real t22 = H[0] * S[1] + H[6] * S[6] + H[12] * S[7] + H[18] * S[8] + H[24] * S[9] + H[30] * S[10];
+  real t35 = H[0] * S[2] + H[6] * S[7] + H[12] * S[11] + H[18] * S[12] + H[24] * S[13] + H[30] *
+    S[14];
+  real t48 = H[0] * S[3] + H[6] * S[8] + H[12] * S[12] + H[18] * S[15] + H[24] * S[16] + H[30] *
+    S[17];
+  real t61 = H[0] * S[4] + H[6] * S[9] + H[12] * S[13] + H[18] * S[16] + H[24] * S[18] + H[30] *
+    S[19];
+  real t74 = H[0] * S[5] + H[6] * S[10] + H[12] * S[14] + H[18] * S[17] + H[24] * S[19] + H[30] *
+    S[20];
+  real t77 = J[0] + (H[0] * t10 + H[6] * t22 + H[12] * t35 + H[18] * t48 + H[24] * t61 + H[30] *
+    t74);
+  real t78 = 0.0 < t77;
+  if (!(t78 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  real t89 = H[1] * S[0] + H[7] * S[1] + H[13] * S[2] + H[19] * S[3] + H[25] * S[4] + H[31] * S[5];
+  real t101 = H[1] * S[1] + H[7] * S[6] + H[13] * S[7] + H[19] * S[8] + H[25] * S[9] + H[31] *
+    S[10];
+  real t114 = H[1] * S[2] + H[7] * S[7] + H[13] * S[11] + H[19] * S[12] + H[25] * S[13] + H[31] *
+    S[14];
+  real t127 = H[1] * S[3] + H[7] * S[8] + H[13] * S[12] + H[19] * S[15] + H[25] * S[16] + H[31] *
+    S[17];
+  real t140 = H[1] * S[4] + H[7] * S[9] + H[13] * S[13] + H[19] * S[16] + H[25] * S[18] + H[31] *
+    S[19];
+  real t153 = H[1] * S[5] + H[7] * S[10] + H[13] * S[14] + H[19] * S[17] + H[25] * S[19] + H[31] *
+    S[20];
+  real t156 = J[1] + (H[1] * t89 + H[7] * t101 + H[13] * t114 + H[19] * t127 + H[25] * t140 + H[31]
+    * t153);
+  real t168 = H[0] * t89 + H[6] * t101 + H[12] * t114 + H[18] * t127 + H[24] * t140 + H[30] * t153;
+  real t169 = 1.0 / t77;
+  real t170 = t168 * t169;
+  real t172 = t156 - t168 * t170;
+  real t173 = t156 * ((real)1 / (real)10000000000000) < t172;
+  if (!(t173 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  real t184 = H[2] * S[0] + H[8] * S[1] + H[14] * S[2] + H[20] * S[3] + H[26] * S[4] + H[32] * S[5];
+  real t196 = H[2] * S[1] + H[8] * S[6] + H[14] * S[7] + H[20] * S[8] + H[26] * S[9] + H[32] *
+    S[10];
+  real t209 = H[2] * S[2] + H[8] * S[7] + H[14] * S[11] + H[20] * S[12] + H[26] * S[13] + H[32] *
+    S[14];
+  real t222 = H[2] * S[3] + H[8] * S[8] + H[14] * S[12] + H[20] * S[15] + H[26] * S[16] + H[32] *
+    S[17];
+  real t235 = H[2] * S[4] + H[8] * S[9] + H[14] * S[13] + H[20] * S[16] + H[26] * S[18] + H[32] *
+    S[19];
+  real t248 = H[2] * S[5] + H[8] * S[10] + H[14] * S[14] + H[20] * S[17] + H[26] * S[19] + H[32] *
+    S[20];
+  real t251 = J[2] + (H[2] * t184 + H[8] * t196 + H[14] * t209 + H[20] * t222 + H[26] * t235 + H[32]
+    * t248);
+  real t263 = H[0] * t184 + H[6] * t196 + H[12] * t209 + H[18] * t222 + H[24] * t235 + H[30] * t248;
+  real t264 = t263 * t169;
+  real t279 = H[1] * t184 + H[7] * t196 + H[13] * t209 + H[19] * t222 + H[25] * t235 + H[31] * t248
+    - t263 * t170;
+  real t280 = 1.0 / t172;
+  real t281 = t280 * t279;
+  real t283 = t251 - t263 * t264 - t279 * t281;
+  real t284 = t251 * ((real)1 / (real)10000000000000) < t283;
+  if (!(t284 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  real t295 = H[3] * S[0] + H[9] * S[1] + H[15] * S[2] + H[21] * S[3] + H[27] * S[4] + H[33] * S[5];
+  real t307 = H[3] * S[1] + H[9] * S[6] + H[15] * S[7] + H[21] * S[8] + H[27] * S[9] + H[33] *
+    S[10];
+  real t320 = H[3] * S[2] + H[9] * S[7] + H[15] * S[11] + H[21] * S[12] + H[27] * S[13] + H[33] *
+    S[14];
+  real t333 = H[3] * S[3] + H[9] * S[8] + H[15] * S[12] + H[21] * S[15] + H[27] * S[16] + H[33] *
+    S[17];
+  real t346 = H[3] * S[4] + H[9] * S[9] + H[15] * S[13] + H[21] * S[16] + H[27] * S[18] + H[33] *
+    S[19];
+  real t359 = H[3] * S[5] + H[9] * S[10] + H[15] * S[14] + H[21] * S[17] + H[27] * S[19] + H[33] *
+    S[20];
+  real t362 = J[3] + (H[3] * t295 + H[9] * t307 + H[15] * t320 + H[21] * t333 + H[27] * t346 + H[33]
+    * t359);
+  real t374 = H[0] * t295 + H[6] * t307 + H[12] * t320 + H[18] * t333 + H[24] * t346 + H[30] * t359;
+  real t375 = t374 * t169;
+  real t390 = H[1] * t295 + H[7] * t307 + H[13] * t320 + H[19] * t333 + H[25] * t346 + H[31] * t359
+    - t374 * t170;
+  real t391 = t280 * t390;
+  real t408 = H[2] * t295 + H[8] * t307 + H[14] * t320 + H[20] * t333 + H[26] * t346 + H[32] * t359
+    - t374 * t264 - t281 * t390;
+  real t409 = 1.0 / t283;
+  real t410 = t409 * t408;
+  real t412 = t362 - t374 * t375 - t390 * t391 - t408 * t410;
+  real t413 = t362 * ((real)1 / (real)10000000000000) < t412;
+  if (!(t413 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  real t424 = H[4] * S[0] + H[10] * S[1] + H[16] * S[2] + H[22] * S[3] + H[28] * S[4] + H[34] *
+    S[5];
+  real t436 = H[4] * S[1] + H[10] * S[6] + H[16] * S[7] + H[22] * S[8] + H[28] * S[9] + H[34] *
+    S[10];
+  real t449 = H[4] * S[2] + H[10] * S[7] + H[16] * S[11] + H[22] * S[12] + H[28] * S[13] + H[34] *
+    S[14];
+  real t462 = H[4] * S[3] + H[10] * S[8] + H[16] * S[12] + H[22] * S[15] + H[28] * S[16] + H[34] *
+    S[17];
+  real t475 = H[4] * S[4] + H[10] * S[9] + H[16] * S[13] + H[22] * S[16] + H[28] * S[18] + H[34] *
+    S[19];
+  real t488 = H[4] * S[5] + H[10] * S[10] + H[16] * S[14] + H[22] * S[17] + H[28] * S[19] + H[34] *
+    S[20];
+  real t491 = J[4] + (H[4] * t424 + H[10] * t436 + H[16] * t449 + H[22] * t462 + H[28] * t475 +
+    H[34] * t488);
+  real t503 = H[0] * t424 + H[6] * t436 + H[12] * t449 + H[18] * t462 + H[24] * t475 + H[30] * t488;
+  real t504 = t503 * t169;
+  real t519 = H[1] * t424 + H[7] * t436 + H[13] * t449 + H[19] * t462 + H[25] * t475 + H[31] * t488
+    - t503 * t170;
+  real t520 = t280 * t519;
+  real t537 = H[2] * t424 + H[8] * t436 + H[14] * t449 + H[20] * t462 + H[26] * t475 + H[32] * t488
+    - t503 * t264 - t281 * t519;
+  real t538 = t409 * t537;
+  real t557 = H[3] * t424 + H[9] * t436 + H[15] * t449 + H[21] * t462 + H[27] * t475 + H[33] * t488
+    - t503 * t375 - t391 * t519 - t410 * t537;
+  real t558 = 1.0 / t412;
+  real t559 = t558 * t557;
+  real t561 = t491 - t503 * t504 - t519 * t520 - t537 * t538 - t557 * t559;
+  real t562 = t491 * ((real)1 / (real)10000000000000) < t561;
+  if (!(t562 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  real t573 = H[5] * S[0] + H[11] * S[1] + H[17] * S[2] + H[23] * S[3] + H[29] * S[4] + H[35] *
+    S[5];
+  real t585 = H[5] * S[1] + H[11] * S[6] + H[17] * S[7] + H[23] * S[8] + H[29] * S[9] + H[35] *
+    S[10];
+  real t598 = H[5] * S[2] + H[11] * S[7] + H[17] * S[11] + H[23] * S[12] + H[29] * S[13] + H[35] *
+    S[14];
+  real t611 = H[5] * S[3] + H[11] * S[8] + H[17] * S[12] + H[23] * S[15] + H[29] * S[16] + H[35] *
+    S[17];
+  real t624 = H[5] * S[4] + H[11] * S[9] + H[17] * S[13] + H[23] * S[16] + H[29] * S[18] + H[35] *
+    S[19];
+  real t637 = H[5] * S[5] + H[11] * S[10] + H[17] * S[14] + H[23] * S[17] + H[29] * S[19] + H[35] *
+    S[20];
+  real t640 = J[5] + (H[5] * t573 + H[11] * t585 + H[17] * t598 + H[23] * t611 + H[29] * t624 +
+    H[35] * t637);
+  real t652 = H[0] * t573 + H[6] * t585 + H[12] * t598 + H[18] * t611 + H[24] * t624 + H[30] * t637;
+  real t653 = t652 * t169;
+  real t668 = H[1] * t573 + H[7] * t585 + H[13] * t598 + H[19] * t611 + H[25] * t624 + H[31] * t637
+    - t652 * t170;
+  real t669 = t280 * t668;
+  real t686 = H[2] * t573 + H[8] * t585 + H[14] * t598 + H[20] * t611 + H[26] * t624 + H[32] * t637
+    - t652 * t264 - t281 * t668;
+  real t687 = t409 * t686;
+  real t706 = H[3] * t573 + H[9] * t585 + H[15] * t598 + H[21] * t611 + H[27] * t624 + H[33] * t637
+    - t652 * t375 - t391 * t668 - t410 * t686;
+  real t707 = t558 * t706;
+  real t728 = H[4] * t573 + H[10] * t585 + H[16] * t598 + H[22] * t611 + H[28] * t624 + H[34] * t637
+    - t652 * t504 - t520 * t668 - t538 * t686 - t559 * t706;
+  real t729 = 1.0 / t561;
+  real t730 = t729 * t728;
+  real t732 = t640 - t652 * t653 - t668 * t669 - t686 * t687 - t706 * t707 - t728 * t730;
+  real t733 = t640 * ((real)1 / (real)10000000000000) < t732;
+  if (!(t733 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t78 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t173 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t284 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t413 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t562 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  if (!(t733 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  real t742 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t743 = (0.0 < floor_[0]) ? floor_[0] : t742;
+  real t753 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t754 = (0.0 < floor_[1]) ? floor_[1] : t753;
+  if (!(((H[12] * H[12] + (H[0] * H[0] + H[6] * H[6])) * t743 + (H[30] * H[30] + (H[18] * H[18] + H[24] * H[24])) * t754 < t77))) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t743 * (H[13] * H[13] + (H[1] * H[1] + H[7] * H[7])) + t754 * (H[31] * H[31] + (H[19] * H[19] + H[25] * H[25])) < t156))) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t743 * (H[14] * H[14] + (H[2] * H[2] + H[8] * H[8])) + t754 * (H[32] * H[32] + (H[20] * H[20] + H[26] * H[26])) < t251))) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t743 * (H[15] * H[15] + (H[3] * H[3] + H[9] * H[9])) + t754 * (H[33] * H[33] + (H[21] * H[21] + H[27] * H[27])) < t362))) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t743 * (H[16] * H[16] + (H[4] * H[4] + H[10] * H[10])) + t754 * (H[34] * H[34] + (H[22] * H[22] + H[28] * H[28])) < t491))) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t743 * (H[17] * H[17] + (H[5] * H[5] + H[11] * H[11])) + t754 * (H[35] * H[35] + (H[23] * H[23] + H[29] * H[29])) < t640))) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
+  real t830 = t89 - t10 * t170;
+  real t835 = t184 - t10 * t264 - t281 * t830;
+  real t842 = t295 - t10 * t375 - t391 * t830 - t410 * t835;
+  real t851 = t424 - t10 * t504 - t520 * t830 - t538 * t835 - t559 * t842;
+  real t853 = 1.0 / t732;
+  real t864 = t853 * (t573 - t10 * t653 - t669 * t830 - t687 * t835 - t707 * t842 - t730 * t851);
+  real t866 = t729 * t851 - t730 * t864;
+  real t870 = t558 * t842 - t559 * t866 - t707 * t864;
+  real t876 = t409 * t835 - t410 * t870 - t538 * t866 - t687 * t864;
+  real t884 = t280 * t830 - t281 * t876 - t391 * t870 - t520 * t866 - t669 * t864;
+  real t894 = t10 * t169 - t170 * t884 - t264 * t876 - t375 * t870 - t504 * t866 - t653 * t864;
+  G[0] = t894;
+  real t897 = t101 - t22 * t170;
+  real t902 = t196 - t22 * t264 - t281 * t897;
+  real t909 = t307 - t22 * t375 - t391 * t897 - t410 * t902;
+  real t918 = t436 - t22 * t504 - t520 * t897 - t538 * t902 - t559 * t909;
+  real t930 = t853 * (t585 - t22 * t653 - t669 * t897 - t687 * t902 - t707 * t909 - t730 * t918);
+  real t932 = t729 * t918 - t730 * t930;
+  real t936 = t558 * t909 - t559 * t932 - t707 * t930;
+  real t942 = t409 * t902 - t410 * t936 - t538 * t932 - t687 * t930;
+  real t950 = t280 * t897 - t281 * t942 - t391 * t936 - t520 * t932 - t669 * t930;
+  real t960 = t22 * t169 - t170 * t950 - t264 * t942 - t375 * t936 - t504 * t932 - t653 * t930;
+  G[1] = t960;
+  real t963 = t114 - t35 * t170;
+  real t968 = t209 - t35 * t264 - t281 * t963;
+  real t975 = t320 - t35 * t375 - t391 * t963 - t410 * t968;
+  real t984 = t449 - t35 * t504 - t520 * t963 - t538 * t968 - t559 * t975;
+  real t996 = t853 * (t598 - t35 * t653 - t669 * t963 - t687 * t968 - t707 * t975 - t730 * t984);
+  real t998 = t729 * t984 - t730 * t996;
+  real t1002 = t558 * t975 - t559 * t998 - t707 * t996;
+  real t1008 = t409 * t968 - t410 * t1002 - t538 * t998 - t687 * t996;
+  real t1016 = t280 * t963 - t281 * t1008 - t391 * t1002 - t520 * t998 - t669 * t996;
+  real t1026 = t35 * t169 - t170 * t1016 - t264 * t1008 - t375 * t1002 - t504 * t998 - t653 * t996;
+  G[2] = t1026;
+  real t1029 = t127 - t48 * t170;
+  real t1034 = t222 - t48 * t264 - t281 * t1029;
+  real t1041 = t333 - t48 * t375 - t391 * t1029 - t410 * t1034;
+  real t1050 = t462 - t48 * t504 - t520 * t1029 - t538 * t1034 - t559 * t1041;
+  real t1062 = t853 * (t611 - t48 * t653 - t669 * t1029 - t687 * t1034 - t707 * t1041 - t730 *
+    t1050);
+  real t1064 = t729 * t1050 - t730 * t1062;
+  real t1068 = t558 * t1041 - t559 * t1064 - t707 * t1062;
+  real t1074 = t409 * t1034 - t410 * t1068 - t538 * t1064 - t687 * t1062;
+  real t1082 = t280 * t1029 - t281 * t1074 - t391 * t1068 - t520 * t1064 - t669 * t1062;
+  real t1092 = t48 * t169 - t170 * t1082 - t264 * t1074 - t375 * t1068 - t504 * t1064 - t653 *
+    t1062;
+  G[3] = t1092;
+  real t1095 = t140 - t61 * t170;
+  real t1100 = t235 - t61 * t264 - t281 * t1095;
+  real t1107 = t346 - t61 * t375 - t391 * t1095 - t410 * t1100;
+  real t1116 = t475 - t61 * t504 - t520 * t1095 - t538 * t1100 - t559 * t1107;
+  real t1128 = t853 * (t624 - t61 * t653 - t669 * t1095 - t687 * t1100 - t707 * t1107 - t730 *
+    t1116);
+  real t1130 = t729 * t1116 - t730 * t1128;
+  real t1134 = t558 * t1107 - t559 * t1130 - t707 * t1128;
+  real t1140 = t409 * t1100 - t410 * t1134 - t538 * t1130 - t687 * t1128;
+  real t1148 = t280 * t1095 - t281 * t1140 - t391 * t1134 - t520 * t1130 - t669 * t1128;
+  real t1158 = t61 * t169 - t170 * t1148 - t264 * t1140 - t375 * t1134 - t504 * t1130 - t653 *
+    t1128;
+  G[4] = t1158;
+  real t1161 = t153 - t74 * t170;
+  real t1166 = t248 - t74 * t264 - t281 * t1161;
+  real t1173 = t359 - t74 * t375 - t391 * t1161 - t410 * t1166;
+  real t1182 = t488 - t74 * t504 - t520 * t1161 - t538 * t1166 - t559 * t1173;
+  real t1194 = t853 * (t637 - t74 * t653 - t669 * t1161 - t687 * t1166 - t707 * t1173 - t730 *
+    t1182);
+  real t1196 = t729 * t1182 - t730 * t1194;
+  real t1200 = t558 * t1173 - t559 * t1196 - t707 * t1194;
+  real t1206 = t409 * t1166 - t410 * t1200 - t538 * t1196 - t687 * t1194;
+  real t1214 = t280 * t1161 - t281 * t1206 - t391 * t1200 - t520 * t1196 - t669 * t1194;
+  real t1224 = t74 * t169 - t170 * t1214 - t264 * t1206 - t375 * t1200 - t504 * t1196 - t653 *
+    t1194;
+  G[5] = t1224;
+  G[6] = t884;
+  G[7] = t950;
+  G[8] = t1016;
+  G[9] = t1082;
+  G[10] = t1148;
+  G[11] = t1214;
+  G[12] = t876;
+  G[13] = t942;
+  G[14] = t1008;
+  G[15] = t1074;
+  G[16] = t1140;
+  G[17] = t1206;
+  G[18] = t870;
+  G[19] = t936;
+  G[20] = t1002;
+  G[21] = t1068;
+  G[22] = t1134;
+  G[23] = t1200;
+  G[24] = t866;
+  G[25] = t932;
+  G[26] = t998;
+  G[27] = t1064;
+  G[28] = t1130;
+  G[29] = t1196;
+  G[30] = t864;
+  G[31] = t930;
+  G[32] = t996;
+  G[33] = t1062;
+  G[34] = t1128;
+  G[35] = t1194;
+  real t1236 = tau[0] - (H[0] * e[0] + H[6] * e[1] + H[12] * e[2] + H[18] * e[3] + H[24] * e[4] +
+    H[30] * e[5]);
+  real t1251 = tau[1] - (H[1] * e[0] + H[7] * e[1] + H[13] * e[2] + H[19] * e[3] + H[25] * e[4] +
+    H[31] * e[5]) - t170 * t1236;
+  real t1268 = tau[2] - (H[2] * e[0] + H[8] * e[1] + H[14] * e[2] + H[20] * e[3] + H[26] * e[4] +
+    H[32] * e[5]) - t264 * t1236 - t281 * t1251;
+  real t1287 = tau[3] - (H[3] * e[0] + H[9] * e[1] + H[15] * e[2] + H[21] * e[3] + H[27] * e[4] +
+    H[33] * e[5]) - t375 * t1236 - t391 * t1251 - t410 * t1268;
+  real t1308 = tau[4] - (H[4] * e[0] + H[10] * e[1] + H[16] * e[2] + H[22] * e[3] + H[28] * e[4] +
+    H[34] * e[5]) - t504 * t1236 - t520 * t1251 - t538 * t1268 - t559 * t1287;
+  real t1332 = t853 * (tau[5] - (H[5] * e[0] + H[11] * e[1] + H[17] * e[2] + H[23] * e[3] + H[29] *
+    e[4] + H[35] * e[5]) - t653 * t1236 - t669 * t1251 - t687 * t1268 - t707 * t1287 - t730 *
+    t1308);
+  real t1334 = t729 * t1308 - t730 * t1332;
+  real t1338 = t558 * t1287 - t559 * t1334 - t707 * t1332;
+  real t1344 = t409 * t1268 - t410 * t1338 - t538 * t1334 - t687 * t1332;
+  real t1352 = t280 * t1251 - t281 * t1344 - t391 * t1338 - t520 * t1334 - t669 * t1332;
+  real t1362 = t169 * t1236 - t170 * t1352 - t264 * t1344 - t375 * t1338 - t504 * t1334 - t653 *
+    t1332;
+  g[0] = t1362;
+  g[1] = t1352;
+  g[2] = t1344;
+  g[3] = t1338;
+  g[4] = t1334;
+  g[5] = t1332;
+  real t1374 = S[0] - (t10 * t894 + t89 * t884 + t184 * t876 + t295 * t870 + t424 * t866 + t573 *
+    t864);
+  real t1387 = S[1] - (t10 * t960 + t89 * t950 + t184 * t942 + t295 * t936 + t424 * t932 + t573 *
+    t930);
+  real t1401 = S[2] - (t10 * t1026 + t89 * t1016 + t184 * t1008 + t295 * t1002 + t424 * t998 + t573
+    * t996);
+  real t1403 = Rc[0] * t1374 + Rc[1] * t1387 + Rc[2] * t1401;
+  real t1417 = S[6] - (t22 * t960 + t101 * t950 + t196 * t942 + t307 * t936 + t436 * t932 + t585 *
+    t930);
+  real t1431 = S[7] - (t22 * t1026 + t101 * t1016 + t196 * t1008 + t307 * t1002 + t436 * t998 + t585
+    * t996);
+  real t1433 = Rc[0] * t1387 + Rc[1] * t1417 + Rc[2] * t1431;
+  real t1450 = S[11] - (t35 * t1026 + t114 * t1016 + t209 * t1008 + t320 * t1002 + t449 * t998 +
+    t598 * t996);
+  real t1452 = Rc[0] * t1401 + Rc[1] * t1431 + Rc[2] * t1450;
+  real t1454 = Rc[0] * t1403 + Rc[1] * t1433 + Rc[2] * t1452;
+  S_I[0] += t1454;
+  real t1459 = Rc[3] * t1403 + Rc[4] * t1433 + Rc[5] * t1452;
+  S_I[1] += t1459;
+  real t1464 = Rc[6] * t1403 + Rc[7] * t1433 + Rc[8] * t1452;
+  S_I[2] += t1464;
+  real t1476 = S[3] - (t10 * t1092 + t89 * t1082 + t184 * t1074 + t295 * t1068 + t424 * t1064 + t573
+    * t1062);
+  real t1489 = S[8] - (t22 * t1092 + t101 * t1082 + t196 * t1074 + t307 * t1068 + t436 * t1064 +
+    t585 * t1062);
+  real t1503 = S[12] - (t35 * t1092 + t114 * t1082 + t209 * t1074 + t320 * t1068 + t449 * t1064 +
+    t598 * t1062);
+  real t1505 = Rc[0] * t1476 + Rc[1] * t1489 + Rc[2] * t1503;
+  real t1518 = S[4] - (t10 * t1158 + t89 * t1148 + t184 * t1140 + t295 * t1134 + t424 * t1130 + t573
+    * t1128);
+  real t1531 = S[9] - (t22 * t1158 + t101 * t1148 + t196 * t1140 + t307 * t1134 + t436 * t1130 +
+    t585 * t1128);
+  real t1545 = S[13] - (t35 * t1158 + t114 * t1148 + t209 * t1140 + t320 * t1134 + t449 * t1130 +
+    t598 * t1128);
+  real t1547 = Rc[0] * t1518 + Rc[1] * t1531 + Rc[2] * t1545;
+  real t1561 = S[5] - (t10 * t1224 + t89 * t1214 + t184 * t1206 + t295 * t1200 + t424 * t1196 + t573
+    * t1194);
+  real t1574 = S[10] - (t22 * t1224 + t101 * t1214 + t196 * t1206 + t307 * t1200 + t436 * t1196 +
+    t585 * t1194);
+  real t1588 = S[14] - (t35 * t1224 + t114 * t1214 + t209 * t1206 + t320 * t1200 + t449 * t1196 +
+    t598 * t1194);
+  real t1590 = Rc[0] * t1561 + Rc[1] * t1574 + Rc[2] * t1588;
+  real t1592 = Rc[0] * t1505 + Rc[1] * t1547 + Rc[2] * t1590;
+  real t1593 = r[1] * t1464;
+  real t1594 = r[2] * t1459;
+  S_I[3] += t1592 + (t1593 - t1594);
+  real t1601 = Rc[3] * t1505 + Rc[4] * t1547 + Rc[5] * t1590;
+  real t1605 = t1601 + (r[2] * t1454 - r[0] * t1464);
+  S_I[4] += t1605;
+  real t1610 = Rc[6] * t1505 + Rc[7] * t1547 + Rc[8] * t1590;
+  real t1614 = t1610 + (r[0] * t1459 - r[1] * t1454);
+  S_I[5] += t1614;
+  real t1619 = Rc[3] * t1374 + Rc[4] * t1387 + Rc[5] * t1401;
+  real t1625 = Rc[3] * t1387 + Rc[4] * t1417 + Rc[5] * t1431;
+  real t1632 = Rc[3] * t1401 + Rc[4] * t1431 + Rc[5] * t1450;
+  real t1634 = Rc[3] * t1619 + Rc[4] * t1625 + Rc[5] * t1632;
+  S_I[6] += t1634;
+  real t1639 = Rc[6] * t1619 + Rc[7] * t1625 + Rc[8] * t1632;
+  S_I[7] += t1639;
+  real t1644 = Rc[3] * t1476 + Rc[4] * t1489 + Rc[5] * t1503;
+  real t1650 = Rc[3] * t1518 + Rc[4] * t1531 + Rc[5] * t1545;
+  real t1657 = Rc[3] * t1561 + Rc[4] * t1574 + Rc[5] * t1588;
+  real t1659 = Rc[0] * t1644 + Rc[1] * t1650 + Rc[2] * t1657;
+  real t1663 = t1659 + (r[1] * t1639 - r[2] * t1634);
+  S_I[8] += t1663;
+  real t1668 = Rc[3] * t1644 + Rc[4] * t1650 + Rc[5] * t1657;
+  real t1669 = r[0] * t1639;
+  real t1671 = t1668 + (t1594 - t1669);
+  S_I[9] += t1671;
+  real t1676 = Rc[6] * t1644 + Rc[7] * t1650 + Rc[8] * t1657;
+  real t1680 = t1676 + (r[0] * t1634 - r[1] * t1459);
+  S_I[10] += t1680;
+  real t1700 = Rc[6] * (Rc[6] * t1374 + Rc[7] * t1387 + Rc[8] * t1401) + Rc[7] * (Rc[6] * t1387 +
+    Rc[7] * t1417 + Rc[8] * t1431) + Rc[8] * (Rc[6] * t1401 + Rc[7] * t1431 + Rc[8] * t1450);
+  S_I[11] += t1700;
+  real t1705 = Rc[6] * t1476 + Rc[7] * t1489 + Rc[8] * t1503;
+  real t1711 = Rc[6] * t1518 + Rc[7] * t1531 + Rc[8] * t1545;
+  real t1718 = Rc[6] * t1561 + Rc[7] * t1574 + Rc[8] * t1588;
+  real t1720 = Rc[0] * t1705 + Rc[1] * t1711 + Rc[2] * t1718;
+  real t1724 = t1720 + (r[1] * t1700 - r[2] * t1639);
+  S_I[12] += t1724;
+  real t1729 = Rc[3] * t1705 + Rc[4] * t1711 + Rc[5] * t1718;
+  real t1733 = t1729 + (r[2] * t1464 - r[0] * t1700);
+  S_I[13] += t1733;
+  real t1740 = Rc[6] * t1705 + Rc[7] * t1711 + Rc[8] * t1718 + (t1669 - t1593);
+  S_I[14] += t1740;
+  real t1752 = S[15] - (t48 * t1092 + t127 * t1082 + t222 * t1074 + t333 * t1068 + t462 * t1064 +
+    t611 * t1062);
+  real t1765 = S[16] - (t48 * t1158 + t127 * t1148 + t222 * t1140 + t333 * t1134 + t462 * t1130 +
+    t611 * t1128);
+  real t1779 = S[17] - (t48 * t1224 + t127 * t1214 + t222 * t1206 + t333 * t1200 + t462 * t1196 +
+    t611 * t1194);
+  real t1781 = Rc[0] * t1752 + Rc[1] * t1765 + Rc[2] * t1779;
+  real t1795 = S[18] - (t61 * t1158 + t140 * t1148 + t235 * t1140 + t346 * t1134 + t475 * t1130 +
+    t624 * t1128);
+  real t1809 = S[19] - (t61 * t1224 + t140 * t1214 + t235 * t1206 + t346 * t1200 + t475 * t1196 +
+    t624 * t1194);
+  real t1811 = Rc[0] * t1765 + Rc[1] * t1795 + Rc[2] * t1809;
+  real t1828 = S[20] - (t74 * t1224 + t153 * t1214 + t248 * t1206 + t359 * t1200 + t488 * t1196 +
+    t637 * t1194);
+  real t1830 = Rc[0] * t1779 + Rc[1] * t1809 + Rc[2] * t1828;
+  S_I[15] += Rc[0] * t1781 + Rc[1] * t1811 + Rc[2] * t1830 + (r[1] * t1724 - r[2] * t1663 + (r[1] *
+    t1720 - r[2] * t1659));
+  S_I[16] += Rc[3] * t1781 + Rc[4] * t1811 + Rc[5] * t1830 + (r[1] * t1733 - r[2] * t1671 + (r[2] *
+    t1592 - r[0] * t1720));
+  S_I[17] += Rc[6] * t1781 + Rc[7] * t1811 + Rc[8] * t1830 + (r[1] * t1740 - r[2] * t1680 + (r[0] *
+    t1659 - r[1] * t1592));
+  real t1871 = Rc[3] * t1752 + Rc[4] * t1765 + Rc[5] * t1779;
+  real t1877 = Rc[3] * t1765 + Rc[4] * t1795 + Rc[5] * t1809;
+  real t1884 = Rc[3] * t1779 + Rc[4] * t1809 + Rc[5] * t1828;
+  S_I[18] += Rc[3] * t1871 + Rc[4] * t1877 + Rc[5] * t1884 + (r[2] * t1605 - r[0] * t1733 + (r[2] *
+    t1601 - r[0] * t1729));
+  S_I[19] += Rc[6] * t1871 + Rc[7] * t1877 + Rc[8] * t1884 + (r[2] * t1614 - r[0] * t1740 + (r[0] *
+    t1668 - r[1] * t1601));
+  S_I[20] += Rc[6] * (Rc[6] * t1752 + Rc[7] * t1765 + Rc[8] * t1779) + Rc[7] * (Rc[6] * t1765 +
+    Rc[7] * t1795 + Rc[8] * t1809) + Rc[8] * (Rc[6] * t1779 + Rc[7] * t1809 + Rc[8] * t1828) + (r[0]
+    * t1680 - r[1] * t1614 + (r[0] * t1676 - r[1] * t1610));
+  real t1947 = e[0] + (t10 * t1362 + t89 * t1352 + t184 * t1344 + t295 * t1338 + t424 * t1334 + t573
+    * t1332);
+  real t1960 = e[1] + (t22 * t1362 + t101 * t1352 + t196 * t1344 + t307 * t1338 + t436 * t1334 +
+    t585 * t1332);
+  real t1974 = e[2] + (t35 * t1362 + t114 * t1352 + t209 * t1344 + t320 * t1338 + t449 * t1334 +
+    t598 * t1332);
+  e_I[0] += Rc[0] * t1947 + Rc[1] * t1960 + Rc[2] * t1974;
+  e_I[1] += Rc[3] * t1947 + Rc[4] * t1960 + Rc[5] * t1974;
+  e_I[2] += Rc[6] * t1947 + Rc[7] * t1960 + Rc[8] * t1974;
+  real t1998 = e[3] + (t48 * t1362 + t127 * t1352 + t222 * t1344 + t333 * t1338 + t462 * t1334 +
+    t611 * t1332);
+  real t2011 = e[4] + (t61 * t1362 + t140 * t1352 + t235 * t1344 + t346 * t1338 + t475 * t1334 +
+    t624 * t1332);
+  real t2025 = e[5] + (t74 * t1362 + t153 * t1352 + t248 * t1344 + t359 * t1338 + t488 * t1334 +
+    t637 * t1332);
+  e_I[3] += Rc[0] * t1998 + Rc[1] * t2011 + Rc[2] * t2025 + (t1947 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t1960 * (Rc[7] * r[1] - Rc[4] * r[2]) + t1974 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t1998 + Rc[4] * t2011 + Rc[5] * t2025 + (t1947 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t1960 * (Rc[1] * r[2] - Rc[7] * r[0]) + t1974 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t1998 + Rc[7] * t2011 + Rc[8] * t2025 + (t1947 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t1960 * (Rc[4] * r[0] - Rc[1] * r[1]) + t1974 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_condense_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_condense_outputs[] = {
-    {"G", 36, "", 0, 0},
-    {"g", 6, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic6_condense_guards[] = {
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 6 of 6 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic6_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3]))
 
 /* accelerations recovered across a hinge with 6 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the free coordinates
@@ -2700,327 +564,67 @@ static const mstmm_guard mstmm_sweep_generic6_condense_guards[] = {
  * out udot[6] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic6_recover(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic6_recover(in_t Rc, in_t r, in_t H, in_t G, in_t g, in_t delta_I, out_t udot,
+    out_t delta)
 {
-    const real t0 = r[2] * delta_I[4];
-    const real t1 = r[1] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = Rc[0] * t3;
-    const real t5 = r[0] * delta_I[5];
-    const real t6 = r[2] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = Rc[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r[1] * delta_I[3];
-    const real t12 = r[0] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = Rc[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = Rc[1] * t3;
-    const real t19 = Rc[4] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = Rc[7] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[1] * t22;
-    const real t24 = t17 + t23;
-    const real t25 = Rc[2] * t3;
-    const real t26 = Rc[5] * t8;
-    const real t27 = t25 + t26;
-    const real t28 = Rc[8] * t14;
-    const real t29 = t27 + t28;
-    const real t30 = G[2] * t29;
-    const real t31 = t24 + t30;
-    const real t32 = Rc[0] * delta_I[3];
-    const real t33 = Rc[3] * delta_I[4];
-    const real t34 = t32 + t33;
-    const real t35 = Rc[6] * delta_I[5];
-    const real t36 = t34 + t35;
-    const real t37 = G[3] * t36;
-    const real t38 = t31 + t37;
-    const real t39 = Rc[1] * delta_I[3];
-    const real t40 = Rc[4] * delta_I[4];
-    const real t41 = t39 + t40;
-    const real t42 = Rc[7] * delta_I[5];
-    const real t43 = t41 + t42;
-    const real t44 = G[4] * t43;
-    const real t45 = t38 + t44;
-    const real t46 = Rc[2] * delta_I[3];
-    const real t47 = Rc[5] * delta_I[4];
-    const real t48 = t46 + t47;
-    const real t49 = Rc[8] * delta_I[5];
-    const real t50 = t48 + t49;
-    const real t51 = G[5] * t50;
-    const real t52 = t45 + t51;
-    const real t53 = g[0] - t52;
-    udot[0] = t53;
-    const real t54 = G[6] * t16;
-    const real t55 = G[7] * t22;
-    const real t56 = t54 + t55;
-    const real t57 = G[8] * t29;
-    const real t58 = t56 + t57;
-    const real t59 = G[9] * t36;
-    const real t60 = t58 + t59;
-    const real t61 = G[10] * t43;
-    const real t62 = t60 + t61;
-    const real t63 = G[11] * t50;
-    const real t64 = t62 + t63;
-    const real t65 = g[1] - t64;
-    udot[1] = t65;
-    const real t66 = G[12] * t16;
-    const real t67 = G[13] * t22;
-    const real t68 = t66 + t67;
-    const real t69 = G[14] * t29;
-    const real t70 = t68 + t69;
-    const real t71 = G[15] * t36;
-    const real t72 = t70 + t71;
-    const real t73 = G[16] * t43;
-    const real t74 = t72 + t73;
-    const real t75 = G[17] * t50;
-    const real t76 = t74 + t75;
-    const real t77 = g[2] - t76;
-    udot[2] = t77;
-    const real t78 = G[18] * t16;
-    const real t79 = G[19] * t22;
-    const real t80 = t78 + t79;
-    const real t81 = G[20] * t29;
-    const real t82 = t80 + t81;
-    const real t83 = G[21] * t36;
-    const real t84 = t82 + t83;
-    const real t85 = G[22] * t43;
-    const real t86 = t84 + t85;
-    const real t87 = G[23] * t50;
-    const real t88 = t86 + t87;
-    const real t89 = g[3] - t88;
-    udot[3] = t89;
-    const real t90 = G[24] * t16;
-    const real t91 = G[25] * t22;
-    const real t92 = t90 + t91;
-    const real t93 = G[26] * t29;
-    const real t94 = t92 + t93;
-    const real t95 = G[27] * t36;
-    const real t96 = t94 + t95;
-    const real t97 = G[28] * t43;
-    const real t98 = t96 + t97;
-    const real t99 = G[29] * t50;
-    const real t100 = t98 + t99;
-    const real t101 = g[4] - t100;
-    udot[4] = t101;
-    const real t102 = G[30] * t16;
-    const real t103 = G[31] * t22;
-    const real t104 = t102 + t103;
-    const real t105 = G[32] * t29;
-    const real t106 = t104 + t105;
-    const real t107 = G[33] * t36;
-    const real t108 = t106 + t107;
-    const real t109 = G[34] * t43;
-    const real t110 = t108 + t109;
-    const real t111 = G[35] * t50;
-    const real t112 = t110 + t111;
-    const real t113 = g[5] - t112;
-    udot[5] = t113;
-    const real t114 = H[0] * t53;
-    const real t115 = H[1] * t65;
-    const real t116 = t114 + t115;
-    const real t117 = H[2] * t77;
-    const real t118 = t116 + t117;
-    const real t119 = H[3] * t89;
-    const real t120 = t118 + t119;
-    const real t121 = H[4] * t101;
-    const real t122 = t120 + t121;
-    const real t123 = H[5] * t113;
-    const real t124 = t122 + t123;
-    const real t125 = t16 + t124;
-    delta[0] = t125;
-    const real t126 = H[6] * t53;
-    const real t127 = H[7] * t65;
-    const real t128 = t126 + t127;
-    const real t129 = H[8] * t77;
-    const real t130 = t128 + t129;
-    const real t131 = H[9] * t89;
-    const real t132 = t130 + t131;
-    const real t133 = H[10] * t101;
-    const real t134 = t132 + t133;
-    const real t135 = H[11] * t113;
-    const real t136 = t134 + t135;
-    const real t137 = t22 + t136;
-    delta[1] = t137;
-    const real t138 = H[12] * t53;
-    const real t139 = H[13] * t65;
-    const real t140 = t138 + t139;
-    const real t141 = H[14] * t77;
-    const real t142 = t140 + t141;
-    const real t143 = H[15] * t89;
-    const real t144 = t142 + t143;
-    const real t145 = H[16] * t101;
-    const real t146 = t144 + t145;
-    const real t147 = H[17] * t113;
-    const real t148 = t146 + t147;
-    const real t149 = t29 + t148;
-    delta[2] = t149;
-    const real t150 = H[18] * t53;
-    const real t151 = H[19] * t65;
-    const real t152 = t150 + t151;
-    const real t153 = H[20] * t77;
-    const real t154 = t152 + t153;
-    const real t155 = H[21] * t89;
-    const real t156 = t154 + t155;
-    const real t157 = H[22] * t101;
-    const real t158 = t156 + t157;
-    const real t159 = H[23] * t113;
-    const real t160 = t158 + t159;
-    const real t161 = t36 + t160;
-    delta[3] = t161;
-    const real t162 = H[24] * t53;
-    const real t163 = H[25] * t65;
-    const real t164 = t162 + t163;
-    const real t165 = H[26] * t77;
-    const real t166 = t164 + t165;
-    const real t167 = H[27] * t89;
-    const real t168 = t166 + t167;
-    const real t169 = H[28] * t101;
-    const real t170 = t168 + t169;
-    const real t171 = H[29] * t113;
-    const real t172 = t170 + t171;
-    const real t173 = t43 + t172;
-    delta[4] = t173;
-    const real t174 = H[30] * t53;
-    const real t175 = H[31] * t65;
-    const real t176 = t174 + t175;
-    const real t177 = H[32] * t77;
-    const real t178 = t176 + t177;
-    const real t179 = H[33] * t89;
-    const real t180 = t178 + t179;
-    const real t181 = H[34] * t101;
-    const real t182 = t180 + t181;
-    const real t183 = H[35] * t113;
-    const real t184 = t182 + t183;
-    const real t185 = t50 + t184;
-    delta[5] = t185;
-    return 0;
+  real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t8 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t14 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t16 = Rc[0] * t3 + Rc[3] * t8 + Rc[6] * t14;
+  real t22 = Rc[1] * t3 + Rc[4] * t8 + Rc[7] * t14;
+  real t29 = Rc[2] * t3 + Rc[5] * t8 + Rc[8] * t14;
+  real t36 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t43 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t50 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t53 = g[0] - (G[0] * t16 + G[1] * t22 + G[2] * t29 + G[3] * t36 + G[4] * t43 + G[5] * t50);
+  udot[0] = t53;
+  real t65 = g[1] - (G[6] * t16 + G[7] * t22 + G[8] * t29 + G[9] * t36 + G[10] * t43 + G[11] * t50);
+  udot[1] = t65;
+  real t77 = g[2] - (G[12] * t16 + G[13] * t22 + G[14] * t29 + G[15] * t36 + G[16] * t43 + G[17] *
+    t50);
+  udot[2] = t77;
+  real t89 = g[3] - (G[18] * t16 + G[19] * t22 + G[20] * t29 + G[21] * t36 + G[22] * t43 + G[23] *
+    t50);
+  udot[3] = t89;
+  real t101 = g[4] - (G[24] * t16 + G[25] * t22 + G[26] * t29 + G[27] * t36 + G[28] * t43 + G[29] *
+    t50);
+  udot[4] = t101;
+  real t113 = g[5] - (G[30] * t16 + G[31] * t22 + G[32] * t29 + G[33] * t36 + G[34] * t43 + G[35] *
+    t50);
+  udot[5] = t113;
+  delta[0] = t16 + (H[0] * t53 + H[1] * t65 + H[2] * t77 + H[3] * t89 + H[4] * t101 + H[5] * t113);
+  delta[1] = t22 + (H[6] * t53 + H[7] * t65 + H[8] * t77 + H[9] * t89 + H[10] * t101 + H[11] *
+    t113);
+  delta[2] = t29 + (H[12] * t53 + H[13] * t65 + H[14] * t77 + H[15] * t89 + H[16] * t101 + H[17] *
+    t113);
+  delta[3] = t36 + (H[18] * t53 + H[19] * t65 + H[20] * t77 + H[21] * t89 + H[22] * t101 + H[23] *
+    t113);
+  delta[4] = t43 + (H[24] * t53 + H[25] * t65 + H[26] * t77 + H[27] * t89 + H[28] * t101 + H[29] *
+    t113);
+  delta[5] = t50 + (H[30] * t53 + H[31] * t65 + H[32] * t77 + H[33] * t89 + H[34] * t101 + H[35] *
+    t113);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_recover(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_recover_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"G", 36, "", 0, 0},
-    {"g", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_recover_outputs[] = {
-    {"udot", 6, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_recover, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]))
 
 /* efforts of a hinge with 6 speeds
  * in  H[6][6] motion subspace
  * in  f[6] (N, N*m) load of the inboard on the outboard side at P
  * out tau[6] (N, N*m) efforts along the speeds
  */
-int mstmm_sweep_generic6_effort(const real *restrict H, const real *restrict f, real *restrict tau)
+int mstmm_sweep_generic6_effort(in_t H, in_t f, out_t tau)
 {
-    const real t0 = H[0] * f[0];
-    const real t1 = H[6] * f[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * f[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * f[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * f[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * f[5];
-    const real t10 = t8 + t9;
-    tau[0] = t10;
-    const real t11 = H[1] * f[0];
-    const real t12 = H[7] * f[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[13] * f[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[19] * f[3];
-    const real t17 = t15 + t16;
-    const real t18 = H[25] * f[4];
-    const real t19 = t17 + t18;
-    const real t20 = H[31] * f[5];
-    const real t21 = t19 + t20;
-    tau[1] = t21;
-    const real t22 = H[2] * f[0];
-    const real t23 = H[8] * f[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[14] * f[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[20] * f[3];
-    const real t28 = t26 + t27;
-    const real t29 = H[26] * f[4];
-    const real t30 = t28 + t29;
-    const real t31 = H[32] * f[5];
-    const real t32 = t30 + t31;
-    tau[2] = t32;
-    const real t33 = H[3] * f[0];
-    const real t34 = H[9] * f[1];
-    const real t35 = t33 + t34;
-    const real t36 = H[15] * f[2];
-    const real t37 = t35 + t36;
-    const real t38 = H[21] * f[3];
-    const real t39 = t37 + t38;
-    const real t40 = H[27] * f[4];
-    const real t41 = t39 + t40;
-    const real t42 = H[33] * f[5];
-    const real t43 = t41 + t42;
-    tau[3] = t43;
-    const real t44 = H[4] * f[0];
-    const real t45 = H[10] * f[1];
-    const real t46 = t44 + t45;
-    const real t47 = H[16] * f[2];
-    const real t48 = t46 + t47;
-    const real t49 = H[22] * f[3];
-    const real t50 = t48 + t49;
-    const real t51 = H[28] * f[4];
-    const real t52 = t50 + t51;
-    const real t53 = H[34] * f[5];
-    const real t54 = t52 + t53;
-    tau[4] = t54;
-    const real t55 = H[5] * f[0];
-    const real t56 = H[11] * f[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[17] * f[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[23] * f[3];
-    const real t61 = t59 + t60;
-    const real t62 = H[29] * f[4];
-    const real t63 = t61 + t62;
-    const real t64 = H[35] * f[5];
-    const real t65 = t63 + t64;
-    tau[5] = t65;
-    return 0;
+  tau[0] = H[0] * f[0] + H[6] * f[1] + H[12] * f[2] + H[18] * f[3] + H[24] * f[4] + H[30] * f[5];
+  tau[1] = H[1] * f[0] + H[7] * f[1] + H[13] * f[2] + H[19] * f[3] + H[25] * f[4] + H[31] * f[5];
+  tau[2] = H[2] * f[0] + H[8] * f[1] + H[14] * f[2] + H[20] * f[3] + H[26] * f[4] + H[32] * f[5];
+  tau[3] = H[3] * f[0] + H[9] * f[1] + H[15] * f[2] + H[21] * f[3] + H[27] * f[4] + H[33] * f[5];
+  tau[4] = H[4] * f[0] + H[10] * f[1] + H[16] * f[2] + H[22] * f[3] + H[28] * f[4] + H[34] * f[5];
+  tau[5] = H[5] * f[0] + H[11] * f[1] + H[17] * f[2] + H[23] * f[3] + H[29] * f[4] + H[35] * f[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_effort_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_effort_outputs[] = {
-    {"tau", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_effort, (in[0], in[1], out[0]))
 
 /* accelerations of a hinge with 6 speeds from those of its bodies
  * in  Rc[3][3] rotation, body axes to parent axes
@@ -3030,568 +634,117 @@ static const mstmm_port mstmm_sweep_generic6_effort_outputs[] = {
  * in  delta_I[6] deviation of the parent's acceleration
  * out udot[6] accelerations of the coordinates
  */
-int mstmm_sweep_generic6_project(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict delta, const real *restrict delta_I,
-    real *restrict udot)
+int mstmm_sweep_generic6_project(in_t Rc, in_t r, in_t H, in_t delta, in_t delta_I, out_t udot)
 {
-    const real t0 = H[0] * H[0];
-    const real t1 = H[6] * H[6];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * H[12];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * H[18];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * H[24];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * H[30];
-    const real t10 = t8 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[7] * H[7];
-    const real t14 = t12 + t13;
-    const real t15 = H[13] * H[13];
-    const real t16 = t14 + t15;
-    const real t17 = H[19] * H[19];
-    const real t18 = t16 + t17;
-    const real t19 = H[25] * H[25];
-    const real t20 = t18 + t19;
-    const real t21 = H[31] * H[31];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[0] * H[1];
-    const real t25 = H[6] * H[7];
-    const real t26 = t24 + t25;
-    const real t27 = H[12] * H[13];
-    const real t28 = t26 + t27;
-    const real t29 = H[18] * H[19];
-    const real t30 = t28 + t29;
-    const real t31 = H[24] * H[25];
-    const real t32 = t30 + t31;
-    const real t33 = H[30] * H[31];
-    const real t34 = t32 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[8] * H[8];
-    const real t42 = t40 + t41;
-    const real t43 = H[14] * H[14];
-    const real t44 = t42 + t43;
-    const real t45 = H[20] * H[20];
-    const real t46 = t44 + t45;
-    const real t47 = H[26] * H[26];
-    const real t48 = t46 + t47;
-    const real t49 = H[32] * H[32];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[0] * H[2];
-    const real t53 = H[6] * H[8];
-    const real t54 = t52 + t53;
-    const real t55 = H[12] * H[14];
-    const real t56 = t54 + t55;
-    const real t57 = H[18] * H[20];
-    const real t58 = t56 + t57;
-    const real t59 = H[24] * H[26];
-    const real t60 = t58 + t59;
-    const real t61 = H[30] * H[32];
-    const real t62 = t60 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[7] * H[8];
-    const real t68 = t66 + t67;
-    const real t69 = H[13] * H[14];
-    const real t70 = t68 + t69;
-    const real t71 = H[19] * H[20];
-    const real t72 = t70 + t71;
-    const real t73 = H[25] * H[26];
-    const real t74 = t72 + t73;
-    const real t75 = H[31] * H[32];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[3] * H[3];
-    const real t85 = H[9] * H[9];
-    const real t86 = t84 + t85;
-    const real t87 = H[15] * H[15];
-    const real t88 = t86 + t87;
-    const real t89 = H[21] * H[21];
-    const real t90 = t88 + t89;
-    const real t91 = H[27] * H[27];
-    const real t92 = t90 + t91;
-    const real t93 = H[33] * H[33];
-    const real t94 = t92 + t93;
-    const real t95 = t94 * ((real)1 / (real)10000000000000);
-    const real t96 = H[0] * H[3];
-    const real t97 = H[6] * H[9];
-    const real t98 = t96 + t97;
-    const real t99 = H[12] * H[15];
-    const real t100 = t98 + t99;
-    const real t101 = H[18] * H[21];
-    const real t102 = t100 + t101;
-    const real t103 = H[24] * H[27];
-    const real t104 = t102 + t103;
-    const real t105 = H[30] * H[33];
-    const real t106 = t104 + t105;
-    const real t107 = t106 * t35;
-    const real t108 = t106 * t107;
-    const real t109 = t94 - t108;
-    const real t110 = H[1] * H[3];
-    const real t111 = H[7] * H[9];
-    const real t112 = t110 + t111;
-    const real t113 = H[13] * H[15];
-    const real t114 = t112 + t113;
-    const real t115 = H[19] * H[21];
-    const real t116 = t114 + t115;
-    const real t117 = H[25] * H[27];
-    const real t118 = t116 + t117;
-    const real t119 = H[31] * H[33];
-    const real t120 = t118 + t119;
-    const real t121 = t106 * t36;
-    const real t122 = t120 - t121;
-    const real t123 = t79 * t122;
-    const real t124 = t122 * t123;
-    const real t125 = t109 - t124;
-    const real t126 = H[2] * H[3];
-    const real t127 = H[8] * H[9];
-    const real t128 = t126 + t127;
-    const real t129 = H[14] * H[15];
-    const real t130 = t128 + t129;
-    const real t131 = H[20] * H[21];
-    const real t132 = t130 + t131;
-    const real t133 = H[26] * H[27];
-    const real t134 = t132 + t133;
-    const real t135 = H[32] * H[33];
-    const real t136 = t134 + t135;
-    const real t137 = t106 * t63;
-    const real t138 = t136 - t137;
-    const real t139 = t80 * t122;
-    const real t140 = t138 - t139;
-    const real t141 = 1.0 / t82;
-    const real t142 = t141 * t140;
-    const real t143 = t140 * t142;
-    const real t144 = t125 - t143;
-    const real t145 = t95 < t144;
-    if (!(t145 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t146 = H[4] * H[4];
-    const real t147 = H[10] * H[10];
-    const real t148 = t146 + t147;
-    const real t149 = H[16] * H[16];
-    const real t150 = t148 + t149;
-    const real t151 = H[22] * H[22];
-    const real t152 = t150 + t151;
-    const real t153 = H[28] * H[28];
-    const real t154 = t152 + t153;
-    const real t155 = H[34] * H[34];
-    const real t156 = t154 + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[0] * H[4];
-    const real t159 = H[6] * H[10];
-    const real t160 = t158 + t159;
-    const real t161 = H[12] * H[16];
-    const real t162 = t160 + t161;
-    const real t163 = H[18] * H[22];
-    const real t164 = t162 + t163;
-    const real t165 = H[24] * H[28];
-    const real t166 = t164 + t165;
-    const real t167 = H[30] * H[34];
-    const real t168 = t166 + t167;
-    const real t169 = t168 * t35;
-    const real t170 = t168 * t169;
-    const real t171 = t156 - t170;
-    const real t172 = H[1] * H[4];
-    const real t173 = H[7] * H[10];
-    const real t174 = t172 + t173;
-    const real t175 = H[13] * H[16];
-    const real t176 = t174 + t175;
-    const real t177 = H[19] * H[22];
-    const real t178 = t176 + t177;
-    const real t179 = H[25] * H[28];
-    const real t180 = t178 + t179;
-    const real t181 = H[31] * H[34];
-    const real t182 = t180 + t181;
-    const real t183 = t168 * t36;
-    const real t184 = t182 - t183;
-    const real t185 = t79 * t184;
-    const real t186 = t184 * t185;
-    const real t187 = t171 - t186;
-    const real t188 = H[2] * H[4];
-    const real t189 = H[8] * H[10];
-    const real t190 = t188 + t189;
-    const real t191 = H[14] * H[16];
-    const real t192 = t190 + t191;
-    const real t193 = H[20] * H[22];
-    const real t194 = t192 + t193;
-    const real t195 = H[26] * H[28];
-    const real t196 = t194 + t195;
-    const real t197 = H[32] * H[34];
-    const real t198 = t196 + t197;
-    const real t199 = t168 * t63;
-    const real t200 = t198 - t199;
-    const real t201 = t80 * t184;
-    const real t202 = t200 - t201;
-    const real t203 = t141 * t202;
-    const real t204 = t202 * t203;
-    const real t205 = t187 - t204;
-    const real t206 = H[3] * H[4];
-    const real t207 = H[9] * H[10];
-    const real t208 = t206 + t207;
-    const real t209 = H[15] * H[16];
-    const real t210 = t208 + t209;
-    const real t211 = H[21] * H[22];
-    const real t212 = t210 + t211;
-    const real t213 = H[27] * H[28];
-    const real t214 = t212 + t213;
-    const real t215 = H[33] * H[34];
-    const real t216 = t214 + t215;
-    const real t217 = t168 * t107;
-    const real t218 = t216 - t217;
-    const real t219 = t123 * t184;
-    const real t220 = t218 - t219;
-    const real t221 = t142 * t202;
-    const real t222 = t220 - t221;
-    const real t223 = 1.0 / t144;
-    const real t224 = t223 * t222;
-    const real t225 = t222 * t224;
-    const real t226 = t205 - t225;
-    const real t227 = t157 < t226;
-    if (!(t227 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t228 = H[5] * H[5];
-    const real t229 = H[11] * H[11];
-    const real t230 = t228 + t229;
-    const real t231 = H[17] * H[17];
-    const real t232 = t230 + t231;
-    const real t233 = H[23] * H[23];
-    const real t234 = t232 + t233;
-    const real t235 = H[29] * H[29];
-    const real t236 = t234 + t235;
-    const real t237 = H[35] * H[35];
-    const real t238 = t236 + t237;
-    const real t239 = t238 * ((real)1 / (real)10000000000000);
-    const real t240 = H[0] * H[5];
-    const real t241 = H[6] * H[11];
-    const real t242 = t240 + t241;
-    const real t243 = H[12] * H[17];
-    const real t244 = t242 + t243;
-    const real t245 = H[18] * H[23];
-    const real t246 = t244 + t245;
-    const real t247 = H[24] * H[29];
-    const real t248 = t246 + t247;
-    const real t249 = H[30] * H[35];
-    const real t250 = t248 + t249;
-    const real t251 = t250 * t35;
-    const real t252 = t250 * t251;
-    const real t253 = t238 - t252;
-    const real t254 = H[1] * H[5];
-    const real t255 = H[7] * H[11];
-    const real t256 = t254 + t255;
-    const real t257 = H[13] * H[17];
-    const real t258 = t256 + t257;
-    const real t259 = H[19] * H[23];
-    const real t260 = t258 + t259;
-    const real t261 = H[25] * H[29];
-    const real t262 = t260 + t261;
-    const real t263 = H[31] * H[35];
-    const real t264 = t262 + t263;
-    const real t265 = t250 * t36;
-    const real t266 = t264 - t265;
-    const real t267 = t79 * t266;
-    const real t268 = t266 * t267;
-    const real t269 = t253 - t268;
-    const real t270 = H[2] * H[5];
-    const real t271 = H[8] * H[11];
-    const real t272 = t270 + t271;
-    const real t273 = H[14] * H[17];
-    const real t274 = t272 + t273;
-    const real t275 = H[20] * H[23];
-    const real t276 = t274 + t275;
-    const real t277 = H[26] * H[29];
-    const real t278 = t276 + t277;
-    const real t279 = H[32] * H[35];
-    const real t280 = t278 + t279;
-    const real t281 = t250 * t63;
-    const real t282 = t280 - t281;
-    const real t283 = t80 * t266;
-    const real t284 = t282 - t283;
-    const real t285 = t141 * t284;
-    const real t286 = t284 * t285;
-    const real t287 = t269 - t286;
-    const real t288 = H[3] * H[5];
-    const real t289 = H[9] * H[11];
-    const real t290 = t288 + t289;
-    const real t291 = H[15] * H[17];
-    const real t292 = t290 + t291;
-    const real t293 = H[21] * H[23];
-    const real t294 = t292 + t293;
-    const real t295 = H[27] * H[29];
-    const real t296 = t294 + t295;
-    const real t297 = H[33] * H[35];
-    const real t298 = t296 + t297;
-    const real t299 = t250 * t107;
-    const real t300 = t298 - t299;
-    const real t301 = t123 * t266;
-    const real t302 = t300 - t301;
-    const real t303 = t142 * t284;
-    const real t304 = t302 - t303;
-    const real t305 = t223 * t304;
-    const real t306 = t304 * t305;
-    const real t307 = t287 - t306;
-    const real t308 = H[4] * H[5];
-    const real t309 = H[10] * H[11];
-    const real t310 = t308 + t309;
-    const real t311 = H[16] * H[17];
-    const real t312 = t310 + t311;
-    const real t313 = H[22] * H[23];
-    const real t314 = t312 + t313;
-    const real t315 = H[28] * H[29];
-    const real t316 = t314 + t315;
-    const real t317 = H[34] * H[35];
-    const real t318 = t316 + t317;
-    const real t319 = t250 * t169;
-    const real t320 = t318 - t319;
-    const real t321 = t185 * t266;
-    const real t322 = t320 - t321;
-    const real t323 = t203 * t284;
-    const real t324 = t322 - t323;
-    const real t325 = t224 * t304;
-    const real t326 = t324 - t325;
-    const real t327 = 1.0 / t226;
-    const real t328 = t327 * t326;
-    const real t329 = t326 * t328;
-    const real t330 = t307 - t329;
-    const real t331 = t239 < t330;
-    if (!(t331 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t332 = r[2] * delta_I[4];
-    const real t333 = r[1] * delta_I[5];
-    const real t334 = t332 - t333;
-    const real t335 = delta_I[0] + t334;
-    const real t336 = Rc[0] * t335;
-    const real t337 = r[0] * delta_I[5];
-    const real t338 = r[2] * delta_I[3];
-    const real t339 = t337 - t338;
-    const real t340 = delta_I[1] + t339;
-    const real t341 = Rc[3] * t340;
-    const real t342 = t336 + t341;
-    const real t343 = r[1] * delta_I[3];
-    const real t344 = r[0] * delta_I[4];
-    const real t345 = t343 - t344;
-    const real t346 = delta_I[2] + t345;
-    const real t347 = Rc[6] * t346;
-    const real t348 = t342 + t347;
-    const real t349 = delta[0] - t348;
-    const real t350 = H[0] * t349;
-    const real t351 = Rc[1] * t335;
-    const real t352 = Rc[4] * t340;
-    const real t353 = t351 + t352;
-    const real t354 = Rc[7] * t346;
-    const real t355 = t353 + t354;
-    const real t356 = delta[1] - t355;
-    const real t357 = H[6] * t356;
-    const real t358 = t350 + t357;
-    const real t359 = Rc[2] * t335;
-    const real t360 = Rc[5] * t340;
-    const real t361 = t359 + t360;
-    const real t362 = Rc[8] * t346;
-    const real t363 = t361 + t362;
-    const real t364 = delta[2] - t363;
-    const real t365 = H[12] * t364;
-    const real t366 = t358 + t365;
-    const real t367 = Rc[0] * delta_I[3];
-    const real t368 = Rc[3] * delta_I[4];
-    const real t369 = t367 + t368;
-    const real t370 = Rc[6] * delta_I[5];
-    const real t371 = t369 + t370;
-    const real t372 = delta[3] - t371;
-    const real t373 = H[18] * t372;
-    const real t374 = t366 + t373;
-    const real t375 = Rc[1] * delta_I[3];
-    const real t376 = Rc[4] * delta_I[4];
-    const real t377 = t375 + t376;
-    const real t378 = Rc[7] * delta_I[5];
-    const real t379 = t377 + t378;
-    const real t380 = delta[4] - t379;
-    const real t381 = H[24] * t380;
-    const real t382 = t374 + t381;
-    const real t383 = Rc[2] * delta_I[3];
-    const real t384 = Rc[5] * delta_I[4];
-    const real t385 = t383 + t384;
-    const real t386 = Rc[8] * delta_I[5];
-    const real t387 = t385 + t386;
-    const real t388 = delta[5] - t387;
-    const real t389 = H[30] * t388;
-    const real t390 = t382 + t389;
-    const real t391 = t390 * t35;
-    const real t392 = H[1] * t349;
-    const real t393 = H[7] * t356;
-    const real t394 = t392 + t393;
-    const real t395 = H[13] * t364;
-    const real t396 = t394 + t395;
-    const real t397 = H[19] * t372;
-    const real t398 = t396 + t397;
-    const real t399 = H[25] * t380;
-    const real t400 = t398 + t399;
-    const real t401 = H[31] * t388;
-    const real t402 = t400 + t401;
-    const real t403 = t390 * t36;
-    const real t404 = t402 - t403;
-    const real t405 = t79 * t404;
-    const real t406 = H[2] * t349;
-    const real t407 = H[8] * t356;
-    const real t408 = t406 + t407;
-    const real t409 = H[14] * t364;
-    const real t410 = t408 + t409;
-    const real t411 = H[20] * t372;
-    const real t412 = t410 + t411;
-    const real t413 = H[26] * t380;
-    const real t414 = t412 + t413;
-    const real t415 = H[32] * t388;
-    const real t416 = t414 + t415;
-    const real t417 = t390 * t63;
-    const real t418 = t416 - t417;
-    const real t419 = t80 * t404;
-    const real t420 = t418 - t419;
-    const real t421 = t141 * t420;
-    const real t422 = H[3] * t349;
-    const real t423 = H[9] * t356;
-    const real t424 = t422 + t423;
-    const real t425 = H[15] * t364;
-    const real t426 = t424 + t425;
-    const real t427 = H[21] * t372;
-    const real t428 = t426 + t427;
-    const real t429 = H[27] * t380;
-    const real t430 = t428 + t429;
-    const real t431 = H[33] * t388;
-    const real t432 = t430 + t431;
-    const real t433 = t390 * t107;
-    const real t434 = t432 - t433;
-    const real t435 = t123 * t404;
-    const real t436 = t434 - t435;
-    const real t437 = t142 * t420;
-    const real t438 = t436 - t437;
-    const real t439 = t223 * t438;
-    const real t440 = H[4] * t349;
-    const real t441 = H[10] * t356;
-    const real t442 = t440 + t441;
-    const real t443 = H[16] * t364;
-    const real t444 = t442 + t443;
-    const real t445 = H[22] * t372;
-    const real t446 = t444 + t445;
-    const real t447 = H[28] * t380;
-    const real t448 = t446 + t447;
-    const real t449 = H[34] * t388;
-    const real t450 = t448 + t449;
-    const real t451 = t390 * t169;
-    const real t452 = t450 - t451;
-    const real t453 = t185 * t404;
-    const real t454 = t452 - t453;
-    const real t455 = t203 * t420;
-    const real t456 = t454 - t455;
-    const real t457 = t224 * t438;
-    const real t458 = t456 - t457;
-    const real t459 = t327 * t458;
-    const real t460 = 1.0 / t330;
-    const real t461 = H[5] * t349;
-    const real t462 = H[11] * t356;
-    const real t463 = t461 + t462;
-    const real t464 = H[17] * t364;
-    const real t465 = t463 + t464;
-    const real t466 = H[23] * t372;
-    const real t467 = t465 + t466;
-    const real t468 = H[29] * t380;
-    const real t469 = t467 + t468;
-    const real t470 = H[35] * t388;
-    const real t471 = t469 + t470;
-    const real t472 = t390 * t251;
-    const real t473 = t471 - t472;
-    const real t474 = t267 * t404;
-    const real t475 = t473 - t474;
-    const real t476 = t285 * t420;
-    const real t477 = t475 - t476;
-    const real t478 = t305 * t438;
-    const real t479 = t477 - t478;
-    const real t480 = t328 * t458;
-    const real t481 = t479 - t480;
-    const real t482 = t460 * t481;
-    const real t483 = t328 * t482;
-    const real t484 = t459 - t483;
-    const real t485 = t224 * t484;
-    const real t486 = t439 - t485;
-    const real t487 = t305 * t482;
-    const real t488 = t486 - t487;
-    const real t489 = t142 * t488;
-    const real t490 = t421 - t489;
-    const real t491 = t203 * t484;
-    const real t492 = t490 - t491;
-    const real t493 = t285 * t482;
-    const real t494 = t492 - t493;
-    const real t495 = t80 * t494;
-    const real t496 = t405 - t495;
-    const real t497 = t123 * t488;
-    const real t498 = t496 - t497;
-    const real t499 = t185 * t484;
-    const real t500 = t498 - t499;
-    const real t501 = t267 * t482;
-    const real t502 = t500 - t501;
-    const real t503 = t36 * t502;
-    const real t504 = t391 - t503;
-    const real t505 = t63 * t494;
-    const real t506 = t504 - t505;
-    const real t507 = t107 * t488;
-    const real t508 = t506 - t507;
-    const real t509 = t169 * t484;
-    const real t510 = t508 - t509;
-    const real t511 = t251 * t482;
-    const real t512 = t510 - t511;
-    udot[0] = t512;
-    udot[1] = t502;
-    udot[2] = t494;
-    udot[3] = t488;
-    udot[4] = t484;
-    udot[5] = t482;
-    return 0;
+  real t10 = H[0] * H[0] + H[6] * H[6] + H[12] * H[12] + H[18] * H[18] + H[24] * H[24] + H[30] *
+    H[30];
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[7] * H[7] + H[13] * H[13] + H[19] * H[19] + H[25] * H[25] + H[31] *
+    H[31];
+  real t34 = H[0] * H[1] + H[6] * H[7] + H[12] * H[13] + H[18] * H[19] + H[24] * H[25] + H[30] *
+    H[31];
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[8] * H[8] + H[14] * H[14] + H[20] * H[20] + H[26] * H[26] + H[32] *
+    H[32];
+  real t62 = H[0] * H[2] + H[6] * H[8] + H[12] * H[14] + H[18] * H[20] + H[24] * H[26] + H[30] *
+    H[32];
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[7] * H[8] + H[13] * H[14] + H[19] * H[20] + H[25] * H[26] + H[31] *
+    H[32] - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  real t94 = H[3] * H[3] + H[9] * H[9] + H[15] * H[15] + H[21] * H[21] + H[27] * H[27] + H[33] *
+    H[33];
+  real t106 = H[0] * H[3] + H[6] * H[9] + H[12] * H[15] + H[18] * H[21] + H[24] * H[27] + H[30] *
+    H[33];
+  real t107 = t106 * t35;
+  real t122 = H[1] * H[3] + H[7] * H[9] + H[13] * H[15] + H[19] * H[21] + H[25] * H[27] + H[31] *
+    H[33] - t106 * t36;
+  real t123 = t79 * t122;
+  real t140 = H[2] * H[3] + H[8] * H[9] + H[14] * H[15] + H[20] * H[21] + H[26] * H[27] + H[32] *
+    H[33] - t106 * t63 - t80 * t122;
+  real t141 = 1.0 / t82;
+  real t142 = t141 * t140;
+  real t144 = t94 - t106 * t107 - t122 * t123 - t140 * t142;
+  if (!((t94 * ((real)1 / (real)10000000000000) < t144))) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  real t156 = H[4] * H[4] + H[10] * H[10] + H[16] * H[16] + H[22] * H[22] + H[28] * H[28] + H[34] *
+    H[34];
+  real t168 = H[0] * H[4] + H[6] * H[10] + H[12] * H[16] + H[18] * H[22] + H[24] * H[28] + H[30] *
+    H[34];
+  real t169 = t168 * t35;
+  real t184 = H[1] * H[4] + H[7] * H[10] + H[13] * H[16] + H[19] * H[22] + H[25] * H[28] + H[31] *
+    H[34] - t168 * t36;
+  real t185 = t79 * t184;
+  real t202 = H[2] * H[4] + H[8] * H[10] + H[14] * H[16] + H[20] * H[22] + H[26] * H[28] + H[32] *
+    H[34] - t168 * t63 - t80 * t184;
+  real t203 = t141 * t202;
+  real t222 = H[3] * H[4] + H[9] * H[10] + H[15] * H[16] + H[21] * H[22] + H[27] * H[28] + H[33] *
+    H[34] - t168 * t107 - t123 * t184 - t142 * t202;
+  real t223 = 1.0 / t144;
+  real t224 = t223 * t222;
+  real t226 = t156 - t168 * t169 - t184 * t185 - t202 * t203 - t222 * t224;
+  if (!((t156 * ((real)1 / (real)10000000000000) < t226))) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  real t238 = H[5] * H[5] + H[11] * H[11] + H[17] * H[17] + H[23] * H[23] + H[29] * H[29] + H[35] *
+    H[35];
+  real t250 = H[0] * H[5] + H[6] * H[11] + H[12] * H[17] + H[18] * H[23] + H[24] * H[29] + H[30] *
+    H[35];
+  real t251 = t250 * t35;
+  real t266 = H[1] * H[5] + H[7] * H[11] + H[13] * H[17] + H[19] * H[23] + H[25] * H[29] + H[31] *
+    H[35] - t250 * t36;
+  real t267 = t79 * t266;
+  real t284 = H[2] * H[5] + H[8] * H[11] + H[14] * H[17] + H[20] * H[23] + H[26] * H[29] + H[32] *
+    H[35] - t250 * t63 - t80 * t266;
+  real t285 = t141 * t284;
+  real t304 = H[3] * H[5] + H[9] * H[11] + H[15] * H[17] + H[21] * H[23] + H[27] * H[29] + H[33] *
+    H[35] - t250 * t107 - t123 * t266 - t142 * t284;
+  real t305 = t223 * t304;
+  real t326 = H[4] * H[5] + H[10] * H[11] + H[16] * H[17] + H[22] * H[23] + H[28] * H[29] + H[34] *
+    H[35] - t250 * t169 - t185 * t266 - t203 * t284 - t224 * t304;
+  real t327 = 1.0 / t226;
+  real t328 = t327 * t326;
+  real t330 = t238 - t250 * t251 - t266 * t267 - t284 * t285 - t304 * t305 - t326 * t328;
+  if (!((t238 * ((real)1 / (real)10000000000000) < t330))) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  real t335 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t340 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t346 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t349 = delta[0] - (Rc[0] * t335 + Rc[3] * t340 + Rc[6] * t346);
+  real t356 = delta[1] - (Rc[1] * t335 + Rc[4] * t340 + Rc[7] * t346);
+  real t364 = delta[2] - (Rc[2] * t335 + Rc[5] * t340 + Rc[8] * t346);
+  real t372 = delta[3] - (Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5]);
+  real t380 = delta[4] - (Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5]);
+  real t388 = delta[5] - (Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5]);
+  real t390 = H[0] * t349 + H[6] * t356 + H[12] * t364 + H[18] * t372 + H[24] * t380 + H[30] * t388;
+  real t404 = H[1] * t349 + H[7] * t356 + H[13] * t364 + H[19] * t372 + H[25] * t380 + H[31] * t388
+    - t390 * t36;
+  real t420 = H[2] * t349 + H[8] * t356 + H[14] * t364 + H[20] * t372 + H[26] * t380 + H[32] * t388
+    - t390 * t63 - t80 * t404;
+  real t438 = H[3] * t349 + H[9] * t356 + H[15] * t364 + H[21] * t372 + H[27] * t380 + H[33] * t388
+    - t390 * t107 - t123 * t404 - t142 * t420;
+  real t458 = H[4] * t349 + H[10] * t356 + H[16] * t364 + H[22] * t372 + H[28] * t380 + H[34] * t388
+    - t390 * t169 - t185 * t404 - t203 * t420 - t224 * t438;
+  real t482 = 1.0 / t330 * (H[5] * t349 + H[11] * t356 + H[17] * t364 + H[23] * t372 + H[29] * t380
+    + H[35] * t388 - t390 * t251 - t267 * t404 - t285 * t420 - t305 * t438 - t328 * t458);
+  real t484 = t327 * t458 - t328 * t482;
+  real t488 = t223 * t438 - t224 * t484 - t305 * t482;
+  real t494 = t141 * t420 - t142 * t488 - t203 * t484 - t285 * t482;
+  real t502 = t79 * t404 - t80 * t494 - t123 * t488 - t185 * t484 - t267 * t482;
+  udot[0] = t390 * t35 - t36 * t502 - t63 * t494 - t107 * t488 - t169 * t484 - t251 * t482;
+  udot[1] = t502;
+  udot[2] = t494;
+  udot[3] = t488;
+  udot[4] = t484;
+  udot[5] = t482;
+  return 0;
 }
 
-static int mstmm_sweep_generic6_project_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_project(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_project_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_project_outputs[] = {
-    {"udot", 6, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic6_project_guards[] = {
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic6_project, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 6 free speeds, and the factor of D
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the free coordinates
@@ -3603,2008 +756,436 @@ static const mstmm_guard mstmm_sweep_generic6_project_guards[] = {
  * out G[6][6] D^-1 H^T S
  * out S_I[21] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_generic6_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict J, const real *restrict W,
-    const real *restrict floor_, const real *restrict S, real *restrict F, real *restrict G,
-    real *restrict S_I)
+int mstmm_sweep_generic6_factor(in_t Rc, in_t r, in_t H, in_t J, in_t W, in_t floor_, in_t S,
+    out_t F, out_t G, out_t S_I)
 {
-    const real t0 = H[0] * S[0];
-    const real t1 = H[6] * S[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * S[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * S[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * S[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * S[5];
-    const real t10 = t8 + t9;
-    const real t11 = H[0] * t10;
-    const real t12 = H[0] * S[1];
-    const real t13 = H[6] * S[6];
-    const real t14 = t12 + t13;
-    const real t15 = H[12] * S[7];
-    const real t16 = t14 + t15;
-    const real t17 = H[18] * S[8];
-    const real t18 = t16 + t17;
-    const real t19 = H[24] * S[9];
-    const real t20 = t18 + t19;
-    const real t21 = H[30] * S[10];
-    const real t22 = t20 + t21;
-    const real t23 = H[6] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = H[0] * S[2];
-    const real t26 = H[6] * S[7];
-    const real t27 = t25 + t26;
-    const real t28 = H[12] * S[11];
-    const real t29 = t27 + t28;
-    const real t30 = H[18] * S[12];
-    const real t31 = t29 + t30;
-    const real t32 = H[24] * S[13];
-    const real t33 = t31 + t32;
-    const real t34 = H[30] * S[14];
-    const real t35 = t33 + t34;
-    const real t36 = H[12] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = H[0] * S[3];
-    const real t39 = H[6] * S[8];
-    const real t40 = t38 + t39;
-    const real t41 = H[12] * S[12];
-    const real t42 = t40 + t41;
-    const real t43 = H[18] * S[15];
-    const real t44 = t42 + t43;
-    const real t45 = H[24] * S[16];
-    const real t46 = t44 + t45;
-    const real t47 = H[30] * S[17];
-    const real t48 = t46 + t47;
-    const real t49 = H[18] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = H[0] * S[4];
-    const real t52 = H[6] * S[9];
-    const real t53 = t51 + t52;
-    const real t54 = H[12] * S[13];
-    const real t55 = t53 + t54;
-    const real t56 = H[18] * S[16];
-    const real t57 = t55 + t56;
-    const real t58 = H[24] * S[18];
-    const real t59 = t57 + t58;
-    const real t60 = H[30] * S[19];
-    const real t61 = t59 + t60;
-    const real t62 = H[24] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = H[0] * S[5];
-    const real t65 = H[6] * S[10];
-    const real t66 = t64 + t65;
-    const real t67 = H[12] * S[14];
-    const real t68 = t66 + t67;
-    const real t69 = H[18] * S[17];
-    const real t70 = t68 + t69;
-    const real t71 = H[24] * S[19];
-    const real t72 = t70 + t71;
-    const real t73 = H[30] * S[20];
-    const real t74 = t72 + t73;
-    const real t75 = H[30] * t74;
-    const real t76 = t63 + t75;
-    const real t77 = J[0] - W[0];
-    const real t78 = t76 + t77;
-    const real t79 = 0.0 < t78;
-    if (!(t79 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t80 = H[1] * S[0];
-    const real t81 = H[7] * S[1];
-    const real t82 = t80 + t81;
-    const real t83 = H[13] * S[2];
-    const real t84 = t82 + t83;
-    const real t85 = H[19] * S[3];
-    const real t86 = t84 + t85;
-    const real t87 = H[25] * S[4];
-    const real t88 = t86 + t87;
-    const real t89 = H[31] * S[5];
-    const real t90 = t88 + t89;
-    const real t91 = H[1] * t90;
-    const real t92 = H[1] * S[1];
-    const real t93 = H[7] * S[6];
-    const real t94 = t92 + t93;
-    const real t95 = H[13] * S[7];
-    const real t96 = t94 + t95;
-    const real t97 = H[19] * S[8];
-    const real t98 = t96 + t97;
-    const real t99 = H[25] * S[9];
-    const real t100 = t98 + t99;
-    const real t101 = H[31] * S[10];
-    const real t102 = t100 + t101;
-    const real t103 = H[7] * t102;
-    const real t104 = t91 + t103;
-    const real t105 = H[1] * S[2];
-    const real t106 = H[7] * S[7];
-    const real t107 = t105 + t106;
-    const real t108 = H[13] * S[11];
-    const real t109 = t107 + t108;
-    const real t110 = H[19] * S[12];
-    const real t111 = t109 + t110;
-    const real t112 = H[25] * S[13];
-    const real t113 = t111 + t112;
-    const real t114 = H[31] * S[14];
-    const real t115 = t113 + t114;
-    const real t116 = H[13] * t115;
-    const real t117 = t104 + t116;
-    const real t118 = H[1] * S[3];
-    const real t119 = H[7] * S[8];
-    const real t120 = t118 + t119;
-    const real t121 = H[13] * S[12];
-    const real t122 = t120 + t121;
-    const real t123 = H[19] * S[15];
-    const real t124 = t122 + t123;
-    const real t125 = H[25] * S[16];
-    const real t126 = t124 + t125;
-    const real t127 = H[31] * S[17];
-    const real t128 = t126 + t127;
-    const real t129 = H[19] * t128;
-    const real t130 = t117 + t129;
-    const real t131 = H[1] * S[4];
-    const real t132 = H[7] * S[9];
-    const real t133 = t131 + t132;
-    const real t134 = H[13] * S[13];
-    const real t135 = t133 + t134;
-    const real t136 = H[19] * S[16];
-    const real t137 = t135 + t136;
-    const real t138 = H[25] * S[18];
-    const real t139 = t137 + t138;
-    const real t140 = H[31] * S[19];
-    const real t141 = t139 + t140;
-    const real t142 = H[25] * t141;
-    const real t143 = t130 + t142;
-    const real t144 = H[1] * S[5];
-    const real t145 = H[7] * S[10];
-    const real t146 = t144 + t145;
-    const real t147 = H[13] * S[14];
-    const real t148 = t146 + t147;
-    const real t149 = H[19] * S[17];
-    const real t150 = t148 + t149;
-    const real t151 = H[25] * S[19];
-    const real t152 = t150 + t151;
-    const real t153 = H[31] * S[20];
-    const real t154 = t152 + t153;
-    const real t155 = H[31] * t154;
-    const real t156 = t143 + t155;
-    const real t157 = J[1] - W[7];
-    const real t158 = t156 + t157;
-    const real t159 = t158 * ((real)1 / (real)10000000000000);
-    const real t160 = H[0] * t90;
-    const real t161 = H[6] * t102;
-    const real t162 = t160 + t161;
-    const real t163 = H[12] * t115;
-    const real t164 = t162 + t163;
-    const real t165 = H[18] * t128;
-    const real t166 = t164 + t165;
-    const real t167 = H[24] * t141;
-    const real t168 = t166 + t167;
-    const real t169 = H[30] * t154;
-    const real t170 = t168 + t169;
-    const real t171 = W[1] + W[6];
-    const real t172 = 0.5 * t171;
-    const real t173 = t170 - t172;
-    const real t174 = 1.0 / t78;
-    const real t175 = t173 * t174;
-    const real t176 = t173 * t175;
-    const real t177 = t158 - t176;
-    const real t178 = t159 < t177;
-    if (!(t178 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t179 = H[2] * S[0];
-    const real t180 = H[8] * S[1];
-    const real t181 = t179 + t180;
-    const real t182 = H[14] * S[2];
-    const real t183 = t181 + t182;
-    const real t184 = H[20] * S[3];
-    const real t185 = t183 + t184;
-    const real t186 = H[26] * S[4];
-    const real t187 = t185 + t186;
-    const real t188 = H[32] * S[5];
-    const real t189 = t187 + t188;
-    const real t190 = H[2] * t189;
-    const real t191 = H[2] * S[1];
-    const real t192 = H[8] * S[6];
-    const real t193 = t191 + t192;
-    const real t194 = H[14] * S[7];
-    const real t195 = t193 + t194;
-    const real t196 = H[20] * S[8];
-    const real t197 = t195 + t196;
-    const real t198 = H[26] * S[9];
-    const real t199 = t197 + t198;
-    const real t200 = H[32] * S[10];
-    const real t201 = t199 + t200;
-    const real t202 = H[8] * t201;
-    const real t203 = t190 + t202;
-    const real t204 = H[2] * S[2];
-    const real t205 = H[8] * S[7];
-    const real t206 = t204 + t205;
-    const real t207 = H[14] * S[11];
-    const real t208 = t206 + t207;
-    const real t209 = H[20] * S[12];
-    const real t210 = t208 + t209;
-    const real t211 = H[26] * S[13];
-    const real t212 = t210 + t211;
-    const real t213 = H[32] * S[14];
-    const real t214 = t212 + t213;
-    const real t215 = H[14] * t214;
-    const real t216 = t203 + t215;
-    const real t217 = H[2] * S[3];
-    const real t218 = H[8] * S[8];
-    const real t219 = t217 + t218;
-    const real t220 = H[14] * S[12];
-    const real t221 = t219 + t220;
-    const real t222 = H[20] * S[15];
-    const real t223 = t221 + t222;
-    const real t224 = H[26] * S[16];
-    const real t225 = t223 + t224;
-    const real t226 = H[32] * S[17];
-    const real t227 = t225 + t226;
-    const real t228 = H[20] * t227;
-    const real t229 = t216 + t228;
-    const real t230 = H[2] * S[4];
-    const real t231 = H[8] * S[9];
-    const real t232 = t230 + t231;
-    const real t233 = H[14] * S[13];
-    const real t234 = t232 + t233;
-    const real t235 = H[20] * S[16];
-    const real t236 = t234 + t235;
-    const real t237 = H[26] * S[18];
-    const real t238 = t236 + t237;
-    const real t239 = H[32] * S[19];
-    const real t240 = t238 + t239;
-    const real t241 = H[26] * t240;
-    const real t242 = t229 + t241;
-    const real t243 = H[2] * S[5];
-    const real t244 = H[8] * S[10];
-    const real t245 = t243 + t244;
-    const real t246 = H[14] * S[14];
-    const real t247 = t245 + t246;
-    const real t248 = H[20] * S[17];
-    const real t249 = t247 + t248;
-    const real t250 = H[26] * S[19];
-    const real t251 = t249 + t250;
-    const real t252 = H[32] * S[20];
-    const real t253 = t251 + t252;
-    const real t254 = H[32] * t253;
-    const real t255 = t242 + t254;
-    const real t256 = J[2] - W[14];
-    const real t257 = t255 + t256;
-    const real t258 = t257 * ((real)1 / (real)10000000000000);
-    const real t259 = H[0] * t189;
-    const real t260 = H[6] * t201;
-    const real t261 = t259 + t260;
-    const real t262 = H[12] * t214;
-    const real t263 = t261 + t262;
-    const real t264 = H[18] * t227;
-    const real t265 = t263 + t264;
-    const real t266 = H[24] * t240;
-    const real t267 = t265 + t266;
-    const real t268 = H[30] * t253;
-    const real t269 = t267 + t268;
-    const real t270 = W[2] + W[12];
-    const real t271 = 0.5 * t270;
-    const real t272 = t269 - t271;
-    const real t273 = t272 * t174;
-    const real t274 = t272 * t273;
-    const real t275 = t257 - t274;
-    const real t276 = H[1] * t189;
-    const real t277 = H[7] * t201;
-    const real t278 = t276 + t277;
-    const real t279 = H[13] * t214;
-    const real t280 = t278 + t279;
-    const real t281 = H[19] * t227;
-    const real t282 = t280 + t281;
-    const real t283 = H[25] * t240;
-    const real t284 = t282 + t283;
-    const real t285 = H[31] * t253;
-    const real t286 = t284 + t285;
-    const real t287 = W[8] + W[13];
-    const real t288 = 0.5 * t287;
-    const real t289 = t286 - t288;
-    const real t290 = t272 * t175;
-    const real t291 = t289 - t290;
-    const real t292 = 1.0 / t177;
-    const real t293 = t292 * t291;
-    const real t294 = t291 * t293;
-    const real t295 = t275 - t294;
-    const real t296 = t258 < t295;
-    if (!(t296 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t297 = H[3] * S[0];
-    const real t298 = H[9] * S[1];
-    const real t299 = t297 + t298;
-    const real t300 = H[15] * S[2];
-    const real t301 = t299 + t300;
-    const real t302 = H[21] * S[3];
-    const real t303 = t301 + t302;
-    const real t304 = H[27] * S[4];
-    const real t305 = t303 + t304;
-    const real t306 = H[33] * S[5];
-    const real t307 = t305 + t306;
-    const real t308 = H[3] * t307;
-    const real t309 = H[3] * S[1];
-    const real t310 = H[9] * S[6];
-    const real t311 = t309 + t310;
-    const real t312 = H[15] * S[7];
-    const real t313 = t311 + t312;
-    const real t314 = H[21] * S[8];
-    const real t315 = t313 + t314;
-    const real t316 = H[27] * S[9];
-    const real t317 = t315 + t316;
-    const real t318 = H[33] * S[10];
-    const real t319 = t317 + t318;
-    const real t320 = H[9] * t319;
-    const real t321 = t308 + t320;
-    const real t322 = H[3] * S[2];
-    const real t323 = H[9] * S[7];
-    const real t324 = t322 + t323;
-    const real t325 = H[15] * S[11];
-    const real t326 = t324 + t325;
-    const real t327 = H[21] * S[12];
-    const real t328 = t326 + t327;
-    const real t329 = H[27] * S[13];
-    const real t330 = t328 + t329;
-    const real t331 = H[33] * S[14];
-    const real t332 = t330 + t331;
-    const real t333 = H[15] * t332;
-    const real t334 = t321 + t333;
-    const real t335 = H[3] * S[3];
-    const real t336 = H[9] * S[8];
-    const real t337 = t335 + t336;
-    const real t338 = H[15] * S[12];
-    const real t339 = t337 + t338;
-    const real t340 = H[21] * S[15];
-    const real t341 = t339 + t340;
-    const real t342 = H[27] * S[16];
-    const real t343 = t341 + t342;
-    const real t344 = H[33] * S[17];
-    const real t345 = t343 + t344;
-    const real t346 = H[21] * t345;
-    const real t347 = t334 + t346;
-    const real t348 = H[3] * S[4];
-    const real t349 = H[9] * S[9];
-    const real t350 = t348 + t349;
-    const real t351 = H[15] * S[13];
-    const real t352 = t350 + t351;
-    const real t353 = H[21] * S[16];
-    const real t354 = t352 + t353;
-    const real t355 = H[27] * S[18];
-    const real t356 = t354 + t355;
-    const real t357 = H[33] * S[19];
-    const real t358 = t356 + t357;
-    const real t359 = H[27] * t358;
-    const real t360 = t347 + t359;
-    const real t361 = H[3] * S[5];
-    const real t362 = H[9] * S[10];
-    const real t363 = t361 + t362;
-    const real t364 = H[15] * S[14];
-    const real t365 = t363 + t364;
-    const real t366 = H[21] * S[17];
-    const real t367 = t365 + t366;
-    const real t368 = H[27] * S[19];
-    const real t369 = t367 + t368;
-    const real t370 = H[33] * S[20];
-    const real t371 = t369 + t370;
-    const real t372 = H[33] * t371;
-    const real t373 = t360 + t372;
-    const real t374 = J[3] - W[21];
-    const real t375 = t373 + t374;
-    const real t376 = t375 * ((real)1 / (real)10000000000000);
-    const real t377 = H[0] * t307;
-    const real t378 = H[6] * t319;
-    const real t379 = t377 + t378;
-    const real t380 = H[12] * t332;
-    const real t381 = t379 + t380;
-    const real t382 = H[18] * t345;
-    const real t383 = t381 + t382;
-    const real t384 = H[24] * t358;
-    const real t385 = t383 + t384;
-    const real t386 = H[30] * t371;
-    const real t387 = t385 + t386;
-    const real t388 = W[3] + W[18];
-    const real t389 = 0.5 * t388;
-    const real t390 = t387 - t389;
-    const real t391 = t390 * t174;
-    const real t392 = t390 * t391;
-    const real t393 = t375 - t392;
-    const real t394 = H[1] * t307;
-    const real t395 = H[7] * t319;
-    const real t396 = t394 + t395;
-    const real t397 = H[13] * t332;
-    const real t398 = t396 + t397;
-    const real t399 = H[19] * t345;
-    const real t400 = t398 + t399;
-    const real t401 = H[25] * t358;
-    const real t402 = t400 + t401;
-    const real t403 = H[31] * t371;
-    const real t404 = t402 + t403;
-    const real t405 = W[9] + W[19];
-    const real t406 = 0.5 * t405;
-    const real t407 = t404 - t406;
-    const real t408 = t390 * t175;
-    const real t409 = t407 - t408;
-    const real t410 = t292 * t409;
-    const real t411 = t409 * t410;
-    const real t412 = t393 - t411;
-    const real t413 = H[2] * t307;
-    const real t414 = H[8] * t319;
-    const real t415 = t413 + t414;
-    const real t416 = H[14] * t332;
-    const real t417 = t415 + t416;
-    const real t418 = H[20] * t345;
-    const real t419 = t417 + t418;
-    const real t420 = H[26] * t358;
-    const real t421 = t419 + t420;
-    const real t422 = H[32] * t371;
-    const real t423 = t421 + t422;
-    const real t424 = W[15] + W[20];
-    const real t425 = 0.5 * t424;
-    const real t426 = t423 - t425;
-    const real t427 = t390 * t273;
-    const real t428 = t426 - t427;
-    const real t429 = t293 * t409;
-    const real t430 = t428 - t429;
-    const real t431 = 1.0 / t295;
-    const real t432 = t431 * t430;
-    const real t433 = t430 * t432;
-    const real t434 = t412 - t433;
-    const real t435 = t376 < t434;
-    if (!(t435 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t436 = H[4] * S[0];
-    const real t437 = H[10] * S[1];
-    const real t438 = t436 + t437;
-    const real t439 = H[16] * S[2];
-    const real t440 = t438 + t439;
-    const real t441 = H[22] * S[3];
-    const real t442 = t440 + t441;
-    const real t443 = H[28] * S[4];
-    const real t444 = t442 + t443;
-    const real t445 = H[34] * S[5];
-    const real t446 = t444 + t445;
-    const real t447 = H[4] * t446;
-    const real t448 = H[4] * S[1];
-    const real t449 = H[10] * S[6];
-    const real t450 = t448 + t449;
-    const real t451 = H[16] * S[7];
-    const real t452 = t450 + t451;
-    const real t453 = H[22] * S[8];
-    const real t454 = t452 + t453;
-    const real t455 = H[28] * S[9];
-    const real t456 = t454 + t455;
-    const real t457 = H[34] * S[10];
-    const real t458 = t456 + t457;
-    const real t459 = H[10] * t458;
-    const real t460 = t447 + t459;
-    const real t461 = H[4] * S[2];
-    const real t462 = H[10] * S[7];
-    const real t463 = t461 + t462;
-    const real t464 = H[16] * S[11];
-    const real t465 = t463 + t464;
-    const real t466 = H[22] * S[12];
-    const real t467 = t465 + t466;
-    const real t468 = H[28] * S[13];
-    const real t469 = t467 + t468;
-    const real t470 = H[34] * S[14];
-    const real t471 = t469 + t470;
-    const real t472 = H[16] * t471;
-    const real t473 = t460 + t472;
-    const real t474 = H[4] * S[3];
-    const real t475 = H[10] * S[8];
-    const real t476 = t474 + t475;
-    const real t477 = H[16] * S[12];
-    const real t478 = t476 + t477;
-    const real t479 = H[22] * S[15];
-    const real t480 = t478 + t479;
-    const real t481 = H[28] * S[16];
-    const real t482 = t480 + t481;
-    const real t483 = H[34] * S[17];
-    const real t484 = t482 + t483;
-    const real t485 = H[22] * t484;
-    const real t486 = t473 + t485;
-    const real t487 = H[4] * S[4];
-    const real t488 = H[10] * S[9];
-    const real t489 = t487 + t488;
-    const real t490 = H[16] * S[13];
-    const real t491 = t489 + t490;
-    const real t492 = H[22] * S[16];
-    const real t493 = t491 + t492;
-    const real t494 = H[28] * S[18];
-    const real t495 = t493 + t494;
-    const real t496 = H[34] * S[19];
-    const real t497 = t495 + t496;
-    const real t498 = H[28] * t497;
-    const real t499 = t486 + t498;
-    const real t500 = H[4] * S[5];
-    const real t501 = H[10] * S[10];
-    const real t502 = t500 + t501;
-    const real t503 = H[16] * S[14];
-    const real t504 = t502 + t503;
-    const real t505 = H[22] * S[17];
-    const real t506 = t504 + t505;
-    const real t507 = H[28] * S[19];
-    const real t508 = t506 + t507;
-    const real t509 = H[34] * S[20];
-    const real t510 = t508 + t509;
-    const real t511 = H[34] * t510;
-    const real t512 = t499 + t511;
-    const real t513 = J[4] - W[28];
-    const real t514 = t512 + t513;
-    const real t515 = t514 * ((real)1 / (real)10000000000000);
-    const real t516 = H[0] * t446;
-    const real t517 = H[6] * t458;
-    const real t518 = t516 + t517;
-    const real t519 = H[12] * t471;
-    const real t520 = t518 + t519;
-    const real t521 = H[18] * t484;
-    const real t522 = t520 + t521;
-    const real t523 = H[24] * t497;
-    const real t524 = t522 + t523;
-    const real t525 = H[30] * t510;
-    const real t526 = t524 + t525;
-    const real t527 = W[4] + W[24];
-    const real t528 = 0.5 * t527;
-    const real t529 = t526 - t528;
-    const real t530 = t529 * t174;
-    const real t531 = t529 * t530;
-    const real t532 = t514 - t531;
-    const real t533 = H[1] * t446;
-    const real t534 = H[7] * t458;
-    const real t535 = t533 + t534;
-    const real t536 = H[13] * t471;
-    const real t537 = t535 + t536;
-    const real t538 = H[19] * t484;
-    const real t539 = t537 + t538;
-    const real t540 = H[25] * t497;
-    const real t541 = t539 + t540;
-    const real t542 = H[31] * t510;
-    const real t543 = t541 + t542;
-    const real t544 = W[10] + W[25];
-    const real t545 = 0.5 * t544;
-    const real t546 = t543 - t545;
-    const real t547 = t529 * t175;
-    const real t548 = t546 - t547;
-    const real t549 = t292 * t548;
-    const real t550 = t548 * t549;
-    const real t551 = t532 - t550;
-    const real t552 = H[2] * t446;
-    const real t553 = H[8] * t458;
-    const real t554 = t552 + t553;
-    const real t555 = H[14] * t471;
-    const real t556 = t554 + t555;
-    const real t557 = H[20] * t484;
-    const real t558 = t556 + t557;
-    const real t559 = H[26] * t497;
-    const real t560 = t558 + t559;
-    const real t561 = H[32] * t510;
-    const real t562 = t560 + t561;
-    const real t563 = W[16] + W[26];
-    const real t564 = 0.5 * t563;
-    const real t565 = t562 - t564;
-    const real t566 = t529 * t273;
-    const real t567 = t565 - t566;
-    const real t568 = t293 * t548;
-    const real t569 = t567 - t568;
-    const real t570 = t431 * t569;
-    const real t571 = t569 * t570;
-    const real t572 = t551 - t571;
-    const real t573 = H[3] * t446;
-    const real t574 = H[9] * t458;
-    const real t575 = t573 + t574;
-    const real t576 = H[15] * t471;
-    const real t577 = t575 + t576;
-    const real t578 = H[21] * t484;
-    const real t579 = t577 + t578;
-    const real t580 = H[27] * t497;
-    const real t581 = t579 + t580;
-    const real t582 = H[33] * t510;
-    const real t583 = t581 + t582;
-    const real t584 = W[22] + W[27];
-    const real t585 = 0.5 * t584;
-    const real t586 = t583 - t585;
-    const real t587 = t529 * t391;
-    const real t588 = t586 - t587;
-    const real t589 = t410 * t548;
-    const real t590 = t588 - t589;
-    const real t591 = t432 * t569;
-    const real t592 = t590 - t591;
-    const real t593 = 1.0 / t434;
-    const real t594 = t593 * t592;
-    const real t595 = t592 * t594;
-    const real t596 = t572 - t595;
-    const real t597 = t515 < t596;
-    if (!(t597 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t598 = H[5] * S[0];
-    const real t599 = H[11] * S[1];
-    const real t600 = t598 + t599;
-    const real t601 = H[17] * S[2];
-    const real t602 = t600 + t601;
-    const real t603 = H[23] * S[3];
-    const real t604 = t602 + t603;
-    const real t605 = H[29] * S[4];
-    const real t606 = t604 + t605;
-    const real t607 = H[35] * S[5];
-    const real t608 = t606 + t607;
-    const real t609 = H[5] * t608;
-    const real t610 = H[5] * S[1];
-    const real t611 = H[11] * S[6];
-    const real t612 = t610 + t611;
-    const real t613 = H[17] * S[7];
-    const real t614 = t612 + t613;
-    const real t615 = H[23] * S[8];
-    const real t616 = t614 + t615;
-    const real t617 = H[29] * S[9];
-    const real t618 = t616 + t617;
-    const real t619 = H[35] * S[10];
-    const real t620 = t618 + t619;
-    const real t621 = H[11] * t620;
-    const real t622 = t609 + t621;
-    const real t623 = H[5] * S[2];
-    const real t624 = H[11] * S[7];
-    const real t625 = t623 + t624;
-    const real t626 = H[17] * S[11];
-    const real t627 = t625 + t626;
-    const real t628 = H[23] * S[12];
-    const real t629 = t627 + t628;
-    const real t630 = H[29] * S[13];
-    const real t631 = t629 + t630;
-    const real t632 = H[35] * S[14];
-    const real t633 = t631 + t632;
-    const real t634 = H[17] * t633;
-    const real t635 = t622 + t634;
-    const real t636 = H[5] * S[3];
-    const real t637 = H[11] * S[8];
-    const real t638 = t636 + t637;
-    const real t639 = H[17] * S[12];
-    const real t640 = t638 + t639;
-    const real t641 = H[23] * S[15];
-    const real t642 = t640 + t641;
-    const real t643 = H[29] * S[16];
-    const real t644 = t642 + t643;
-    const real t645 = H[35] * S[17];
-    const real t646 = t644 + t645;
-    const real t647 = H[23] * t646;
-    const real t648 = t635 + t647;
-    const real t649 = H[5] * S[4];
-    const real t650 = H[11] * S[9];
-    const real t651 = t649 + t650;
-    const real t652 = H[17] * S[13];
-    const real t653 = t651 + t652;
-    const real t654 = H[23] * S[16];
-    const real t655 = t653 + t654;
-    const real t656 = H[29] * S[18];
-    const real t657 = t655 + t656;
-    const real t658 = H[35] * S[19];
-    const real t659 = t657 + t658;
-    const real t660 = H[29] * t659;
-    const real t661 = t648 + t660;
-    const real t662 = H[5] * S[5];
-    const real t663 = H[11] * S[10];
-    const real t664 = t662 + t663;
-    const real t665 = H[17] * S[14];
-    const real t666 = t664 + t665;
-    const real t667 = H[23] * S[17];
-    const real t668 = t666 + t667;
-    const real t669 = H[29] * S[19];
-    const real t670 = t668 + t669;
-    const real t671 = H[35] * S[20];
-    const real t672 = t670 + t671;
-    const real t673 = H[35] * t672;
-    const real t674 = t661 + t673;
-    const real t675 = J[5] - W[35];
-    const real t676 = t674 + t675;
-    const real t677 = t676 * ((real)1 / (real)10000000000000);
-    const real t678 = H[0] * t608;
-    const real t679 = H[6] * t620;
-    const real t680 = t678 + t679;
-    const real t681 = H[12] * t633;
-    const real t682 = t680 + t681;
-    const real t683 = H[18] * t646;
-    const real t684 = t682 + t683;
-    const real t685 = H[24] * t659;
-    const real t686 = t684 + t685;
-    const real t687 = H[30] * t672;
-    const real t688 = t686 + t687;
-    const real t689 = W[5] + W[30];
-    const real t690 = 0.5 * t689;
-    const real t691 = t688 - t690;
-    const real t692 = t691 * t174;
-    const real t693 = t691 * t692;
-    const real t694 = t676 - t693;
-    const real t695 = H[1] * t608;
-    const real t696 = H[7] * t620;
-    const real t697 = t695 + t696;
-    const real t698 = H[13] * t633;
-    const real t699 = t697 + t698;
-    const real t700 = H[19] * t646;
-    const real t701 = t699 + t700;
-    const real t702 = H[25] * t659;
-    const real t703 = t701 + t702;
-    const real t704 = H[31] * t672;
-    const real t705 = t703 + t704;
-    const real t706 = W[11] + W[31];
-    const real t707 = 0.5 * t706;
-    const real t708 = t705 - t707;
-    const real t709 = t691 * t175;
-    const real t710 = t708 - t709;
-    const real t711 = t292 * t710;
-    const real t712 = t710 * t711;
-    const real t713 = t694 - t712;
-    const real t714 = H[2] * t608;
-    const real t715 = H[8] * t620;
-    const real t716 = t714 + t715;
-    const real t717 = H[14] * t633;
-    const real t718 = t716 + t717;
-    const real t719 = H[20] * t646;
-    const real t720 = t718 + t719;
-    const real t721 = H[26] * t659;
-    const real t722 = t720 + t721;
-    const real t723 = H[32] * t672;
-    const real t724 = t722 + t723;
-    const real t725 = W[17] + W[32];
-    const real t726 = 0.5 * t725;
-    const real t727 = t724 - t726;
-    const real t728 = t691 * t273;
-    const real t729 = t727 - t728;
-    const real t730 = t293 * t710;
-    const real t731 = t729 - t730;
-    const real t732 = t431 * t731;
-    const real t733 = t731 * t732;
-    const real t734 = t713 - t733;
-    const real t735 = H[3] * t608;
-    const real t736 = H[9] * t620;
-    const real t737 = t735 + t736;
-    const real t738 = H[15] * t633;
-    const real t739 = t737 + t738;
-    const real t740 = H[21] * t646;
-    const real t741 = t739 + t740;
-    const real t742 = H[27] * t659;
-    const real t743 = t741 + t742;
-    const real t744 = H[33] * t672;
-    const real t745 = t743 + t744;
-    const real t746 = W[23] + W[33];
-    const real t747 = 0.5 * t746;
-    const real t748 = t745 - t747;
-    const real t749 = t691 * t391;
-    const real t750 = t748 - t749;
-    const real t751 = t410 * t710;
-    const real t752 = t750 - t751;
-    const real t753 = t432 * t731;
-    const real t754 = t752 - t753;
-    const real t755 = t593 * t754;
-    const real t756 = t754 * t755;
-    const real t757 = t734 - t756;
-    const real t758 = H[4] * t608;
-    const real t759 = H[10] * t620;
-    const real t760 = t758 + t759;
-    const real t761 = H[16] * t633;
-    const real t762 = t760 + t761;
-    const real t763 = H[22] * t646;
-    const real t764 = t762 + t763;
-    const real t765 = H[28] * t659;
-    const real t766 = t764 + t765;
-    const real t767 = H[34] * t672;
-    const real t768 = t766 + t767;
-    const real t769 = W[29] + W[34];
-    const real t770 = 0.5 * t769;
-    const real t771 = t768 - t770;
-    const real t772 = t691 * t530;
-    const real t773 = t771 - t772;
-    const real t774 = t549 * t710;
-    const real t775 = t773 - t774;
-    const real t776 = t570 * t731;
-    const real t777 = t775 - t776;
-    const real t778 = t594 * t754;
-    const real t779 = t777 - t778;
-    const real t780 = 1.0 / t596;
-    const real t781 = t780 * t779;
-    const real t782 = t779 * t781;
-    const real t783 = t757 - t782;
-    const real t784 = t677 < t783;
-    if (!(t784 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t785 = H[12] * H[12];
-    const real t786 = H[0] * H[0];
-    const real t787 = H[6] * H[6];
-    const real t788 = t786 + t787;
-    const real t789 = t785 + t788;
-    const real t790 = 0.0 < floor_[0];
-    const real t791 = S[0] + S[6];
-    const real t792 = S[11] + t791;
-    const real t793 = ((real)1 / (real)300000000000000) * t792;
-    const real t794 = t790 != 0 ? floor_[0] : t793;
-    const real t795 = t789 * t794;
-    const real t796 = H[30] * H[30];
-    const real t797 = H[18] * H[18];
-    const real t798 = H[24] * H[24];
-    const real t799 = t797 + t798;
-    const real t800 = t796 + t799;
-    const real t801 = 0.0 < floor_[1];
-    const real t802 = S[15] + S[18];
-    const real t803 = S[20] + t802;
-    const real t804 = ((real)1 / (real)300000000000000) * t803;
-    const real t805 = t801 != 0 ? floor_[1] : t804;
-    const real t806 = t800 * t805;
-    const real t807 = t795 + t806;
-    const real t808 = t807 < t78;
-    if (!(t808 != 0)) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
-    const real t809 = H[13] * H[13];
-    const real t810 = H[1] * H[1];
-    const real t811 = H[7] * H[7];
-    const real t812 = t810 + t811;
-    const real t813 = t809 + t812;
-    const real t814 = t794 * t813;
-    const real t815 = H[31] * H[31];
-    const real t816 = H[19] * H[19];
-    const real t817 = H[25] * H[25];
-    const real t818 = t816 + t817;
-    const real t819 = t815 + t818;
-    const real t820 = t805 * t819;
-    const real t821 = t814 + t820;
-    const real t822 = t821 < t158;
-    if (!(t822 != 0)) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
-    const real t823 = H[14] * H[14];
-    const real t824 = H[2] * H[2];
-    const real t825 = H[8] * H[8];
-    const real t826 = t824 + t825;
-    const real t827 = t823 + t826;
-    const real t828 = t794 * t827;
-    const real t829 = H[32] * H[32];
-    const real t830 = H[20] * H[20];
-    const real t831 = H[26] * H[26];
-    const real t832 = t830 + t831;
-    const real t833 = t829 + t832;
-    const real t834 = t805 * t833;
-    const real t835 = t828 + t834;
-    const real t836 = t835 < t257;
-    if (!(t836 != 0)) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
-    const real t837 = H[15] * H[15];
-    const real t838 = H[3] * H[3];
-    const real t839 = H[9] * H[9];
-    const real t840 = t838 + t839;
-    const real t841 = t837 + t840;
-    const real t842 = t794 * t841;
-    const real t843 = H[33] * H[33];
-    const real t844 = H[21] * H[21];
-    const real t845 = H[27] * H[27];
-    const real t846 = t844 + t845;
-    const real t847 = t843 + t846;
-    const real t848 = t805 * t847;
-    const real t849 = t842 + t848;
-    const real t850 = t849 < t375;
-    if (!(t850 != 0)) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
-    const real t851 = H[16] * H[16];
-    const real t852 = H[4] * H[4];
-    const real t853 = H[10] * H[10];
-    const real t854 = t852 + t853;
-    const real t855 = t851 + t854;
-    const real t856 = t794 * t855;
-    const real t857 = H[34] * H[34];
-    const real t858 = H[22] * H[22];
-    const real t859 = H[28] * H[28];
-    const real t860 = t858 + t859;
-    const real t861 = t857 + t860;
-    const real t862 = t805 * t861;
-    const real t863 = t856 + t862;
-    const real t864 = t863 < t514;
-    if (!(t864 != 0)) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
-    const real t865 = H[17] * H[17];
-    const real t866 = H[5] * H[5];
-    const real t867 = H[11] * H[11];
-    const real t868 = t866 + t867;
-    const real t869 = t865 + t868;
-    const real t870 = t794 * t869;
-    const real t871 = H[35] * H[35];
-    const real t872 = H[23] * H[23];
-    const real t873 = H[29] * H[29];
-    const real t874 = t872 + t873;
-    const real t875 = t871 + t874;
-    const real t876 = t805 * t875;
-    const real t877 = t870 + t876;
-    const real t878 = t877 < t676;
-    if (!(t878 != 0)) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
-    F[0] = t174;
-    F[1] = 0.0;
-    F[2] = 0.0;
-    F[3] = 0.0;
-    F[4] = 0.0;
-    F[5] = 0.0;
-    F[6] = t175;
-    F[7] = t292;
-    F[8] = 0.0;
-    F[9] = 0.0;
-    F[10] = 0.0;
-    F[11] = 0.0;
-    F[12] = t273;
-    F[13] = t293;
-    F[14] = t431;
-    F[15] = 0.0;
-    F[16] = 0.0;
-    F[17] = 0.0;
-    F[18] = t391;
-    F[19] = t410;
-    F[20] = t432;
-    F[21] = t593;
-    F[22] = 0.0;
-    F[23] = 0.0;
-    F[24] = t530;
-    F[25] = t549;
-    F[26] = t570;
-    F[27] = t594;
-    F[28] = t780;
-    F[29] = 0.0;
-    F[30] = t692;
-    F[31] = t711;
-    F[32] = t732;
-    F[33] = t755;
-    F[34] = t781;
-    const real t879 = 1.0 / t783;
-    F[35] = t879;
-    const real t880 = t10 * t174;
-    const real t881 = t10 * t175;
-    const real t882 = t90 - t881;
-    const real t883 = t292 * t882;
-    const real t884 = t10 * t273;
-    const real t885 = t189 - t884;
-    const real t886 = t293 * t882;
-    const real t887 = t885 - t886;
-    const real t888 = t431 * t887;
-    const real t889 = t10 * t391;
-    const real t890 = t307 - t889;
-    const real t891 = t410 * t882;
-    const real t892 = t890 - t891;
-    const real t893 = t432 * t887;
-    const real t894 = t892 - t893;
-    const real t895 = t593 * t894;
-    const real t896 = t10 * t530;
-    const real t897 = t446 - t896;
-    const real t898 = t549 * t882;
-    const real t899 = t897 - t898;
-    const real t900 = t570 * t887;
-    const real t901 = t899 - t900;
-    const real t902 = t594 * t894;
-    const real t903 = t901 - t902;
-    const real t904 = t780 * t903;
-    const real t905 = t10 * t692;
-    const real t906 = t608 - t905;
-    const real t907 = t711 * t882;
-    const real t908 = t906 - t907;
-    const real t909 = t732 * t887;
-    const real t910 = t908 - t909;
-    const real t911 = t755 * t894;
-    const real t912 = t910 - t911;
-    const real t913 = t781 * t903;
-    const real t914 = t912 - t913;
-    const real t915 = t879 * t914;
-    const real t916 = t781 * t915;
-    const real t917 = t904 - t916;
-    const real t918 = t594 * t917;
-    const real t919 = t895 - t918;
-    const real t920 = t755 * t915;
-    const real t921 = t919 - t920;
-    const real t922 = t432 * t921;
-    const real t923 = t888 - t922;
-    const real t924 = t570 * t917;
-    const real t925 = t923 - t924;
-    const real t926 = t732 * t915;
-    const real t927 = t925 - t926;
-    const real t928 = t293 * t927;
-    const real t929 = t883 - t928;
-    const real t930 = t410 * t921;
-    const real t931 = t929 - t930;
-    const real t932 = t549 * t917;
-    const real t933 = t931 - t932;
-    const real t934 = t711 * t915;
-    const real t935 = t933 - t934;
-    const real t936 = t175 * t935;
-    const real t937 = t880 - t936;
-    const real t938 = t273 * t927;
-    const real t939 = t937 - t938;
-    const real t940 = t391 * t921;
-    const real t941 = t939 - t940;
-    const real t942 = t530 * t917;
-    const real t943 = t941 - t942;
-    const real t944 = t692 * t915;
-    const real t945 = t943 - t944;
-    G[0] = t945;
-    const real t946 = t22 * t174;
-    const real t947 = t22 * t175;
-    const real t948 = t102 - t947;
-    const real t949 = t292 * t948;
-    const real t950 = t22 * t273;
-    const real t951 = t201 - t950;
-    const real t952 = t293 * t948;
-    const real t953 = t951 - t952;
-    const real t954 = t431 * t953;
-    const real t955 = t22 * t391;
-    const real t956 = t319 - t955;
-    const real t957 = t410 * t948;
-    const real t958 = t956 - t957;
-    const real t959 = t432 * t953;
-    const real t960 = t958 - t959;
-    const real t961 = t593 * t960;
-    const real t962 = t22 * t530;
-    const real t963 = t458 - t962;
-    const real t964 = t549 * t948;
-    const real t965 = t963 - t964;
-    const real t966 = t570 * t953;
-    const real t967 = t965 - t966;
-    const real t968 = t594 * t960;
-    const real t969 = t967 - t968;
-    const real t970 = t780 * t969;
-    const real t971 = t22 * t692;
-    const real t972 = t620 - t971;
-    const real t973 = t711 * t948;
-    const real t974 = t972 - t973;
-    const real t975 = t732 * t953;
-    const real t976 = t974 - t975;
-    const real t977 = t755 * t960;
-    const real t978 = t976 - t977;
-    const real t979 = t781 * t969;
-    const real t980 = t978 - t979;
-    const real t981 = t879 * t980;
-    const real t982 = t781 * t981;
-    const real t983 = t970 - t982;
-    const real t984 = t594 * t983;
-    const real t985 = t961 - t984;
-    const real t986 = t755 * t981;
-    const real t987 = t985 - t986;
-    const real t988 = t432 * t987;
-    const real t989 = t954 - t988;
-    const real t990 = t570 * t983;
-    const real t991 = t989 - t990;
-    const real t992 = t732 * t981;
-    const real t993 = t991 - t992;
-    const real t994 = t293 * t993;
-    const real t995 = t949 - t994;
-    const real t996 = t410 * t987;
-    const real t997 = t995 - t996;
-    const real t998 = t549 * t983;
-    const real t999 = t997 - t998;
-    const real t1000 = t711 * t981;
-    const real t1001 = t999 - t1000;
-    const real t1002 = t175 * t1001;
-    const real t1003 = t946 - t1002;
-    const real t1004 = t273 * t993;
-    const real t1005 = t1003 - t1004;
-    const real t1006 = t391 * t987;
-    const real t1007 = t1005 - t1006;
-    const real t1008 = t530 * t983;
-    const real t1009 = t1007 - t1008;
-    const real t1010 = t692 * t981;
-    const real t1011 = t1009 - t1010;
-    G[1] = t1011;
-    const real t1012 = t35 * t174;
-    const real t1013 = t35 * t175;
-    const real t1014 = t115 - t1013;
-    const real t1015 = t292 * t1014;
-    const real t1016 = t35 * t273;
-    const real t1017 = t214 - t1016;
-    const real t1018 = t293 * t1014;
-    const real t1019 = t1017 - t1018;
-    const real t1020 = t431 * t1019;
-    const real t1021 = t35 * t391;
-    const real t1022 = t332 - t1021;
-    const real t1023 = t410 * t1014;
-    const real t1024 = t1022 - t1023;
-    const real t1025 = t432 * t1019;
-    const real t1026 = t1024 - t1025;
-    const real t1027 = t593 * t1026;
-    const real t1028 = t35 * t530;
-    const real t1029 = t471 - t1028;
-    const real t1030 = t549 * t1014;
-    const real t1031 = t1029 - t1030;
-    const real t1032 = t570 * t1019;
-    const real t1033 = t1031 - t1032;
-    const real t1034 = t594 * t1026;
-    const real t1035 = t1033 - t1034;
-    const real t1036 = t780 * t1035;
-    const real t1037 = t35 * t692;
-    const real t1038 = t633 - t1037;
-    const real t1039 = t711 * t1014;
-    const real t1040 = t1038 - t1039;
-    const real t1041 = t732 * t1019;
-    const real t1042 = t1040 - t1041;
-    const real t1043 = t755 * t1026;
-    const real t1044 = t1042 - t1043;
-    const real t1045 = t781 * t1035;
-    const real t1046 = t1044 - t1045;
-    const real t1047 = t879 * t1046;
-    const real t1048 = t781 * t1047;
-    const real t1049 = t1036 - t1048;
-    const real t1050 = t594 * t1049;
-    const real t1051 = t1027 - t1050;
-    const real t1052 = t755 * t1047;
-    const real t1053 = t1051 - t1052;
-    const real t1054 = t432 * t1053;
-    const real t1055 = t1020 - t1054;
-    const real t1056 = t570 * t1049;
-    const real t1057 = t1055 - t1056;
-    const real t1058 = t732 * t1047;
-    const real t1059 = t1057 - t1058;
-    const real t1060 = t293 * t1059;
-    const real t1061 = t1015 - t1060;
-    const real t1062 = t410 * t1053;
-    const real t1063 = t1061 - t1062;
-    const real t1064 = t549 * t1049;
-    const real t1065 = t1063 - t1064;
-    const real t1066 = t711 * t1047;
-    const real t1067 = t1065 - t1066;
-    const real t1068 = t175 * t1067;
-    const real t1069 = t1012 - t1068;
-    const real t1070 = t273 * t1059;
-    const real t1071 = t1069 - t1070;
-    const real t1072 = t391 * t1053;
-    const real t1073 = t1071 - t1072;
-    const real t1074 = t530 * t1049;
-    const real t1075 = t1073 - t1074;
-    const real t1076 = t692 * t1047;
-    const real t1077 = t1075 - t1076;
-    G[2] = t1077;
-    const real t1078 = t48 * t174;
-    const real t1079 = t48 * t175;
-    const real t1080 = t128 - t1079;
-    const real t1081 = t292 * t1080;
-    const real t1082 = t48 * t273;
-    const real t1083 = t227 - t1082;
-    const real t1084 = t293 * t1080;
-    const real t1085 = t1083 - t1084;
-    const real t1086 = t431 * t1085;
-    const real t1087 = t48 * t391;
-    const real t1088 = t345 - t1087;
-    const real t1089 = t410 * t1080;
-    const real t1090 = t1088 - t1089;
-    const real t1091 = t432 * t1085;
-    const real t1092 = t1090 - t1091;
-    const real t1093 = t593 * t1092;
-    const real t1094 = t48 * t530;
-    const real t1095 = t484 - t1094;
-    const real t1096 = t549 * t1080;
-    const real t1097 = t1095 - t1096;
-    const real t1098 = t570 * t1085;
-    const real t1099 = t1097 - t1098;
-    const real t1100 = t594 * t1092;
-    const real t1101 = t1099 - t1100;
-    const real t1102 = t780 * t1101;
-    const real t1103 = t48 * t692;
-    const real t1104 = t646 - t1103;
-    const real t1105 = t711 * t1080;
-    const real t1106 = t1104 - t1105;
-    const real t1107 = t732 * t1085;
-    const real t1108 = t1106 - t1107;
-    const real t1109 = t755 * t1092;
-    const real t1110 = t1108 - t1109;
-    const real t1111 = t781 * t1101;
-    const real t1112 = t1110 - t1111;
-    const real t1113 = t879 * t1112;
-    const real t1114 = t781 * t1113;
-    const real t1115 = t1102 - t1114;
-    const real t1116 = t594 * t1115;
-    const real t1117 = t1093 - t1116;
-    const real t1118 = t755 * t1113;
-    const real t1119 = t1117 - t1118;
-    const real t1120 = t432 * t1119;
-    const real t1121 = t1086 - t1120;
-    const real t1122 = t570 * t1115;
-    const real t1123 = t1121 - t1122;
-    const real t1124 = t732 * t1113;
-    const real t1125 = t1123 - t1124;
-    const real t1126 = t293 * t1125;
-    const real t1127 = t1081 - t1126;
-    const real t1128 = t410 * t1119;
-    const real t1129 = t1127 - t1128;
-    const real t1130 = t549 * t1115;
-    const real t1131 = t1129 - t1130;
-    const real t1132 = t711 * t1113;
-    const real t1133 = t1131 - t1132;
-    const real t1134 = t175 * t1133;
-    const real t1135 = t1078 - t1134;
-    const real t1136 = t273 * t1125;
-    const real t1137 = t1135 - t1136;
-    const real t1138 = t391 * t1119;
-    const real t1139 = t1137 - t1138;
-    const real t1140 = t530 * t1115;
-    const real t1141 = t1139 - t1140;
-    const real t1142 = t692 * t1113;
-    const real t1143 = t1141 - t1142;
-    G[3] = t1143;
-    const real t1144 = t61 * t174;
-    const real t1145 = t61 * t175;
-    const real t1146 = t141 - t1145;
-    const real t1147 = t292 * t1146;
-    const real t1148 = t61 * t273;
-    const real t1149 = t240 - t1148;
-    const real t1150 = t293 * t1146;
-    const real t1151 = t1149 - t1150;
-    const real t1152 = t431 * t1151;
-    const real t1153 = t61 * t391;
-    const real t1154 = t358 - t1153;
-    const real t1155 = t410 * t1146;
-    const real t1156 = t1154 - t1155;
-    const real t1157 = t432 * t1151;
-    const real t1158 = t1156 - t1157;
-    const real t1159 = t593 * t1158;
-    const real t1160 = t61 * t530;
-    const real t1161 = t497 - t1160;
-    const real t1162 = t549 * t1146;
-    const real t1163 = t1161 - t1162;
-    const real t1164 = t570 * t1151;
-    const real t1165 = t1163 - t1164;
-    const real t1166 = t594 * t1158;
-    const real t1167 = t1165 - t1166;
-    const real t1168 = t780 * t1167;
-    const real t1169 = t61 * t692;
-    const real t1170 = t659 - t1169;
-    const real t1171 = t711 * t1146;
-    const real t1172 = t1170 - t1171;
-    const real t1173 = t732 * t1151;
-    const real t1174 = t1172 - t1173;
-    const real t1175 = t755 * t1158;
-    const real t1176 = t1174 - t1175;
-    const real t1177 = t781 * t1167;
-    const real t1178 = t1176 - t1177;
-    const real t1179 = t879 * t1178;
-    const real t1180 = t781 * t1179;
-    const real t1181 = t1168 - t1180;
-    const real t1182 = t594 * t1181;
-    const real t1183 = t1159 - t1182;
-    const real t1184 = t755 * t1179;
-    const real t1185 = t1183 - t1184;
-    const real t1186 = t432 * t1185;
-    const real t1187 = t1152 - t1186;
-    const real t1188 = t570 * t1181;
-    const real t1189 = t1187 - t1188;
-    const real t1190 = t732 * t1179;
-    const real t1191 = t1189 - t1190;
-    const real t1192 = t293 * t1191;
-    const real t1193 = t1147 - t1192;
-    const real t1194 = t410 * t1185;
-    const real t1195 = t1193 - t1194;
-    const real t1196 = t549 * t1181;
-    const real t1197 = t1195 - t1196;
-    const real t1198 = t711 * t1179;
-    const real t1199 = t1197 - t1198;
-    const real t1200 = t175 * t1199;
-    const real t1201 = t1144 - t1200;
-    const real t1202 = t273 * t1191;
-    const real t1203 = t1201 - t1202;
-    const real t1204 = t391 * t1185;
-    const real t1205 = t1203 - t1204;
-    const real t1206 = t530 * t1181;
-    const real t1207 = t1205 - t1206;
-    const real t1208 = t692 * t1179;
-    const real t1209 = t1207 - t1208;
-    G[4] = t1209;
-    const real t1210 = t74 * t174;
-    const real t1211 = t74 * t175;
-    const real t1212 = t154 - t1211;
-    const real t1213 = t292 * t1212;
-    const real t1214 = t74 * t273;
-    const real t1215 = t253 - t1214;
-    const real t1216 = t293 * t1212;
-    const real t1217 = t1215 - t1216;
-    const real t1218 = t431 * t1217;
-    const real t1219 = t74 * t391;
-    const real t1220 = t371 - t1219;
-    const real t1221 = t410 * t1212;
-    const real t1222 = t1220 - t1221;
-    const real t1223 = t432 * t1217;
-    const real t1224 = t1222 - t1223;
-    const real t1225 = t593 * t1224;
-    const real t1226 = t74 * t530;
-    const real t1227 = t510 - t1226;
-    const real t1228 = t549 * t1212;
-    const real t1229 = t1227 - t1228;
-    const real t1230 = t570 * t1217;
-    const real t1231 = t1229 - t1230;
-    const real t1232 = t594 * t1224;
-    const real t1233 = t1231 - t1232;
-    const real t1234 = t780 * t1233;
-    const real t1235 = t74 * t692;
-    const real t1236 = t672 - t1235;
-    const real t1237 = t711 * t1212;
-    const real t1238 = t1236 - t1237;
-    const real t1239 = t732 * t1217;
-    const real t1240 = t1238 - t1239;
-    const real t1241 = t755 * t1224;
-    const real t1242 = t1240 - t1241;
-    const real t1243 = t781 * t1233;
-    const real t1244 = t1242 - t1243;
-    const real t1245 = t879 * t1244;
-    const real t1246 = t781 * t1245;
-    const real t1247 = t1234 - t1246;
-    const real t1248 = t594 * t1247;
-    const real t1249 = t1225 - t1248;
-    const real t1250 = t755 * t1245;
-    const real t1251 = t1249 - t1250;
-    const real t1252 = t432 * t1251;
-    const real t1253 = t1218 - t1252;
-    const real t1254 = t570 * t1247;
-    const real t1255 = t1253 - t1254;
-    const real t1256 = t732 * t1245;
-    const real t1257 = t1255 - t1256;
-    const real t1258 = t293 * t1257;
-    const real t1259 = t1213 - t1258;
-    const real t1260 = t410 * t1251;
-    const real t1261 = t1259 - t1260;
-    const real t1262 = t549 * t1247;
-    const real t1263 = t1261 - t1262;
-    const real t1264 = t711 * t1245;
-    const real t1265 = t1263 - t1264;
-    const real t1266 = t175 * t1265;
-    const real t1267 = t1210 - t1266;
-    const real t1268 = t273 * t1257;
-    const real t1269 = t1267 - t1268;
-    const real t1270 = t391 * t1251;
-    const real t1271 = t1269 - t1270;
-    const real t1272 = t530 * t1247;
-    const real t1273 = t1271 - t1272;
-    const real t1274 = t692 * t1245;
-    const real t1275 = t1273 - t1274;
-    G[5] = t1275;
-    G[6] = t935;
-    G[7] = t1001;
-    G[8] = t1067;
-    G[9] = t1133;
-    G[10] = t1199;
-    G[11] = t1265;
-    G[12] = t927;
-    G[13] = t993;
-    G[14] = t1059;
-    G[15] = t1125;
-    G[16] = t1191;
-    G[17] = t1257;
-    G[18] = t921;
-    G[19] = t987;
-    G[20] = t1053;
-    G[21] = t1119;
-    G[22] = t1185;
-    G[23] = t1251;
-    G[24] = t917;
-    G[25] = t983;
-    G[26] = t1049;
-    G[27] = t1115;
-    G[28] = t1181;
-    G[29] = t1247;
-    G[30] = t915;
-    G[31] = t981;
-    G[32] = t1047;
-    G[33] = t1113;
-    G[34] = t1179;
-    G[35] = t1245;
-    const real t1276 = t10 * t880;
-    const real t1277 = t882 * t883;
-    const real t1278 = t1276 + t1277;
-    const real t1279 = t887 * t888;
-    const real t1280 = t1278 + t1279;
-    const real t1281 = t894 * t895;
-    const real t1282 = t1280 + t1281;
-    const real t1283 = t903 * t904;
-    const real t1284 = t1282 + t1283;
-    const real t1285 = t914 * t915;
-    const real t1286 = t1284 + t1285;
-    const real t1287 = S[0] - t1286;
-    const real t1288 = Rc[0] * t1287;
-    const real t1289 = t10 * t946;
-    const real t1290 = t882 * t949;
-    const real t1291 = t1289 + t1290;
-    const real t1292 = t887 * t954;
-    const real t1293 = t1291 + t1292;
-    const real t1294 = t894 * t961;
-    const real t1295 = t1293 + t1294;
-    const real t1296 = t903 * t970;
-    const real t1297 = t1295 + t1296;
-    const real t1298 = t914 * t981;
-    const real t1299 = t1297 + t1298;
-    const real t1300 = S[1] - t1299;
-    const real t1301 = Rc[1] * t1300;
-    const real t1302 = t1288 + t1301;
-    const real t1303 = t10 * t1012;
-    const real t1304 = t882 * t1015;
-    const real t1305 = t1303 + t1304;
-    const real t1306 = t887 * t1020;
-    const real t1307 = t1305 + t1306;
-    const real t1308 = t894 * t1027;
-    const real t1309 = t1307 + t1308;
-    const real t1310 = t903 * t1036;
-    const real t1311 = t1309 + t1310;
-    const real t1312 = t914 * t1047;
-    const real t1313 = t1311 + t1312;
-    const real t1314 = S[2] - t1313;
-    const real t1315 = Rc[2] * t1314;
-    const real t1316 = t1302 + t1315;
-    const real t1317 = Rc[0] * t1316;
-    const real t1318 = Rc[0] * t1300;
-    const real t1319 = t22 * t946;
-    const real t1320 = t948 * t949;
-    const real t1321 = t1319 + t1320;
-    const real t1322 = t953 * t954;
-    const real t1323 = t1321 + t1322;
-    const real t1324 = t960 * t961;
-    const real t1325 = t1323 + t1324;
-    const real t1326 = t969 * t970;
-    const real t1327 = t1325 + t1326;
-    const real t1328 = t980 * t981;
-    const real t1329 = t1327 + t1328;
-    const real t1330 = S[6] - t1329;
-    const real t1331 = Rc[1] * t1330;
-    const real t1332 = t1318 + t1331;
-    const real t1333 = t22 * t1012;
-    const real t1334 = t948 * t1015;
-    const real t1335 = t1333 + t1334;
-    const real t1336 = t953 * t1020;
-    const real t1337 = t1335 + t1336;
-    const real t1338 = t960 * t1027;
-    const real t1339 = t1337 + t1338;
-    const real t1340 = t969 * t1036;
-    const real t1341 = t1339 + t1340;
-    const real t1342 = t980 * t1047;
-    const real t1343 = t1341 + t1342;
-    const real t1344 = S[7] - t1343;
-    const real t1345 = Rc[2] * t1344;
-    const real t1346 = t1332 + t1345;
-    const real t1347 = Rc[1] * t1346;
-    const real t1348 = t1317 + t1347;
-    const real t1349 = Rc[0] * t1314;
-    const real t1350 = Rc[1] * t1344;
-    const real t1351 = t1349 + t1350;
-    const real t1352 = t35 * t1012;
-    const real t1353 = t1014 * t1015;
-    const real t1354 = t1352 + t1353;
-    const real t1355 = t1019 * t1020;
-    const real t1356 = t1354 + t1355;
-    const real t1357 = t1026 * t1027;
-    const real t1358 = t1356 + t1357;
-    const real t1359 = t1035 * t1036;
-    const real t1360 = t1358 + t1359;
-    const real t1361 = t1046 * t1047;
-    const real t1362 = t1360 + t1361;
-    const real t1363 = S[11] - t1362;
-    const real t1364 = Rc[2] * t1363;
-    const real t1365 = t1351 + t1364;
-    const real t1366 = Rc[2] * t1365;
-    const real t1367 = t1348 + t1366;
-    S_I[0] += t1367;
-    const real t1368 = Rc[3] * t1316;
-    const real t1369 = Rc[4] * t1346;
-    const real t1370 = t1368 + t1369;
-    const real t1371 = Rc[5] * t1365;
-    const real t1372 = t1370 + t1371;
-    S_I[1] += t1372;
-    const real t1373 = Rc[6] * t1316;
-    const real t1374 = Rc[7] * t1346;
-    const real t1375 = t1373 + t1374;
-    const real t1376 = Rc[8] * t1365;
-    const real t1377 = t1375 + t1376;
-    S_I[2] += t1377;
-    const real t1378 = t10 * t1078;
-    const real t1379 = t882 * t1081;
-    const real t1380 = t1378 + t1379;
-    const real t1381 = t887 * t1086;
-    const real t1382 = t1380 + t1381;
-    const real t1383 = t894 * t1093;
-    const real t1384 = t1382 + t1383;
-    const real t1385 = t903 * t1102;
-    const real t1386 = t1384 + t1385;
-    const real t1387 = t914 * t1113;
-    const real t1388 = t1386 + t1387;
-    const real t1389 = S[3] - t1388;
-    const real t1390 = Rc[0] * t1389;
-    const real t1391 = t22 * t1078;
-    const real t1392 = t948 * t1081;
-    const real t1393 = t1391 + t1392;
-    const real t1394 = t953 * t1086;
-    const real t1395 = t1393 + t1394;
-    const real t1396 = t960 * t1093;
-    const real t1397 = t1395 + t1396;
-    const real t1398 = t969 * t1102;
-    const real t1399 = t1397 + t1398;
-    const real t1400 = t980 * t1113;
-    const real t1401 = t1399 + t1400;
-    const real t1402 = S[8] - t1401;
-    const real t1403 = Rc[1] * t1402;
-    const real t1404 = t1390 + t1403;
-    const real t1405 = t35 * t1078;
-    const real t1406 = t1014 * t1081;
-    const real t1407 = t1405 + t1406;
-    const real t1408 = t1019 * t1086;
-    const real t1409 = t1407 + t1408;
-    const real t1410 = t1026 * t1093;
-    const real t1411 = t1409 + t1410;
-    const real t1412 = t1035 * t1102;
-    const real t1413 = t1411 + t1412;
-    const real t1414 = t1046 * t1113;
-    const real t1415 = t1413 + t1414;
-    const real t1416 = S[12] - t1415;
-    const real t1417 = Rc[2] * t1416;
-    const real t1418 = t1404 + t1417;
-    const real t1419 = Rc[0] * t1418;
-    const real t1420 = t10 * t1144;
-    const real t1421 = t882 * t1147;
-    const real t1422 = t1420 + t1421;
-    const real t1423 = t887 * t1152;
-    const real t1424 = t1422 + t1423;
-    const real t1425 = t894 * t1159;
-    const real t1426 = t1424 + t1425;
-    const real t1427 = t903 * t1168;
-    const real t1428 = t1426 + t1427;
-    const real t1429 = t914 * t1179;
-    const real t1430 = t1428 + t1429;
-    const real t1431 = S[4] - t1430;
-    const real t1432 = Rc[0] * t1431;
-    const real t1433 = t22 * t1144;
-    const real t1434 = t948 * t1147;
-    const real t1435 = t1433 + t1434;
-    const real t1436 = t953 * t1152;
-    const real t1437 = t1435 + t1436;
-    const real t1438 = t960 * t1159;
-    const real t1439 = t1437 + t1438;
-    const real t1440 = t969 * t1168;
-    const real t1441 = t1439 + t1440;
-    const real t1442 = t980 * t1179;
-    const real t1443 = t1441 + t1442;
-    const real t1444 = S[9] - t1443;
-    const real t1445 = Rc[1] * t1444;
-    const real t1446 = t1432 + t1445;
-    const real t1447 = t35 * t1144;
-    const real t1448 = t1014 * t1147;
-    const real t1449 = t1447 + t1448;
-    const real t1450 = t1019 * t1152;
-    const real t1451 = t1449 + t1450;
-    const real t1452 = t1026 * t1159;
-    const real t1453 = t1451 + t1452;
-    const real t1454 = t1035 * t1168;
-    const real t1455 = t1453 + t1454;
-    const real t1456 = t1046 * t1179;
-    const real t1457 = t1455 + t1456;
-    const real t1458 = S[13] - t1457;
-    const real t1459 = Rc[2] * t1458;
-    const real t1460 = t1446 + t1459;
-    const real t1461 = Rc[1] * t1460;
-    const real t1462 = t1419 + t1461;
-    const real t1463 = t10 * t1210;
-    const real t1464 = t882 * t1213;
-    const real t1465 = t1463 + t1464;
-    const real t1466 = t887 * t1218;
-    const real t1467 = t1465 + t1466;
-    const real t1468 = t894 * t1225;
-    const real t1469 = t1467 + t1468;
-    const real t1470 = t903 * t1234;
-    const real t1471 = t1469 + t1470;
-    const real t1472 = t914 * t1245;
-    const real t1473 = t1471 + t1472;
-    const real t1474 = S[5] - t1473;
-    const real t1475 = Rc[0] * t1474;
-    const real t1476 = t22 * t1210;
-    const real t1477 = t948 * t1213;
-    const real t1478 = t1476 + t1477;
-    const real t1479 = t953 * t1218;
-    const real t1480 = t1478 + t1479;
-    const real t1481 = t960 * t1225;
-    const real t1482 = t1480 + t1481;
-    const real t1483 = t969 * t1234;
-    const real t1484 = t1482 + t1483;
-    const real t1485 = t980 * t1245;
-    const real t1486 = t1484 + t1485;
-    const real t1487 = S[10] - t1486;
-    const real t1488 = Rc[1] * t1487;
-    const real t1489 = t1475 + t1488;
-    const real t1490 = t35 * t1210;
-    const real t1491 = t1014 * t1213;
-    const real t1492 = t1490 + t1491;
-    const real t1493 = t1019 * t1218;
-    const real t1494 = t1492 + t1493;
-    const real t1495 = t1026 * t1225;
-    const real t1496 = t1494 + t1495;
-    const real t1497 = t1035 * t1234;
-    const real t1498 = t1496 + t1497;
-    const real t1499 = t1046 * t1245;
-    const real t1500 = t1498 + t1499;
-    const real t1501 = S[14] - t1500;
-    const real t1502 = Rc[2] * t1501;
-    const real t1503 = t1489 + t1502;
-    const real t1504 = Rc[2] * t1503;
-    const real t1505 = t1462 + t1504;
-    const real t1506 = r[1] * t1377;
-    const real t1507 = r[2] * t1372;
-    const real t1508 = t1506 - t1507;
-    const real t1509 = t1505 + t1508;
-    S_I[3] += t1509;
-    const real t1510 = Rc[3] * t1418;
-    const real t1511 = Rc[4] * t1460;
-    const real t1512 = t1510 + t1511;
-    const real t1513 = Rc[5] * t1503;
-    const real t1514 = t1512 + t1513;
-    const real t1515 = r[2] * t1367;
-    const real t1516 = r[0] * t1377;
-    const real t1517 = t1515 - t1516;
-    const real t1518 = t1514 + t1517;
-    S_I[4] += t1518;
-    const real t1519 = Rc[6] * t1418;
-    const real t1520 = Rc[7] * t1460;
-    const real t1521 = t1519 + t1520;
-    const real t1522 = Rc[8] * t1503;
-    const real t1523 = t1521 + t1522;
-    const real t1524 = r[0] * t1372;
-    const real t1525 = r[1] * t1367;
-    const real t1526 = t1524 - t1525;
-    const real t1527 = t1523 + t1526;
-    S_I[5] += t1527;
-    const real t1528 = Rc[3] * t1287;
-    const real t1529 = Rc[4] * t1300;
-    const real t1530 = t1528 + t1529;
-    const real t1531 = Rc[5] * t1314;
-    const real t1532 = t1530 + t1531;
-    const real t1533 = Rc[3] * t1532;
-    const real t1534 = Rc[3] * t1300;
-    const real t1535 = Rc[4] * t1330;
-    const real t1536 = t1534 + t1535;
-    const real t1537 = Rc[5] * t1344;
-    const real t1538 = t1536 + t1537;
-    const real t1539 = Rc[4] * t1538;
-    const real t1540 = t1533 + t1539;
-    const real t1541 = Rc[3] * t1314;
-    const real t1542 = Rc[4] * t1344;
-    const real t1543 = t1541 + t1542;
-    const real t1544 = Rc[5] * t1363;
-    const real t1545 = t1543 + t1544;
-    const real t1546 = Rc[5] * t1545;
-    const real t1547 = t1540 + t1546;
-    S_I[6] += t1547;
-    const real t1548 = Rc[6] * t1532;
-    const real t1549 = Rc[7] * t1538;
-    const real t1550 = t1548 + t1549;
-    const real t1551 = Rc[8] * t1545;
-    const real t1552 = t1550 + t1551;
-    S_I[7] += t1552;
-    const real t1553 = Rc[3] * t1389;
-    const real t1554 = Rc[4] * t1402;
-    const real t1555 = t1553 + t1554;
-    const real t1556 = Rc[5] * t1416;
-    const real t1557 = t1555 + t1556;
-    const real t1558 = Rc[0] * t1557;
-    const real t1559 = Rc[3] * t1431;
-    const real t1560 = Rc[4] * t1444;
-    const real t1561 = t1559 + t1560;
-    const real t1562 = Rc[5] * t1458;
-    const real t1563 = t1561 + t1562;
-    const real t1564 = Rc[1] * t1563;
-    const real t1565 = t1558 + t1564;
-    const real t1566 = Rc[3] * t1474;
-    const real t1567 = Rc[4] * t1487;
-    const real t1568 = t1566 + t1567;
-    const real t1569 = Rc[5] * t1501;
-    const real t1570 = t1568 + t1569;
-    const real t1571 = Rc[2] * t1570;
-    const real t1572 = t1565 + t1571;
-    const real t1573 = r[1] * t1552;
-    const real t1574 = r[2] * t1547;
-    const real t1575 = t1573 - t1574;
-    const real t1576 = t1572 + t1575;
-    S_I[8] += t1576;
-    const real t1577 = Rc[3] * t1557;
-    const real t1578 = Rc[4] * t1563;
-    const real t1579 = t1577 + t1578;
-    const real t1580 = Rc[5] * t1570;
-    const real t1581 = t1579 + t1580;
-    const real t1582 = r[0] * t1552;
-    const real t1583 = t1507 - t1582;
-    const real t1584 = t1581 + t1583;
-    S_I[9] += t1584;
-    const real t1585 = Rc[6] * t1557;
-    const real t1586 = Rc[7] * t1563;
-    const real t1587 = t1585 + t1586;
-    const real t1588 = Rc[8] * t1570;
-    const real t1589 = t1587 + t1588;
-    const real t1590 = r[0] * t1547;
-    const real t1591 = r[1] * t1372;
-    const real t1592 = t1590 - t1591;
-    const real t1593 = t1589 + t1592;
-    S_I[10] += t1593;
-    const real t1594 = Rc[6] * t1287;
-    const real t1595 = Rc[7] * t1300;
-    const real t1596 = t1594 + t1595;
-    const real t1597 = Rc[8] * t1314;
-    const real t1598 = t1596 + t1597;
-    const real t1599 = Rc[6] * t1598;
-    const real t1600 = Rc[6] * t1300;
-    const real t1601 = Rc[7] * t1330;
-    const real t1602 = t1600 + t1601;
-    const real t1603 = Rc[8] * t1344;
-    const real t1604 = t1602 + t1603;
-    const real t1605 = Rc[7] * t1604;
-    const real t1606 = t1599 + t1605;
-    const real t1607 = Rc[6] * t1314;
-    const real t1608 = Rc[7] * t1344;
-    const real t1609 = t1607 + t1608;
-    const real t1610 = Rc[8] * t1363;
-    const real t1611 = t1609 + t1610;
-    const real t1612 = Rc[8] * t1611;
-    const real t1613 = t1606 + t1612;
-    S_I[11] += t1613;
-    const real t1614 = Rc[6] * t1389;
-    const real t1615 = Rc[7] * t1402;
-    const real t1616 = t1614 + t1615;
-    const real t1617 = Rc[8] * t1416;
-    const real t1618 = t1616 + t1617;
-    const real t1619 = Rc[0] * t1618;
-    const real t1620 = Rc[6] * t1431;
-    const real t1621 = Rc[7] * t1444;
-    const real t1622 = t1620 + t1621;
-    const real t1623 = Rc[8] * t1458;
-    const real t1624 = t1622 + t1623;
-    const real t1625 = Rc[1] * t1624;
-    const real t1626 = t1619 + t1625;
-    const real t1627 = Rc[6] * t1474;
-    const real t1628 = Rc[7] * t1487;
-    const real t1629 = t1627 + t1628;
-    const real t1630 = Rc[8] * t1501;
-    const real t1631 = t1629 + t1630;
-    const real t1632 = Rc[2] * t1631;
-    const real t1633 = t1626 + t1632;
-    const real t1634 = r[1] * t1613;
-    const real t1635 = r[2] * t1552;
-    const real t1636 = t1634 - t1635;
-    const real t1637 = t1633 + t1636;
-    S_I[12] += t1637;
-    const real t1638 = Rc[3] * t1618;
-    const real t1639 = Rc[4] * t1624;
-    const real t1640 = t1638 + t1639;
-    const real t1641 = Rc[5] * t1631;
-    const real t1642 = t1640 + t1641;
-    const real t1643 = r[2] * t1377;
-    const real t1644 = r[0] * t1613;
-    const real t1645 = t1643 - t1644;
-    const real t1646 = t1642 + t1645;
-    S_I[13] += t1646;
-    const real t1647 = Rc[6] * t1618;
-    const real t1648 = Rc[7] * t1624;
-    const real t1649 = t1647 + t1648;
-    const real t1650 = Rc[8] * t1631;
-    const real t1651 = t1649 + t1650;
-    const real t1652 = t1582 - t1506;
-    const real t1653 = t1651 + t1652;
-    S_I[14] += t1653;
-    const real t1654 = t48 * t1078;
-    const real t1655 = t1080 * t1081;
-    const real t1656 = t1654 + t1655;
-    const real t1657 = t1085 * t1086;
-    const real t1658 = t1656 + t1657;
-    const real t1659 = t1092 * t1093;
-    const real t1660 = t1658 + t1659;
-    const real t1661 = t1101 * t1102;
-    const real t1662 = t1660 + t1661;
-    const real t1663 = t1112 * t1113;
-    const real t1664 = t1662 + t1663;
-    const real t1665 = S[15] - t1664;
-    const real t1666 = Rc[0] * t1665;
-    const real t1667 = t48 * t1144;
-    const real t1668 = t1080 * t1147;
-    const real t1669 = t1667 + t1668;
-    const real t1670 = t1085 * t1152;
-    const real t1671 = t1669 + t1670;
-    const real t1672 = t1092 * t1159;
-    const real t1673 = t1671 + t1672;
-    const real t1674 = t1101 * t1168;
-    const real t1675 = t1673 + t1674;
-    const real t1676 = t1112 * t1179;
-    const real t1677 = t1675 + t1676;
-    const real t1678 = S[16] - t1677;
-    const real t1679 = Rc[1] * t1678;
-    const real t1680 = t1666 + t1679;
-    const real t1681 = t48 * t1210;
-    const real t1682 = t1080 * t1213;
-    const real t1683 = t1681 + t1682;
-    const real t1684 = t1085 * t1218;
-    const real t1685 = t1683 + t1684;
-    const real t1686 = t1092 * t1225;
-    const real t1687 = t1685 + t1686;
-    const real t1688 = t1101 * t1234;
-    const real t1689 = t1687 + t1688;
-    const real t1690 = t1112 * t1245;
-    const real t1691 = t1689 + t1690;
-    const real t1692 = S[17] - t1691;
-    const real t1693 = Rc[2] * t1692;
-    const real t1694 = t1680 + t1693;
-    const real t1695 = Rc[0] * t1694;
-    const real t1696 = Rc[0] * t1678;
-    const real t1697 = t61 * t1144;
-    const real t1698 = t1146 * t1147;
-    const real t1699 = t1697 + t1698;
-    const real t1700 = t1151 * t1152;
-    const real t1701 = t1699 + t1700;
-    const real t1702 = t1158 * t1159;
-    const real t1703 = t1701 + t1702;
-    const real t1704 = t1167 * t1168;
-    const real t1705 = t1703 + t1704;
-    const real t1706 = t1178 * t1179;
-    const real t1707 = t1705 + t1706;
-    const real t1708 = S[18] - t1707;
-    const real t1709 = Rc[1] * t1708;
-    const real t1710 = t1696 + t1709;
-    const real t1711 = t61 * t1210;
-    const real t1712 = t1146 * t1213;
-    const real t1713 = t1711 + t1712;
-    const real t1714 = t1151 * t1218;
-    const real t1715 = t1713 + t1714;
-    const real t1716 = t1158 * t1225;
-    const real t1717 = t1715 + t1716;
-    const real t1718 = t1167 * t1234;
-    const real t1719 = t1717 + t1718;
-    const real t1720 = t1178 * t1245;
-    const real t1721 = t1719 + t1720;
-    const real t1722 = S[19] - t1721;
-    const real t1723 = Rc[2] * t1722;
-    const real t1724 = t1710 + t1723;
-    const real t1725 = Rc[1] * t1724;
-    const real t1726 = t1695 + t1725;
-    const real t1727 = Rc[0] * t1692;
-    const real t1728 = Rc[1] * t1722;
-    const real t1729 = t1727 + t1728;
-    const real t1730 = t74 * t1210;
-    const real t1731 = t1212 * t1213;
-    const real t1732 = t1730 + t1731;
-    const real t1733 = t1217 * t1218;
-    const real t1734 = t1732 + t1733;
-    const real t1735 = t1224 * t1225;
-    const real t1736 = t1734 + t1735;
-    const real t1737 = t1233 * t1234;
-    const real t1738 = t1736 + t1737;
-    const real t1739 = t1244 * t1245;
-    const real t1740 = t1738 + t1739;
-    const real t1741 = S[20] - t1740;
-    const real t1742 = Rc[2] * t1741;
-    const real t1743 = t1729 + t1742;
-    const real t1744 = Rc[2] * t1743;
-    const real t1745 = t1726 + t1744;
-    const real t1746 = r[1] * t1637;
-    const real t1747 = r[2] * t1576;
-    const real t1748 = t1746 - t1747;
-    const real t1749 = r[1] * t1633;
-    const real t1750 = r[2] * t1572;
-    const real t1751 = t1749 - t1750;
-    const real t1752 = t1748 + t1751;
-    const real t1753 = t1745 + t1752;
-    S_I[15] += t1753;
-    const real t1754 = Rc[3] * t1694;
-    const real t1755 = Rc[4] * t1724;
-    const real t1756 = t1754 + t1755;
-    const real t1757 = Rc[5] * t1743;
-    const real t1758 = t1756 + t1757;
-    const real t1759 = r[1] * t1646;
-    const real t1760 = r[2] * t1584;
-    const real t1761 = t1759 - t1760;
-    const real t1762 = r[2] * t1505;
-    const real t1763 = r[0] * t1633;
-    const real t1764 = t1762 - t1763;
-    const real t1765 = t1761 + t1764;
-    const real t1766 = t1758 + t1765;
-    S_I[16] += t1766;
-    const real t1767 = Rc[6] * t1694;
-    const real t1768 = Rc[7] * t1724;
-    const real t1769 = t1767 + t1768;
-    const real t1770 = Rc[8] * t1743;
-    const real t1771 = t1769 + t1770;
-    const real t1772 = r[1] * t1653;
-    const real t1773 = r[2] * t1593;
-    const real t1774 = t1772 - t1773;
-    const real t1775 = r[0] * t1572;
-    const real t1776 = r[1] * t1505;
-    const real t1777 = t1775 - t1776;
-    const real t1778 = t1774 + t1777;
-    const real t1779 = t1771 + t1778;
-    S_I[17] += t1779;
-    const real t1780 = Rc[3] * t1665;
-    const real t1781 = Rc[4] * t1678;
-    const real t1782 = t1780 + t1781;
-    const real t1783 = Rc[5] * t1692;
-    const real t1784 = t1782 + t1783;
-    const real t1785 = Rc[3] * t1784;
-    const real t1786 = Rc[3] * t1678;
-    const real t1787 = Rc[4] * t1708;
-    const real t1788 = t1786 + t1787;
-    const real t1789 = Rc[5] * t1722;
-    const real t1790 = t1788 + t1789;
-    const real t1791 = Rc[4] * t1790;
-    const real t1792 = t1785 + t1791;
-    const real t1793 = Rc[3] * t1692;
-    const real t1794 = Rc[4] * t1722;
-    const real t1795 = t1793 + t1794;
-    const real t1796 = Rc[5] * t1741;
-    const real t1797 = t1795 + t1796;
-    const real t1798 = Rc[5] * t1797;
-    const real t1799 = t1792 + t1798;
-    const real t1800 = r[2] * t1518;
-    const real t1801 = r[0] * t1646;
-    const real t1802 = t1800 - t1801;
-    const real t1803 = r[2] * t1514;
-    const real t1804 = r[0] * t1642;
-    const real t1805 = t1803 - t1804;
-    const real t1806 = t1802 + t1805;
-    const real t1807 = t1799 + t1806;
-    S_I[18] += t1807;
-    const real t1808 = Rc[6] * t1784;
-    const real t1809 = Rc[7] * t1790;
-    const real t1810 = t1808 + t1809;
-    const real t1811 = Rc[8] * t1797;
-    const real t1812 = t1810 + t1811;
-    const real t1813 = r[2] * t1527;
-    const real t1814 = r[0] * t1653;
-    const real t1815 = t1813 - t1814;
-    const real t1816 = r[0] * t1581;
-    const real t1817 = r[1] * t1514;
-    const real t1818 = t1816 - t1817;
-    const real t1819 = t1815 + t1818;
-    const real t1820 = t1812 + t1819;
-    S_I[19] += t1820;
-    const real t1821 = Rc[6] * t1665;
-    const real t1822 = Rc[7] * t1678;
-    const real t1823 = t1821 + t1822;
-    const real t1824 = Rc[8] * t1692;
-    const real t1825 = t1823 + t1824;
-    const real t1826 = Rc[6] * t1825;
-    const real t1827 = Rc[6] * t1678;
-    const real t1828 = Rc[7] * t1708;
-    const real t1829 = t1827 + t1828;
-    const real t1830 = Rc[8] * t1722;
-    const real t1831 = t1829 + t1830;
-    const real t1832 = Rc[7] * t1831;
-    const real t1833 = t1826 + t1832;
-    const real t1834 = Rc[6] * t1692;
-    const real t1835 = Rc[7] * t1722;
-    const real t1836 = t1834 + t1835;
-    const real t1837 = Rc[8] * t1741;
-    const real t1838 = t1836 + t1837;
-    const real t1839 = Rc[8] * t1838;
-    const real t1840 = t1833 + t1839;
-    const real t1841 = r[0] * t1593;
-    const real t1842 = r[1] * t1527;
-    const real t1843 = t1841 - t1842;
-    const real t1844 = r[0] * t1589;
-    const real t1845 = r[1] * t1523;
-    const real t1846 = t1844 - t1845;
-    const real t1847 = t1843 + t1846;
-    const real t1848 = t1840 + t1847;
-    S_I[20] += t1848;
-    return 0;
+  real t10 = H[0] * S[0] + H[6] * S[1] + H[12] * S[2] + H[18] * S[3] + H[24] * S[4] + H[30] * S[5];
+  real t22 = H[0] * S[1] + H[6] * S[6] + H[12] * S[7] + H[18] * S[8] + H[24] * S[9] + H[30] * S[10];
+  real t35 = H[0] * S[2] + H[6] * S[7] + H[12] * S[11] + H[18] * S[12] + H[24] * S[13] + H[30] *
+    S[14];
+  real t48 = H[0] * S[3] + H[6] * S[8] + H[12] * S[12] + H[18] * S[15] + H[24] * S[16] + H[30] *
+    S[17];
+  real t61 = H[0] * S[4] + H[6] * S[9] + H[12] * S[13] + H[18] * S[16] + H[24] * S[18] + H[30] *
+    S[19];
+  real t74 = H[0] * S[5] + H[6] * S[10] + H[12] * S[14] + H[18] * S[17] + H[24] * S[19] + H[30] *
+    S[20];
+  real t78 = H[0] * t10 + H[6] * t22 + H[12] * t35 + H[18] * t48 + H[24] * t61 + H[30] * t74 + (J[0]
+    - W[0]);
+  if (!((0.0 < t78))) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  real t90 = H[1] * S[0] + H[7] * S[1] + H[13] * S[2] + H[19] * S[3] + H[25] * S[4] + H[31] * S[5];
+  real t102 = H[1] * S[1] + H[7] * S[6] + H[13] * S[7] + H[19] * S[8] + H[25] * S[9] + H[31] *
+    S[10];
+  real t115 = H[1] * S[2] + H[7] * S[7] + H[13] * S[11] + H[19] * S[12] + H[25] * S[13] + H[31] *
+    S[14];
+  real t128 = H[1] * S[3] + H[7] * S[8] + H[13] * S[12] + H[19] * S[15] + H[25] * S[16] + H[31] *
+    S[17];
+  real t141 = H[1] * S[4] + H[7] * S[9] + H[13] * S[13] + H[19] * S[16] + H[25] * S[18] + H[31] *
+    S[19];
+  real t154 = H[1] * S[5] + H[7] * S[10] + H[13] * S[14] + H[19] * S[17] + H[25] * S[19] + H[31] *
+    S[20];
+  real t158 = H[1] * t90 + H[7] * t102 + H[13] * t115 + H[19] * t128 + H[25] * t141 + H[31] * t154 +
+    (J[1] - W[7]);
+  real t173 = H[0] * t90 + H[6] * t102 + H[12] * t115 + H[18] * t128 + H[24] * t141 + H[30] * t154 -
+    0.5 * (W[1] + W[6]);
+  real t174 = 1.0 / t78;
+  real t175 = t173 * t174;
+  real t177 = t158 - t173 * t175;
+  if (!((t158 * ((real)1 / (real)10000000000000) < t177))) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  real t189 = H[2] * S[0] + H[8] * S[1] + H[14] * S[2] + H[20] * S[3] + H[26] * S[4] + H[32] * S[5];
+  real t201 = H[2] * S[1] + H[8] * S[6] + H[14] * S[7] + H[20] * S[8] + H[26] * S[9] + H[32] *
+    S[10];
+  real t214 = H[2] * S[2] + H[8] * S[7] + H[14] * S[11] + H[20] * S[12] + H[26] * S[13] + H[32] *
+    S[14];
+  real t227 = H[2] * S[3] + H[8] * S[8] + H[14] * S[12] + H[20] * S[15] + H[26] * S[16] + H[32] *
+    S[17];
+  real t240 = H[2] * S[4] + H[8] * S[9] + H[14] * S[13] + H[20] * S[16] + H[26] * S[18] + H[32] *
+    S[19];
+  real t253 = H[2] * S[5] + H[8] * S[10] + H[14] * S[14] + H[20] * S[17] + H[26] * S[19] + H[32] *
+    S[20];
+  real t257 = H[2] * t189 + H[8] * t201 + H[14] * t214 + H[20] * t227 + H[26] * t240 + H[32] * t253
+    + (J[2] - W[14]);
+  real t272 = H[0] * t189 + H[6] * t201 + H[12] * t214 + H[18] * t227 + H[24] * t240 + H[30] * t253
+    - 0.5 * (W[2] + W[12]);
+  real t273 = t272 * t174;
+  real t291 = H[1] * t189 + H[7] * t201 + H[13] * t214 + H[19] * t227 + H[25] * t240 + H[31] * t253
+    - 0.5 * (W[8] + W[13]) - t272 * t175;
+  real t292 = 1.0 / t177;
+  real t293 = t292 * t291;
+  real t295 = t257 - t272 * t273 - t291 * t293;
+  if (!((t257 * ((real)1 / (real)10000000000000) < t295))) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  real t307 = H[3] * S[0] + H[9] * S[1] + H[15] * S[2] + H[21] * S[3] + H[27] * S[4] + H[33] * S[5];
+  real t319 = H[3] * S[1] + H[9] * S[6] + H[15] * S[7] + H[21] * S[8] + H[27] * S[9] + H[33] *
+    S[10];
+  real t332 = H[3] * S[2] + H[9] * S[7] + H[15] * S[11] + H[21] * S[12] + H[27] * S[13] + H[33] *
+    S[14];
+  real t345 = H[3] * S[3] + H[9] * S[8] + H[15] * S[12] + H[21] * S[15] + H[27] * S[16] + H[33] *
+    S[17];
+  real t358 = H[3] * S[4] + H[9] * S[9] + H[15] * S[13] + H[21] * S[16] + H[27] * S[18] + H[33] *
+    S[19];
+  real t371 = H[3] * S[5] + H[9] * S[10] + H[15] * S[14] + H[21] * S[17] + H[27] * S[19] + H[33] *
+    S[20];
+  real t375 = H[3] * t307 + H[9] * t319 + H[15] * t332 + H[21] * t345 + H[27] * t358 + H[33] * t371
+    + (J[3] - W[21]);
+  real t390 = H[0] * t307 + H[6] * t319 + H[12] * t332 + H[18] * t345 + H[24] * t358 + H[30] * t371
+    - 0.5 * (W[3] + W[18]);
+  real t391 = t390 * t174;
+  real t409 = H[1] * t307 + H[7] * t319 + H[13] * t332 + H[19] * t345 + H[25] * t358 + H[31] * t371
+    - 0.5 * (W[9] + W[19]) - t390 * t175;
+  real t410 = t292 * t409;
+  real t430 = H[2] * t307 + H[8] * t319 + H[14] * t332 + H[20] * t345 + H[26] * t358 + H[32] * t371
+    - 0.5 * (W[15] + W[20]) - t390 * t273 - t293 * t409;
+  real t431 = 1.0 / t295;
+  real t432 = t431 * t430;
+  real t434 = t375 - t390 * t391 - t409 * t410 - t430 * t432;
+  if (!((t375 * ((real)1 / (real)10000000000000) < t434))) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  real t446 = H[4] * S[0] + H[10] * S[1] + H[16] * S[2] + H[22] * S[3] + H[28] * S[4] + H[34] *
+    S[5];
+  real t458 = H[4] * S[1] + H[10] * S[6] + H[16] * S[7] + H[22] * S[8] + H[28] * S[9] + H[34] *
+    S[10];
+  real t471 = H[4] * S[2] + H[10] * S[7] + H[16] * S[11] + H[22] * S[12] + H[28] * S[13] + H[34] *
+    S[14];
+  real t484 = H[4] * S[3] + H[10] * S[8] + H[16] * S[12] + H[22] * S[15] + H[28] * S[16] + H[34] *
+    S[17];
+  real t497 = H[4] * S[4] + H[10] * S[9] + H[16] * S[13] + H[22] * S[16] + H[28] * S[18] + H[34] *
+    S[19];
+  real t510 = H[4] * S[5] + H[10] * S[10] + H[16] * S[14] + H[22] * S[17] + H[28] * S[19] + H[34] *
+    S[20];
+  real t514 = H[4] * t446 + H[10] * t458 + H[16] * t471 + H[22] * t484 + H[28] * t497 + H[34] * t510
+    + (J[4] - W[28]);
+  real t529 = H[0] * t446 + H[6] * t458 + H[12] * t471 + H[18] * t484 + H[24] * t497 + H[30] * t510
+    - 0.5 * (W[4] + W[24]);
+  real t530 = t529 * t174;
+  real t548 = H[1] * t446 + H[7] * t458 + H[13] * t471 + H[19] * t484 + H[25] * t497 + H[31] * t510
+    - 0.5 * (W[10] + W[25]) - t529 * t175;
+  real t549 = t292 * t548;
+  real t569 = H[2] * t446 + H[8] * t458 + H[14] * t471 + H[20] * t484 + H[26] * t497 + H[32] * t510
+    - 0.5 * (W[16] + W[26]) - t529 * t273 - t293 * t548;
+  real t570 = t431 * t569;
+  real t592 = H[3] * t446 + H[9] * t458 + H[15] * t471 + H[21] * t484 + H[27] * t497 + H[33] * t510
+    - 0.5 * (W[22] + W[27]) - t529 * t391 - t410 * t548 - t432 * t569;
+  real t593 = 1.0 / t434;
+  real t594 = t593 * t592;
+  real t596 = t514 - t529 * t530 - t548 * t549 - t569 * t570 - t592 * t594;
+  if (!((t514 * ((real)1 / (real)10000000000000) < t596))) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  real t608 = H[5] * S[0] + H[11] * S[1] + H[17] * S[2] + H[23] * S[3] + H[29] * S[4] + H[35] *
+    S[5];
+  real t620 = H[5] * S[1] + H[11] * S[6] + H[17] * S[7] + H[23] * S[8] + H[29] * S[9] + H[35] *
+    S[10];
+  real t633 = H[5] * S[2] + H[11] * S[7] + H[17] * S[11] + H[23] * S[12] + H[29] * S[13] + H[35] *
+    S[14];
+  real t646 = H[5] * S[3] + H[11] * S[8] + H[17] * S[12] + H[23] * S[15] + H[29] * S[16] + H[35] *
+    S[17];
+  real t659 = H[5] * S[4] + H[11] * S[9] + H[17] * S[13] + H[23] * S[16] + H[29] * S[18] + H[35] *
+    S[19];
+  real t672 = H[5] * S[5] + H[11] * S[10] + H[17] * S[14] + H[23] * S[17] + H[29] * S[19] + H[35] *
+    S[20];
+  real t676 = H[5] * t608 + H[11] * t620 + H[17] * t633 + H[23] * t646 + H[29] * t659 + H[35] * t672
+    + (J[5] - W[35]);
+  real t691 = H[0] * t608 + H[6] * t620 + H[12] * t633 + H[18] * t646 + H[24] * t659 + H[30] * t672
+    - 0.5 * (W[5] + W[30]);
+  real t692 = t691 * t174;
+  real t710 = H[1] * t608 + H[7] * t620 + H[13] * t633 + H[19] * t646 + H[25] * t659 + H[31] * t672
+    - 0.5 * (W[11] + W[31]) - t691 * t175;
+  real t711 = t292 * t710;
+  real t731 = H[2] * t608 + H[8] * t620 + H[14] * t633 + H[20] * t646 + H[26] * t659 + H[32] * t672
+    - 0.5 * (W[17] + W[32]) - t691 * t273 - t293 * t710;
+  real t732 = t431 * t731;
+  real t754 = H[3] * t608 + H[9] * t620 + H[15] * t633 + H[21] * t646 + H[27] * t659 + H[33] * t672
+    - 0.5 * (W[23] + W[33]) - t691 * t391 - t410 * t710 - t432 * t731;
+  real t755 = t593 * t754;
+  real t779 = H[4] * t608 + H[10] * t620 + H[16] * t633 + H[22] * t646 + H[28] * t659 + H[34] * t672
+    - 0.5 * (W[29] + W[34]) - t691 * t530 - t549 * t710 - t570 * t731 - t594 * t754;
+  real t780 = 1.0 / t596;
+  real t781 = t780 * t779;
+  real t783 = t676 - t691 * t692 - t710 * t711 - t731 * t732 - t754 * t755 - t779 * t781;
+  if (!((t676 * ((real)1 / (real)10000000000000) < t783))) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  real t793 = ((real)1 / (real)300000000000000) * (S[11] + (S[0] + S[6]));
+  real t794 = (0.0 < floor_[0]) ? floor_[0] : t793;
+  real t804 = ((real)1 / (real)300000000000000) * (S[20] + (S[15] + S[18]));
+  real t805 = (0.0 < floor_[1]) ? floor_[1] : t804;
+  if (!(((H[12] * H[12] + (H[0] * H[0] + H[6] * H[6])) * t794 + (H[30] * H[30] + (H[18] * H[18] + H[24] * H[24])) * t805 < t78))) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t794 * (H[13] * H[13] + (H[1] * H[1] + H[7] * H[7])) + t805 * (H[31] * H[31] + (H[19] * H[19] + H[25] * H[25])) < t158))) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t794 * (H[14] * H[14] + (H[2] * H[2] + H[8] * H[8])) + t805 * (H[32] * H[32] + (H[20] * H[20] + H[26] * H[26])) < t257))) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t794 * (H[15] * H[15] + (H[3] * H[3] + H[9] * H[9])) + t805 * (H[33] * H[33] + (H[21] * H[21] + H[27] * H[27])) < t375))) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t794 * (H[16] * H[16] + (H[4] * H[4] + H[10] * H[10])) + t805 * (H[34] * H[34] + (H[22] * H[22] + H[28] * H[28])) < t514))) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
+  if (!((t794 * (H[17] * H[17] + (H[5] * H[5] + H[11] * H[11])) + t805 * (H[35] * H[35] + (H[23] * H[23] + H[29] * H[29])) < t676))) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
+  F[0] = t174;
+  F[1] = F[2] = F[3] = F[4] = F[5] = 0.0;
+  F[6] = t175;
+  F[7] = t292;
+  F[8] = F[9] = F[10] = F[11] = 0.0;
+  F[12] = t273;
+  F[13] = t293;
+  F[14] = t431;
+  F[15] = F[16] = F[17] = 0.0;
+  F[18] = t391;
+  F[19] = t410;
+  F[20] = t432;
+  F[21] = t593;
+  F[22] = F[23] = 0.0;
+  F[24] = t530;
+  F[25] = t549;
+  F[26] = t570;
+  F[27] = t594;
+  F[28] = t780;
+  F[29] = 0.0;
+  F[30] = t692;
+  F[31] = t711;
+  F[32] = t732;
+  F[33] = t755;
+  F[34] = t781;
+  real t879 = 1.0 / t783;
+  F[35] = t879;
+  real t880 = t10 * t174;
+  real t882 = t90 - t10 * t175;
+  real t883 = t292 * t882;
+  real t887 = t189 - t10 * t273 - t293 * t882;
+  real t888 = t431 * t887;
+  real t894 = t307 - t10 * t391 - t410 * t882 - t432 * t887;
+  real t895 = t593 * t894;
+  real t903 = t446 - t10 * t530 - t549 * t882 - t570 * t887 - t594 * t894;
+  real t904 = t780 * t903;
+  real t914 = t608 - t10 * t692 - t711 * t882 - t732 * t887 - t755 * t894 - t781 * t903;
+  real t915 = t879 * t914;
+  real t917 = t904 - t781 * t915;
+  real t921 = t895 - t594 * t917 - t755 * t915;
+  real t927 = t888 - t432 * t921 - t570 * t917 - t732 * t915;
+  real t935 = t883 - t293 * t927 - t410 * t921 - t549 * t917 - t711 * t915;
+  G[0] = t880 - t175 * t935 - t273 * t927 - t391 * t921 - t530 * t917 - t692 * t915;
+  real t946 = t22 * t174;
+  real t948 = t102 - t22 * t175;
+  real t949 = t292 * t948;
+  real t953 = t201 - t22 * t273 - t293 * t948;
+  real t954 = t431 * t953;
+  real t960 = t319 - t22 * t391 - t410 * t948 - t432 * t953;
+  real t961 = t593 * t960;
+  real t969 = t458 - t22 * t530 - t549 * t948 - t570 * t953 - t594 * t960;
+  real t970 = t780 * t969;
+  real t980 = t620 - t22 * t692 - t711 * t948 - t732 * t953 - t755 * t960 - t781 * t969;
+  real t981 = t879 * t980;
+  real t983 = t970 - t781 * t981;
+  real t987 = t961 - t594 * t983 - t755 * t981;
+  real t993 = t954 - t432 * t987 - t570 * t983 - t732 * t981;
+  real t1001 = t949 - t293 * t993 - t410 * t987 - t549 * t983 - t711 * t981;
+  G[1] = t946 - t175 * t1001 - t273 * t993 - t391 * t987 - t530 * t983 - t692 * t981;
+  real t1012 = t35 * t174;
+  real t1014 = t115 - t35 * t175;
+  real t1015 = t292 * t1014;
+  real t1019 = t214 - t35 * t273 - t293 * t1014;
+  real t1020 = t431 * t1019;
+  real t1026 = t332 - t35 * t391 - t410 * t1014 - t432 * t1019;
+  real t1027 = t593 * t1026;
+  real t1035 = t471 - t35 * t530 - t549 * t1014 - t570 * t1019 - t594 * t1026;
+  real t1036 = t780 * t1035;
+  real t1046 = t633 - t35 * t692 - t711 * t1014 - t732 * t1019 - t755 * t1026 - t781 * t1035;
+  real t1047 = t879 * t1046;
+  real t1049 = t1036 - t781 * t1047;
+  real t1053 = t1027 - t594 * t1049 - t755 * t1047;
+  real t1059 = t1020 - t432 * t1053 - t570 * t1049 - t732 * t1047;
+  real t1067 = t1015 - t293 * t1059 - t410 * t1053 - t549 * t1049 - t711 * t1047;
+  G[2] = t1012 - t175 * t1067 - t273 * t1059 - t391 * t1053 - t530 * t1049 - t692 * t1047;
+  real t1078 = t48 * t174;
+  real t1080 = t128 - t48 * t175;
+  real t1081 = t292 * t1080;
+  real t1085 = t227 - t48 * t273 - t293 * t1080;
+  real t1086 = t431 * t1085;
+  real t1092 = t345 - t48 * t391 - t410 * t1080 - t432 * t1085;
+  real t1093 = t593 * t1092;
+  real t1101 = t484 - t48 * t530 - t549 * t1080 - t570 * t1085 - t594 * t1092;
+  real t1102 = t780 * t1101;
+  real t1112 = t646 - t48 * t692 - t711 * t1080 - t732 * t1085 - t755 * t1092 - t781 * t1101;
+  real t1113 = t879 * t1112;
+  real t1115 = t1102 - t781 * t1113;
+  real t1119 = t1093 - t594 * t1115 - t755 * t1113;
+  real t1125 = t1086 - t432 * t1119 - t570 * t1115 - t732 * t1113;
+  real t1133 = t1081 - t293 * t1125 - t410 * t1119 - t549 * t1115 - t711 * t1113;
+  G[3] = t1078 - t175 * t1133 - t273 * t1125 - t391 * t1119 - t530 * t1115 - t692 * t1113;
+  real t1144 = t61 * t174;
+  real t1146 = t141 - t61 * t175;
+  real t1147 = t292 * t1146;
+  real t1151 = t240 - t61 * t273 - t293 * t1146;
+  real t1152 = t431 * t1151;
+  real t1158 = t358 - t61 * t391 - t410 * t1146 - t432 * t1151;
+  real t1159 = t593 * t1158;
+  real t1167 = t497 - t61 * t530 - t549 * t1146 - t570 * t1151 - t594 * t1158;
+  real t1168 = t780 * t1167;
+  real t1178 = t659 - t61 * t692 - t711 * t1146 - t732 * t1151 - t755 * t1158 - t781 * t1167;
+  real t1179 = t879 * t1178;
+  real t1181 = t1168 - t781 * t1179;
+  real t1185 = t1159 - t594 * t1181 - t755 * t1179;
+  real t1191 = t1152 - t432 * t1185 - t570 * t1181 - t732 * t1179;
+  real t1199 = t1147 - t293 * t1191 - t410 * t1185 - t549 * t1181 - t711 * t1179;
+  G[4] = t1144 - t175 * t1199 - t273 * t1191 - t391 * t1185 - t530 * t1181 - t692 * t1179;
+  real t1210 = t74 * t174;
+  real t1212 = t154 - t74 * t175;
+  real t1213 = t292 * t1212;
+  real t1217 = t253 - t74 * t273 - t293 * t1212;
+  real t1218 = t431 * t1217;
+  real t1224 = t371 - t74 * t391 - t410 * t1212 - t432 * t1217;
+  real t1225 = t593 * t1224;
+  real t1233 = t510 - t74 * t530 - t549 * t1212 - t570 * t1217 - t594 * t1224;
+  real t1234 = t780 * t1233;
+  real t1244 = t672 - t74 * t692 - t711 * t1212 - t732 * t1217 - t755 * t1224 - t781 * t1233;
+  real t1245 = t879 * t1244;
+  real t1247 = t1234 - t781 * t1245;
+  real t1251 = t1225 - t594 * t1247 - t755 * t1245;
+  real t1257 = t1218 - t432 * t1251 - t570 * t1247 - t732 * t1245;
+  real t1265 = t1213 - t293 * t1257 - t410 * t1251 - t549 * t1247 - t711 * t1245;
+  G[5] = t1210 - t175 * t1265 - t273 * t1257 - t391 * t1251 - t530 * t1247 - t692 * t1245;
+  G[6] = t935;
+  G[7] = t1001;
+  G[8] = t1067;
+  G[9] = t1133;
+  G[10] = t1199;
+  G[11] = t1265;
+  G[12] = t927;
+  G[13] = t993;
+  G[14] = t1059;
+  G[15] = t1125;
+  G[16] = t1191;
+  G[17] = t1257;
+  G[18] = t921;
+  G[19] = t987;
+  G[20] = t1053;
+  G[21] = t1119;
+  G[22] = t1185;
+  G[23] = t1251;
+  G[24] = t917;
+  G[25] = t983;
+  G[26] = t1049;
+  G[27] = t1115;
+  G[28] = t1181;
+  G[29] = t1247;
+  G[30] = t915;
+  G[31] = t981;
+  G[32] = t1047;
+  G[33] = t1113;
+  G[34] = t1179;
+  G[35] = t1245;
+  real t1287 = S[0] - (t10 * t880 + t882 * t883 + t887 * t888 + t894 * t895 + t903 * t904 + t914 *
+    t915);
+  real t1300 = S[1] - (t10 * t946 + t882 * t949 + t887 * t954 + t894 * t961 + t903 * t970 + t914 *
+    t981);
+  real t1314 = S[2] - (t10 * t1012 + t882 * t1015 + t887 * t1020 + t894 * t1027 + t903 * t1036 +
+    t914 * t1047);
+  real t1316 = Rc[0] * t1287 + Rc[1] * t1300 + Rc[2] * t1314;
+  real t1330 = S[6] - (t22 * t946 + t948 * t949 + t953 * t954 + t960 * t961 + t969 * t970 + t980 *
+    t981);
+  real t1344 = S[7] - (t22 * t1012 + t948 * t1015 + t953 * t1020 + t960 * t1027 + t969 * t1036 +
+    t980 * t1047);
+  real t1346 = Rc[0] * t1300 + Rc[1] * t1330 + Rc[2] * t1344;
+  real t1363 = S[11] - (t35 * t1012 + t1014 * t1015 + t1019 * t1020 + t1026 * t1027 + t1035 * t1036
+    + t1046 * t1047);
+  real t1365 = Rc[0] * t1314 + Rc[1] * t1344 + Rc[2] * t1363;
+  real t1367 = Rc[0] * t1316 + Rc[1] * t1346 + Rc[2] * t1365;
+  S_I[0] += t1367;
+  real t1372 = Rc[3] * t1316 + Rc[4] * t1346 + Rc[5] * t1365;
+  S_I[1] += t1372;
+  real t1377 = Rc[6] * t1316 + Rc[7] * t1346 + Rc[8] * t1365;
+  S_I[2] += t1377;
+  real t1389 = S[3] - (t10 * t1078 + t882 * t1081 + t887 * t1086 + t894 * t1093 + t903 * t1102 +
+    t914 * t1113);
+  real t1402 = S[8] - (t22 * t1078 + t948 * t1081 + t953 * t1086 + t960 * t1093 + t969 * t1102 +
+    t980 * t1113);
+  real t1416 = S[12] - (t35 * t1078 + t1014 * t1081 + t1019 * t1086 + t1026 * t1093 + t1035 * t1102
+    + t1046 * t1113);
+  real t1418 = Rc[0] * t1389 + Rc[1] * t1402 + Rc[2] * t1416;
+  real t1431 = S[4] - (t10 * t1144 + t882 * t1147 + t887 * t1152 + t894 * t1159 + t903 * t1168 +
+    t914 * t1179);
+  real t1444 = S[9] - (t22 * t1144 + t948 * t1147 + t953 * t1152 + t960 * t1159 + t969 * t1168 +
+    t980 * t1179);
+  real t1458 = S[13] - (t35 * t1144 + t1014 * t1147 + t1019 * t1152 + t1026 * t1159 + t1035 * t1168
+    + t1046 * t1179);
+  real t1460 = Rc[0] * t1431 + Rc[1] * t1444 + Rc[2] * t1458;
+  real t1474 = S[5] - (t10 * t1210 + t882 * t1213 + t887 * t1218 + t894 * t1225 + t903 * t1234 +
+    t914 * t1245);
+  real t1487 = S[10] - (t22 * t1210 + t948 * t1213 + t953 * t1218 + t960 * t1225 + t969 * t1234 +
+    t980 * t1245);
+  real t1501 = S[14] - (t35 * t1210 + t1014 * t1213 + t1019 * t1218 + t1026 * t1225 + t1035 * t1234
+    + t1046 * t1245);
+  real t1503 = Rc[0] * t1474 + Rc[1] * t1487 + Rc[2] * t1501;
+  real t1505 = Rc[0] * t1418 + Rc[1] * t1460 + Rc[2] * t1503;
+  real t1506 = r[1] * t1377;
+  real t1507 = r[2] * t1372;
+  S_I[3] += t1505 + (t1506 - t1507);
+  real t1514 = Rc[3] * t1418 + Rc[4] * t1460 + Rc[5] * t1503;
+  real t1518 = t1514 + (r[2] * t1367 - r[0] * t1377);
+  S_I[4] += t1518;
+  real t1523 = Rc[6] * t1418 + Rc[7] * t1460 + Rc[8] * t1503;
+  real t1527 = t1523 + (r[0] * t1372 - r[1] * t1367);
+  S_I[5] += t1527;
+  real t1532 = Rc[3] * t1287 + Rc[4] * t1300 + Rc[5] * t1314;
+  real t1538 = Rc[3] * t1300 + Rc[4] * t1330 + Rc[5] * t1344;
+  real t1545 = Rc[3] * t1314 + Rc[4] * t1344 + Rc[5] * t1363;
+  real t1547 = Rc[3] * t1532 + Rc[4] * t1538 + Rc[5] * t1545;
+  S_I[6] += t1547;
+  real t1552 = Rc[6] * t1532 + Rc[7] * t1538 + Rc[8] * t1545;
+  S_I[7] += t1552;
+  real t1557 = Rc[3] * t1389 + Rc[4] * t1402 + Rc[5] * t1416;
+  real t1563 = Rc[3] * t1431 + Rc[4] * t1444 + Rc[5] * t1458;
+  real t1570 = Rc[3] * t1474 + Rc[4] * t1487 + Rc[5] * t1501;
+  real t1572 = Rc[0] * t1557 + Rc[1] * t1563 + Rc[2] * t1570;
+  real t1576 = t1572 + (r[1] * t1552 - r[2] * t1547);
+  S_I[8] += t1576;
+  real t1581 = Rc[3] * t1557 + Rc[4] * t1563 + Rc[5] * t1570;
+  real t1582 = r[0] * t1552;
+  real t1584 = t1581 + (t1507 - t1582);
+  S_I[9] += t1584;
+  real t1589 = Rc[6] * t1557 + Rc[7] * t1563 + Rc[8] * t1570;
+  real t1593 = t1589 + (r[0] * t1547 - r[1] * t1372);
+  S_I[10] += t1593;
+  real t1613 = Rc[6] * (Rc[6] * t1287 + Rc[7] * t1300 + Rc[8] * t1314) + Rc[7] * (Rc[6] * t1300 +
+    Rc[7] * t1330 + Rc[8] * t1344) + Rc[8] * (Rc[6] * t1314 + Rc[7] * t1344 + Rc[8] * t1363);
+  S_I[11] += t1613;
+  real t1618 = Rc[6] * t1389 + Rc[7] * t1402 + Rc[8] * t1416;
+  real t1624 = Rc[6] * t1431 + Rc[7] * t1444 + Rc[8] * t1458;
+  real t1631 = Rc[6] * t1474 + Rc[7] * t1487 + Rc[8] * t1501;
+  real t1633 = Rc[0] * t1618 + Rc[1] * t1624 + Rc[2] * t1631;
+  real t1637 = t1633 + (r[1] * t1613 - r[2] * t1552);
+  S_I[12] += t1637;
+  real t1642 = Rc[3] * t1618 + Rc[4] * t1624 + Rc[5] * t1631;
+  real t1646 = t1642 + (r[2] * t1377 - r[0] * t1613);
+  S_I[13] += t1646;
+  real t1653 = Rc[6] * t1618 + Rc[7] * t1624 + Rc[8] * t1631 + (t1582 - t1506);
+  S_I[14] += t1653;
+  real t1665 = S[15] - (t48 * t1078 + t1080 * t1081 + t1085 * t1086 + t1092 * t1093 + t1101 * t1102
+    + t1112 * t1113);
+  real t1678 = S[16] - (t48 * t1144 + t1080 * t1147 + t1085 * t1152 + t1092 * t1159 + t1101 * t1168
+    + t1112 * t1179);
+  real t1692 = S[17] - (t48 * t1210 + t1080 * t1213 + t1085 * t1218 + t1092 * t1225 + t1101 * t1234
+    + t1112 * t1245);
+  real t1694 = Rc[0] * t1665 + Rc[1] * t1678 + Rc[2] * t1692;
+  real t1708 = S[18] - (t61 * t1144 + t1146 * t1147 + t1151 * t1152 + t1158 * t1159 + t1167 * t1168
+    + t1178 * t1179);
+  real t1722 = S[19] - (t61 * t1210 + t1146 * t1213 + t1151 * t1218 + t1158 * t1225 + t1167 * t1234
+    + t1178 * t1245);
+  real t1724 = Rc[0] * t1678 + Rc[1] * t1708 + Rc[2] * t1722;
+  real t1741 = S[20] - (t74 * t1210 + t1212 * t1213 + t1217 * t1218 + t1224 * t1225 + t1233 * t1234
+    + t1244 * t1245);
+  real t1743 = Rc[0] * t1692 + Rc[1] * t1722 + Rc[2] * t1741;
+  S_I[15] += Rc[0] * t1694 + Rc[1] * t1724 + Rc[2] * t1743 + (r[1] * t1637 - r[2] * t1576 + (r[1] *
+    t1633 - r[2] * t1572));
+  S_I[16] += Rc[3] * t1694 + Rc[4] * t1724 + Rc[5] * t1743 + (r[1] * t1646 - r[2] * t1584 + (r[2] *
+    t1505 - r[0] * t1633));
+  S_I[17] += Rc[6] * t1694 + Rc[7] * t1724 + Rc[8] * t1743 + (r[1] * t1653 - r[2] * t1593 + (r[0] *
+    t1572 - r[1] * t1505));
+  real t1784 = Rc[3] * t1665 + Rc[4] * t1678 + Rc[5] * t1692;
+  real t1790 = Rc[3] * t1678 + Rc[4] * t1708 + Rc[5] * t1722;
+  real t1797 = Rc[3] * t1692 + Rc[4] * t1722 + Rc[5] * t1741;
+  S_I[18] += Rc[3] * t1784 + Rc[4] * t1790 + Rc[5] * t1797 + (r[2] * t1518 - r[0] * t1646 + (r[2] *
+    t1514 - r[0] * t1642));
+  S_I[19] += Rc[6] * t1784 + Rc[7] * t1790 + Rc[8] * t1797 + (r[2] * t1527 - r[0] * t1653 + (r[0] *
+    t1581 - r[1] * t1514));
+  S_I[20] += Rc[6] * (Rc[6] * t1665 + Rc[7] * t1678 + Rc[8] * t1692) + Rc[7] * (Rc[6] * t1678 +
+    Rc[7] * t1708 + Rc[8] * t1722) + Rc[8] * (Rc[6] * t1692 + Rc[7] * t1722 + Rc[8] * t1741) + (r[0]
+    * t1593 - r[1] * t1527 + (r[0] * t1589 - r[1] * t1523));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_factor(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_factor_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"W", 36, "", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"S", 21, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_factor_outputs[] = {
-    {"F", 36, "", 0, 0},
-    {"G", 36, "", 0, 0},
-    {"S_I", 21, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic6_factor_guards[] = {
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 6 of 6 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic6_factor, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2]))
 
 /* load of a right-hand side carried across a hinge with 6 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the free coordinates
@@ -5614,267 +1195,55 @@ static const mstmm_guard mstmm_sweep_generic6_factor_guards[] = {
  * out y[6] (N, N*m) tau - H^T e
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict G, const real *restrict e,
-    const real *restrict tau, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic6_column_load(in_t Rc, in_t r, in_t H, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[6] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[7] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[13] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[19] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[25] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[31] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[8] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[14] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[20] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[26] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[32] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = H[3] * e[0];
-    const real t37 = H[9] * e[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[15] * e[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[21] * e[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[27] * e[4];
-    const real t44 = t42 + t43;
-    const real t45 = H[33] * e[5];
-    const real t46 = t44 + t45;
-    const real t47 = tau[3] - t46;
-    y[3] = t47;
-    const real t48 = H[4] * e[0];
-    const real t49 = H[10] * e[1];
-    const real t50 = t48 + t49;
-    const real t51 = H[16] * e[2];
-    const real t52 = t50 + t51;
-    const real t53 = H[22] * e[3];
-    const real t54 = t52 + t53;
-    const real t55 = H[28] * e[4];
-    const real t56 = t54 + t55;
-    const real t57 = H[34] * e[5];
-    const real t58 = t56 + t57;
-    const real t59 = tau[4] - t58;
-    y[4] = t59;
-    const real t60 = H[5] * e[0];
-    const real t61 = H[11] * e[1];
-    const real t62 = t60 + t61;
-    const real t63 = H[17] * e[2];
-    const real t64 = t62 + t63;
-    const real t65 = H[23] * e[3];
-    const real t66 = t64 + t65;
-    const real t67 = H[29] * e[4];
-    const real t68 = t66 + t67;
-    const real t69 = H[35] * e[5];
-    const real t70 = t68 + t69;
-    const real t71 = tau[5] - t70;
-    y[5] = t71;
-    const real t72 = G[0] * t11;
-    const real t73 = G[6] * t23;
-    const real t74 = t72 + t73;
-    const real t75 = G[12] * t35;
-    const real t76 = t74 + t75;
-    const real t77 = G[18] * t47;
-    const real t78 = t76 + t77;
-    const real t79 = G[24] * t59;
-    const real t80 = t78 + t79;
-    const real t81 = G[30] * t71;
-    const real t82 = t80 + t81;
-    const real t83 = e[0] + t82;
-    const real t84 = Rc[0] * t83;
-    const real t85 = G[1] * t11;
-    const real t86 = G[7] * t23;
-    const real t87 = t85 + t86;
-    const real t88 = G[13] * t35;
-    const real t89 = t87 + t88;
-    const real t90 = G[19] * t47;
-    const real t91 = t89 + t90;
-    const real t92 = G[25] * t59;
-    const real t93 = t91 + t92;
-    const real t94 = G[31] * t71;
-    const real t95 = t93 + t94;
-    const real t96 = e[1] + t95;
-    const real t97 = Rc[1] * t96;
-    const real t98 = t84 + t97;
-    const real t99 = G[2] * t11;
-    const real t100 = G[8] * t23;
-    const real t101 = t99 + t100;
-    const real t102 = G[14] * t35;
-    const real t103 = t101 + t102;
-    const real t104 = G[20] * t47;
-    const real t105 = t103 + t104;
-    const real t106 = G[26] * t59;
-    const real t107 = t105 + t106;
-    const real t108 = G[32] * t71;
-    const real t109 = t107 + t108;
-    const real t110 = e[2] + t109;
-    const real t111 = Rc[2] * t110;
-    const real t112 = t98 + t111;
-    e_I[0] += t112;
-    const real t113 = Rc[3] * t83;
-    const real t114 = Rc[4] * t96;
-    const real t115 = t113 + t114;
-    const real t116 = Rc[5] * t110;
-    const real t117 = t115 + t116;
-    e_I[1] += t117;
-    const real t118 = Rc[6] * t83;
-    const real t119 = Rc[7] * t96;
-    const real t120 = t118 + t119;
-    const real t121 = Rc[8] * t110;
-    const real t122 = t120 + t121;
-    e_I[2] += t122;
-    const real t123 = G[3] * t11;
-    const real t124 = G[9] * t23;
-    const real t125 = t123 + t124;
-    const real t126 = G[15] * t35;
-    const real t127 = t125 + t126;
-    const real t128 = G[21] * t47;
-    const real t129 = t127 + t128;
-    const real t130 = G[27] * t59;
-    const real t131 = t129 + t130;
-    const real t132 = G[33] * t71;
-    const real t133 = t131 + t132;
-    const real t134 = e[3] + t133;
-    const real t135 = Rc[0] * t134;
-    const real t136 = G[4] * t11;
-    const real t137 = G[10] * t23;
-    const real t138 = t136 + t137;
-    const real t139 = G[16] * t35;
-    const real t140 = t138 + t139;
-    const real t141 = G[22] * t47;
-    const real t142 = t140 + t141;
-    const real t143 = G[28] * t59;
-    const real t144 = t142 + t143;
-    const real t145 = G[34] * t71;
-    const real t146 = t144 + t145;
-    const real t147 = e[4] + t146;
-    const real t148 = Rc[1] * t147;
-    const real t149 = t135 + t148;
-    const real t150 = G[5] * t11;
-    const real t151 = G[11] * t23;
-    const real t152 = t150 + t151;
-    const real t153 = G[17] * t35;
-    const real t154 = t152 + t153;
-    const real t155 = G[23] * t47;
-    const real t156 = t154 + t155;
-    const real t157 = G[29] * t59;
-    const real t158 = t156 + t157;
-    const real t159 = G[35] * t71;
-    const real t160 = t158 + t159;
-    const real t161 = e[5] + t160;
-    const real t162 = Rc[2] * t161;
-    const real t163 = t149 + t162;
-    const real t164 = Rc[6] * r[1];
-    const real t165 = Rc[3] * r[2];
-    const real t166 = t164 - t165;
-    const real t167 = t83 * t166;
-    const real t168 = Rc[7] * r[1];
-    const real t169 = Rc[4] * r[2];
-    const real t170 = t168 - t169;
-    const real t171 = t96 * t170;
-    const real t172 = t167 + t171;
-    const real t173 = Rc[8] * r[1];
-    const real t174 = Rc[5] * r[2];
-    const real t175 = t173 - t174;
-    const real t176 = t110 * t175;
-    const real t177 = t172 + t176;
-    const real t178 = t163 + t177;
-    e_I[3] += t178;
-    const real t179 = Rc[3] * t134;
-    const real t180 = Rc[4] * t147;
-    const real t181 = t179 + t180;
-    const real t182 = Rc[5] * t161;
-    const real t183 = t181 + t182;
-    const real t184 = Rc[0] * r[2];
-    const real t185 = Rc[6] * r[0];
-    const real t186 = t184 - t185;
-    const real t187 = t83 * t186;
-    const real t188 = Rc[1] * r[2];
-    const real t189 = Rc[7] * r[0];
-    const real t190 = t188 - t189;
-    const real t191 = t96 * t190;
-    const real t192 = t187 + t191;
-    const real t193 = Rc[2] * r[2];
-    const real t194 = Rc[8] * r[0];
-    const real t195 = t193 - t194;
-    const real t196 = t110 * t195;
-    const real t197 = t192 + t196;
-    const real t198 = t183 + t197;
-    e_I[4] += t198;
-    const real t199 = Rc[6] * t134;
-    const real t200 = Rc[7] * t147;
-    const real t201 = t199 + t200;
-    const real t202 = Rc[8] * t161;
-    const real t203 = t201 + t202;
-    const real t204 = Rc[3] * r[0];
-    const real t205 = Rc[0] * r[1];
-    const real t206 = t204 - t205;
-    const real t207 = t83 * t206;
-    const real t208 = Rc[4] * r[0];
-    const real t209 = Rc[1] * r[1];
-    const real t210 = t208 - t209;
-    const real t211 = t96 * t210;
-    const real t212 = t207 + t211;
-    const real t213 = Rc[5] * r[0];
-    const real t214 = Rc[2] * r[1];
-    const real t215 = t213 - t214;
-    const real t216 = t110 * t215;
-    const real t217 = t212 + t216;
-    const real t218 = t203 + t217;
-    e_I[5] += t218;
-    return 0;
+  real t11 = tau[0] - (H[0] * e[0] + H[6] * e[1] + H[12] * e[2] + H[18] * e[3] + H[24] * e[4] +
+    H[30] * e[5]);
+  y[0] = t11;
+  real t23 = tau[1] - (H[1] * e[0] + H[7] * e[1] + H[13] * e[2] + H[19] * e[3] + H[25] * e[4] +
+    H[31] * e[5]);
+  y[1] = t23;
+  real t35 = tau[2] - (H[2] * e[0] + H[8] * e[1] + H[14] * e[2] + H[20] * e[3] + H[26] * e[4] +
+    H[32] * e[5]);
+  y[2] = t35;
+  real t47 = tau[3] - (H[3] * e[0] + H[9] * e[1] + H[15] * e[2] + H[21] * e[3] + H[27] * e[4] +
+    H[33] * e[5]);
+  y[3] = t47;
+  real t59 = tau[4] - (H[4] * e[0] + H[10] * e[1] + H[16] * e[2] + H[22] * e[3] + H[28] * e[4] +
+    H[34] * e[5]);
+  y[4] = t59;
+  real t71 = tau[5] - (H[5] * e[0] + H[11] * e[1] + H[17] * e[2] + H[23] * e[3] + H[29] * e[4] +
+    H[35] * e[5]);
+  y[5] = t71;
+  real t83 = e[0] + (G[0] * t11 + G[6] * t23 + G[12] * t35 + G[18] * t47 + G[24] * t59 + G[30] *
+    t71);
+  real t96 = e[1] + (G[1] * t11 + G[7] * t23 + G[13] * t35 + G[19] * t47 + G[25] * t59 + G[31] *
+    t71);
+  real t110 = e[2] + (G[2] * t11 + G[8] * t23 + G[14] * t35 + G[20] * t47 + G[26] * t59 + G[32] *
+    t71);
+  e_I[0] += Rc[0] * t83 + Rc[1] * t96 + Rc[2] * t110;
+  e_I[1] += Rc[3] * t83 + Rc[4] * t96 + Rc[5] * t110;
+  e_I[2] += Rc[6] * t83 + Rc[7] * t96 + Rc[8] * t110;
+  real t134 = e[3] + (G[3] * t11 + G[9] * t23 + G[15] * t35 + G[21] * t47 + G[27] * t59 + G[33] *
+    t71);
+  real t147 = e[4] + (G[4] * t11 + G[10] * t23 + G[16] * t35 + G[22] * t47 + G[28] * t59 + G[34] *
+    t71);
+  real t161 = e[5] + (G[5] * t11 + G[11] * t23 + G[17] * t35 + G[23] * t47 + G[29] * t59 + G[35] *
+    t71);
+  e_I[3] += Rc[0] * t134 + Rc[1] * t147 + Rc[2] * t161 + (t83 * (Rc[6] * r[1] - Rc[3] * r[2]) + t96
+    * (Rc[7] * r[1] - Rc[4] * r[2]) + t110 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t134 + Rc[4] * t147 + Rc[5] * t161 + (t83 * (Rc[0] * r[2] - Rc[6] * r[0]) + t96
+    * (Rc[1] * r[2] - Rc[7] * r[0]) + t110 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t134 + Rc[7] * t147 + Rc[8] * t161 + (t83 * (Rc[3] * r[0] - Rc[0] * r[1]) + t96
+    * (Rc[4] * r[0] - Rc[1] * r[1]) + t110 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_column_load(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_column_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"G", 36, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_column_load_outputs[] = {
-    {"y", 6, "N, N*m", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_column_load, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 6 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rc[3][3] rotation, body axes to parent axes
  * in  r[3] (m) P of the body from P of the parent, parent axes
  * in  H[6][6] motion subspace of the free coordinates
@@ -5885,301 +1254,64 @@ static const mstmm_port mstmm_sweep_generic6_column_load_outputs[] = {
  * out udot[6] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_generic6_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_generic6_column_acceleration(in_t Rc, in_t r, in_t H, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[6] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[7] * t2;
-    const real t4 = F[12] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[13] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[14] * t7;
-    const real t9 = F[18] * y[0];
-    const real t10 = y[3] - t9;
-    const real t11 = F[19] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = F[20] * t7;
-    const real t14 = t12 - t13;
-    const real t15 = F[21] * t14;
-    const real t16 = F[24] * y[0];
-    const real t17 = y[4] - t16;
-    const real t18 = F[25] * t2;
-    const real t19 = t17 - t18;
-    const real t20 = F[26] * t7;
-    const real t21 = t19 - t20;
-    const real t22 = F[27] * t14;
-    const real t23 = t21 - t22;
-    const real t24 = F[28] * t23;
-    const real t25 = F[30] * y[0];
-    const real t26 = y[5] - t25;
-    const real t27 = F[31] * t2;
-    const real t28 = t26 - t27;
-    const real t29 = F[32] * t7;
-    const real t30 = t28 - t29;
-    const real t31 = F[33] * t14;
-    const real t32 = t30 - t31;
-    const real t33 = F[34] * t23;
-    const real t34 = t32 - t33;
-    const real t35 = F[35] * t34;
-    const real t36 = F[34] * t35;
-    const real t37 = t24 - t36;
-    const real t38 = F[27] * t37;
-    const real t39 = t15 - t38;
-    const real t40 = F[33] * t35;
-    const real t41 = t39 - t40;
-    const real t42 = F[20] * t41;
-    const real t43 = t8 - t42;
-    const real t44 = F[26] * t37;
-    const real t45 = t43 - t44;
-    const real t46 = F[32] * t35;
-    const real t47 = t45 - t46;
-    const real t48 = F[13] * t47;
-    const real t49 = t3 - t48;
-    const real t50 = F[19] * t41;
-    const real t51 = t49 - t50;
-    const real t52 = F[25] * t37;
-    const real t53 = t51 - t52;
-    const real t54 = F[31] * t35;
-    const real t55 = t53 - t54;
-    const real t56 = F[6] * t55;
-    const real t57 = t0 - t56;
-    const real t58 = F[12] * t47;
-    const real t59 = t57 - t58;
-    const real t60 = F[18] * t41;
-    const real t61 = t59 - t60;
-    const real t62 = F[24] * t37;
-    const real t63 = t61 - t62;
-    const real t64 = F[30] * t35;
-    const real t65 = t63 - t64;
-    const real t66 = r[2] * delta_I[4];
-    const real t67 = r[1] * delta_I[5];
-    const real t68 = t66 - t67;
-    const real t69 = delta_I[0] + t68;
-    const real t70 = Rc[0] * t69;
-    const real t71 = r[0] * delta_I[5];
-    const real t72 = r[2] * delta_I[3];
-    const real t73 = t71 - t72;
-    const real t74 = delta_I[1] + t73;
-    const real t75 = Rc[3] * t74;
-    const real t76 = t70 + t75;
-    const real t77 = r[1] * delta_I[3];
-    const real t78 = r[0] * delta_I[4];
-    const real t79 = t77 - t78;
-    const real t80 = delta_I[2] + t79;
-    const real t81 = Rc[6] * t80;
-    const real t82 = t76 + t81;
-    const real t83 = G[0] * t82;
-    const real t84 = Rc[1] * t69;
-    const real t85 = Rc[4] * t74;
-    const real t86 = t84 + t85;
-    const real t87 = Rc[7] * t80;
-    const real t88 = t86 + t87;
-    const real t89 = G[1] * t88;
-    const real t90 = t83 + t89;
-    const real t91 = Rc[2] * t69;
-    const real t92 = Rc[5] * t74;
-    const real t93 = t91 + t92;
-    const real t94 = Rc[8] * t80;
-    const real t95 = t93 + t94;
-    const real t96 = G[2] * t95;
-    const real t97 = t90 + t96;
-    const real t98 = Rc[0] * delta_I[3];
-    const real t99 = Rc[3] * delta_I[4];
-    const real t100 = t98 + t99;
-    const real t101 = Rc[6] * delta_I[5];
-    const real t102 = t100 + t101;
-    const real t103 = G[3] * t102;
-    const real t104 = t97 + t103;
-    const real t105 = Rc[1] * delta_I[3];
-    const real t106 = Rc[4] * delta_I[4];
-    const real t107 = t105 + t106;
-    const real t108 = Rc[7] * delta_I[5];
-    const real t109 = t107 + t108;
-    const real t110 = G[4] * t109;
-    const real t111 = t104 + t110;
-    const real t112 = Rc[2] * delta_I[3];
-    const real t113 = Rc[5] * delta_I[4];
-    const real t114 = t112 + t113;
-    const real t115 = Rc[8] * delta_I[5];
-    const real t116 = t114 + t115;
-    const real t117 = G[5] * t116;
-    const real t118 = t111 + t117;
-    const real t119 = t65 - t118;
-    udot[0] = t119;
-    const real t120 = G[6] * t82;
-    const real t121 = G[7] * t88;
-    const real t122 = t120 + t121;
-    const real t123 = G[8] * t95;
-    const real t124 = t122 + t123;
-    const real t125 = G[9] * t102;
-    const real t126 = t124 + t125;
-    const real t127 = G[10] * t109;
-    const real t128 = t126 + t127;
-    const real t129 = G[11] * t116;
-    const real t130 = t128 + t129;
-    const real t131 = t55 - t130;
-    udot[1] = t131;
-    const real t132 = G[12] * t82;
-    const real t133 = G[13] * t88;
-    const real t134 = t132 + t133;
-    const real t135 = G[14] * t95;
-    const real t136 = t134 + t135;
-    const real t137 = G[15] * t102;
-    const real t138 = t136 + t137;
-    const real t139 = G[16] * t109;
-    const real t140 = t138 + t139;
-    const real t141 = G[17] * t116;
-    const real t142 = t140 + t141;
-    const real t143 = t47 - t142;
-    udot[2] = t143;
-    const real t144 = G[18] * t82;
-    const real t145 = G[19] * t88;
-    const real t146 = t144 + t145;
-    const real t147 = G[20] * t95;
-    const real t148 = t146 + t147;
-    const real t149 = G[21] * t102;
-    const real t150 = t148 + t149;
-    const real t151 = G[22] * t109;
-    const real t152 = t150 + t151;
-    const real t153 = G[23] * t116;
-    const real t154 = t152 + t153;
-    const real t155 = t41 - t154;
-    udot[3] = t155;
-    const real t156 = G[24] * t82;
-    const real t157 = G[25] * t88;
-    const real t158 = t156 + t157;
-    const real t159 = G[26] * t95;
-    const real t160 = t158 + t159;
-    const real t161 = G[27] * t102;
-    const real t162 = t160 + t161;
-    const real t163 = G[28] * t109;
-    const real t164 = t162 + t163;
-    const real t165 = G[29] * t116;
-    const real t166 = t164 + t165;
-    const real t167 = t37 - t166;
-    udot[4] = t167;
-    const real t168 = G[30] * t82;
-    const real t169 = G[31] * t88;
-    const real t170 = t168 + t169;
-    const real t171 = G[32] * t95;
-    const real t172 = t170 + t171;
-    const real t173 = G[33] * t102;
-    const real t174 = t172 + t173;
-    const real t175 = G[34] * t109;
-    const real t176 = t174 + t175;
-    const real t177 = G[35] * t116;
-    const real t178 = t176 + t177;
-    const real t179 = t35 - t178;
-    udot[5] = t179;
-    const real t180 = H[0] * t119;
-    const real t181 = H[1] * t131;
-    const real t182 = t180 + t181;
-    const real t183 = H[2] * t143;
-    const real t184 = t182 + t183;
-    const real t185 = H[3] * t155;
-    const real t186 = t184 + t185;
-    const real t187 = H[4] * t167;
-    const real t188 = t186 + t187;
-    const real t189 = H[5] * t179;
-    const real t190 = t188 + t189;
-    const real t191 = t82 + t190;
-    delta[0] = t191;
-    const real t192 = H[6] * t119;
-    const real t193 = H[7] * t131;
-    const real t194 = t192 + t193;
-    const real t195 = H[8] * t143;
-    const real t196 = t194 + t195;
-    const real t197 = H[9] * t155;
-    const real t198 = t196 + t197;
-    const real t199 = H[10] * t167;
-    const real t200 = t198 + t199;
-    const real t201 = H[11] * t179;
-    const real t202 = t200 + t201;
-    const real t203 = t88 + t202;
-    delta[1] = t203;
-    const real t204 = H[12] * t119;
-    const real t205 = H[13] * t131;
-    const real t206 = t204 + t205;
-    const real t207 = H[14] * t143;
-    const real t208 = t206 + t207;
-    const real t209 = H[15] * t155;
-    const real t210 = t208 + t209;
-    const real t211 = H[16] * t167;
-    const real t212 = t210 + t211;
-    const real t213 = H[17] * t179;
-    const real t214 = t212 + t213;
-    const real t215 = t95 + t214;
-    delta[2] = t215;
-    const real t216 = H[18] * t119;
-    const real t217 = H[19] * t131;
-    const real t218 = t216 + t217;
-    const real t219 = H[20] * t143;
-    const real t220 = t218 + t219;
-    const real t221 = H[21] * t155;
-    const real t222 = t220 + t221;
-    const real t223 = H[22] * t167;
-    const real t224 = t222 + t223;
-    const real t225 = H[23] * t179;
-    const real t226 = t224 + t225;
-    const real t227 = t102 + t226;
-    delta[3] = t227;
-    const real t228 = H[24] * t119;
-    const real t229 = H[25] * t131;
-    const real t230 = t228 + t229;
-    const real t231 = H[26] * t143;
-    const real t232 = t230 + t231;
-    const real t233 = H[27] * t155;
-    const real t234 = t232 + t233;
-    const real t235 = H[28] * t167;
-    const real t236 = t234 + t235;
-    const real t237 = H[29] * t179;
-    const real t238 = t236 + t237;
-    const real t239 = t109 + t238;
-    delta[4] = t239;
-    const real t240 = H[30] * t119;
-    const real t241 = H[31] * t131;
-    const real t242 = t240 + t241;
-    const real t243 = H[32] * t143;
-    const real t244 = t242 + t243;
-    const real t245 = H[33] * t155;
-    const real t246 = t244 + t245;
-    const real t247 = H[34] * t167;
-    const real t248 = t246 + t247;
-    const real t249 = H[35] * t179;
-    const real t250 = t248 + t249;
-    const real t251 = t116 + t250;
-    delta[5] = t251;
-    return 0;
+  real t2 = y[1] - F[6] * y[0];
+  real t7 = y[2] - F[12] * y[0] - F[13] * t2;
+  real t14 = y[3] - F[18] * y[0] - F[19] * t2 - F[20] * t7;
+  real t23 = y[4] - F[24] * y[0] - F[25] * t2 - F[26] * t7 - F[27] * t14;
+  real t35 = F[35] * (y[5] - F[30] * y[0] - F[31] * t2 - F[32] * t7 - F[33] * t14 - F[34] * t23);
+  real t37 = F[28] * t23 - F[34] * t35;
+  real t41 = F[21] * t14 - F[27] * t37 - F[33] * t35;
+  real t47 = F[14] * t7 - F[20] * t41 - F[26] * t37 - F[32] * t35;
+  real t55 = F[7] * t2 - F[13] * t47 - F[19] * t41 - F[25] * t37 - F[31] * t35;
+  real t69 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
+  real t74 = delta_I[1] + (r[0] * delta_I[5] - r[2] * delta_I[3]);
+  real t80 = delta_I[2] + (r[1] * delta_I[3] - r[0] * delta_I[4]);
+  real t82 = Rc[0] * t69 + Rc[3] * t74 + Rc[6] * t80;
+  real t88 = Rc[1] * t69 + Rc[4] * t74 + Rc[7] * t80;
+  real t95 = Rc[2] * t69 + Rc[5] * t74 + Rc[8] * t80;
+  real t102 = Rc[0] * delta_I[3] + Rc[3] * delta_I[4] + Rc[6] * delta_I[5];
+  real t109 = Rc[1] * delta_I[3] + Rc[4] * delta_I[4] + Rc[7] * delta_I[5];
+  real t116 = Rc[2] * delta_I[3] + Rc[5] * delta_I[4] + Rc[8] * delta_I[5];
+  real t119 = F[0] * y[0] - F[6] * t55 - F[12] * t47 - F[18] * t41 - F[24] * t37 - F[30] * t35 -
+    (G[0] * t82 + G[1] * t88 + G[2] * t95 + G[3] * t102 + G[4] * t109 + G[5] * t116);
+  udot[0] = t119;
+  real t131 = t55 - (G[6] * t82 + G[7] * t88 + G[8] * t95 + G[9] * t102 + G[10] * t109 + G[11] *
+    t116);
+  udot[1] = t131;
+  real t143 = t47 - (G[12] * t82 + G[13] * t88 + G[14] * t95 + G[15] * t102 + G[16] * t109 + G[17] *
+    t116);
+  udot[2] = t143;
+  real t155 = t41 - (G[18] * t82 + G[19] * t88 + G[20] * t95 + G[21] * t102 + G[22] * t109 + G[23] *
+    t116);
+  udot[3] = t155;
+  real t167 = t37 - (G[24] * t82 + G[25] * t88 + G[26] * t95 + G[27] * t102 + G[28] * t109 + G[29] *
+    t116);
+  udot[4] = t167;
+  real t179 = t35 - (G[30] * t82 + G[31] * t88 + G[32] * t95 + G[33] * t102 + G[34] * t109 + G[35] *
+    t116);
+  udot[5] = t179;
+  delta[0] = t82 + (H[0] * t119 + H[1] * t131 + H[2] * t143 + H[3] * t155 + H[4] * t167 + H[5] *
+    t179);
+  delta[1] = t88 + (H[6] * t119 + H[7] * t131 + H[8] * t143 + H[9] * t155 + H[10] * t167 + H[11] *
+    t179);
+  delta[2] = t95 + (H[12] * t119 + H[13] * t131 + H[14] * t143 + H[15] * t155 + H[16] * t167 + H[17]
+    * t179);
+  delta[3] = t102 + (H[18] * t119 + H[19] * t131 + H[20] * t143 + H[21] * t155 + H[22] * t167 +
+    H[23] * t179);
+  delta[4] = t109 + (H[24] * t119 + H[25] * t131 + H[26] * t143 + H[27] * t155 + H[28] * t167 +
+    H[29] * t179);
+  delta[5] = t116 + (H[30] * t119 + H[31] * t131 + H[32] * t143 + H[33] * t155 + H[34] * t167 +
+    H[35] * t179);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_column_acceleration_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"F", 36, "", 0, 0},
-    {"G", 36, "", 0, 0},
-    {"y", 6, "N, N*m", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_column_acceleration_outputs[] = {
-    {"udot", 6, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 /* rows outboard of a hinge with 6 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * source: Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)
  * source: Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)
  * in  H[6][6] motion subspace of the free coordinates
@@ -6195,2816 +1327,977 @@ static const mstmm_port mstmm_sweep_generic6_column_acceleration_outputs[] = {
  * out d_V[6] load in its rows
  * out e_Q[6] (N, N*m) load outside the rows
  */
-int mstmm_sweep_generic6_qr_eliminate(const real *restrict H, const real *restrict J,
-    const real *restrict floor_, const real *restrict U, const real *restrict d,
-    const real *restrict e, const real *restrict tau, real *restrict G, real *restrict g,
-    real *restrict V, real *restrict d_V, real *restrict e_Q)
+int mstmm_sweep_generic6_qr_eliminate(in_t H, in_t J, in_t floor_, in_t U, in_t d, in_t e, in_t tau,
+    out_t G, out_t g, out_t V, out_t d_V, out_t e_Q)
 {
-    const real t0 = H[12] * H[12];
-    const real t1 = H[0] * H[0];
-    const real t2 = H[6] * H[6];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 0.0 < floor_[0];
-    const real t6 = U[11] * U[11];
-    const real t7 = U[7] * U[7];
-    const real t8 = U[6] * U[6];
-    const real t9 = U[2] * U[2];
-    const real t10 = U[0] * U[0];
-    const real t11 = U[1] * U[1];
-    const real t12 = t10 + t11;
-    const real t13 = t9 + t12;
-    const real t14 = t8 + t13;
-    const real t15 = t7 + t14;
-    const real t16 = t6 + t15;
-    const real t17 = ((real)1 / (real)300000000000000) * t16;
-    const real t18 = t5 != 0 ? floor_[0] : t17;
-    const real t19 = t4 * t18;
-    const real t20 = H[30] * H[30];
-    const real t21 = H[18] * H[18];
-    const real t22 = H[24] * H[24];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    const real t25 = 0.0 < floor_[1];
-    const real t26 = U[20] * U[20];
-    const real t27 = U[19] * U[19];
-    const real t28 = U[18] * U[18];
-    const real t29 = U[17] * U[17];
-    const real t30 = U[16] * U[16];
-    const real t31 = U[15] * U[15];
-    const real t32 = U[14] * U[14];
-    const real t33 = U[13] * U[13];
-    const real t34 = U[12] * U[12];
-    const real t35 = U[10] * U[10];
-    const real t36 = U[9] * U[9];
-    const real t37 = U[8] * U[8];
-    const real t38 = U[5] * U[5];
-    const real t39 = U[3] * U[3];
-    const real t40 = U[4] * U[4];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = t36 + t43;
-    const real t45 = t35 + t44;
-    const real t46 = t34 + t45;
-    const real t47 = t33 + t46;
-    const real t48 = t32 + t47;
-    const real t49 = t31 + t48;
-    const real t50 = t30 + t49;
-    const real t51 = t29 + t50;
-    const real t52 = t28 + t51;
-    const real t53 = t27 + t52;
-    const real t54 = t26 + t53;
-    const real t55 = ((real)1 / (real)300000000000000) * t54;
-    const real t56 = t25 != 0 ? floor_[1] : t55;
-    const real t57 = t24 * t56;
-    const real t58 = t19 + t57;
-    const real t59 = H[30] * U[20];
-    const real t60 = t59 * t59;
-    const real t61 = H[24] * U[18];
-    const real t62 = H[30] * U[19];
-    const real t63 = t61 + t62;
-    const real t64 = t63 * t63;
-    const real t65 = H[18] * U[15];
-    const real t66 = H[24] * U[16];
-    const real t67 = t65 + t66;
-    const real t68 = H[30] * U[17];
-    const real t69 = t67 + t68;
-    const real t70 = t69 * t69;
-    const real t71 = H[12] * U[11];
-    const real t72 = H[18] * U[12];
-    const real t73 = t71 + t72;
-    const real t74 = H[24] * U[13];
-    const real t75 = t73 + t74;
-    const real t76 = H[30] * U[14];
-    const real t77 = t75 + t76;
-    const real t78 = t77 * t77;
-    const real t79 = H[6] * U[6];
-    const real t80 = H[12] * U[7];
-    const real t81 = t79 + t80;
-    const real t82 = H[18] * U[8];
-    const real t83 = t81 + t82;
-    const real t84 = H[24] * U[9];
-    const real t85 = t83 + t84;
-    const real t86 = H[30] * U[10];
-    const real t87 = t85 + t86;
-    const real t88 = t87 * t87;
-    const real t89 = H[0] * U[0];
-    const real t90 = H[6] * U[1];
-    const real t91 = t89 + t90;
-    const real t92 = H[12] * U[2];
-    const real t93 = t91 + t92;
-    const real t94 = H[18] * U[3];
-    const real t95 = t93 + t94;
-    const real t96 = H[24] * U[4];
-    const real t97 = t95 + t96;
-    const real t98 = H[30] * U[5];
-    const real t99 = t97 + t98;
-    const real t100 = t99 * t99;
-    const real t101 = J[0] + t100;
-    const real t102 = t88 + t101;
-    const real t103 = t78 + t102;
-    const real t104 = t70 + t103;
-    const real t105 = t64 + t104;
-    const real t106 = t60 + t105;
-    const real t107 = t58 < t106;
-    if (!(t107 != 0)) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
-    const real t108 = H[13] * H[13];
-    const real t109 = H[1] * H[1];
-    const real t110 = H[7] * H[7];
-    const real t111 = t109 + t110;
-    const real t112 = t108 + t111;
-    const real t113 = t18 * t112;
-    const real t114 = H[31] * H[31];
-    const real t115 = H[19] * H[19];
-    const real t116 = H[25] * H[25];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    const real t119 = t56 * t118;
-    const real t120 = t113 + t119;
-    const real t121 = H[31] * U[20];
-    const real t122 = t121 * t121;
-    const real t123 = H[25] * U[18];
-    const real t124 = H[31] * U[19];
-    const real t125 = t123 + t124;
-    const real t126 = t125 * t125;
-    const real t127 = H[19] * U[15];
-    const real t128 = H[25] * U[16];
-    const real t129 = t127 + t128;
-    const real t130 = H[31] * U[17];
-    const real t131 = t129 + t130;
-    const real t132 = t131 * t131;
-    const real t133 = H[13] * U[11];
-    const real t134 = H[19] * U[12];
-    const real t135 = t133 + t134;
-    const real t136 = H[25] * U[13];
-    const real t137 = t135 + t136;
-    const real t138 = H[31] * U[14];
-    const real t139 = t137 + t138;
-    const real t140 = t139 * t139;
-    const real t141 = H[7] * U[6];
-    const real t142 = H[13] * U[7];
-    const real t143 = t141 + t142;
-    const real t144 = H[19] * U[8];
-    const real t145 = t143 + t144;
-    const real t146 = H[25] * U[9];
-    const real t147 = t145 + t146;
-    const real t148 = H[31] * U[10];
-    const real t149 = t147 + t148;
-    const real t150 = t149 * t149;
-    const real t151 = H[1] * U[0];
-    const real t152 = H[7] * U[1];
-    const real t153 = t151 + t152;
-    const real t154 = H[13] * U[2];
-    const real t155 = t153 + t154;
-    const real t156 = H[19] * U[3];
-    const real t157 = t155 + t156;
-    const real t158 = H[25] * U[4];
-    const real t159 = t157 + t158;
-    const real t160 = H[31] * U[5];
-    const real t161 = t159 + t160;
-    const real t162 = t161 * t161;
-    const real t163 = J[1] + t162;
-    const real t164 = t150 + t163;
-    const real t165 = t140 + t164;
-    const real t166 = t132 + t165;
-    const real t167 = t126 + t166;
-    const real t168 = t122 + t167;
-    const real t169 = t120 < t168;
-    if (!(t169 != 0)) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
-    const real t170 = H[14] * H[14];
-    const real t171 = H[2] * H[2];
-    const real t172 = H[8] * H[8];
-    const real t173 = t171 + t172;
-    const real t174 = t170 + t173;
-    const real t175 = t18 * t174;
-    const real t176 = H[32] * H[32];
-    const real t177 = H[20] * H[20];
-    const real t178 = H[26] * H[26];
-    const real t179 = t177 + t178;
-    const real t180 = t176 + t179;
-    const real t181 = t56 * t180;
-    const real t182 = t175 + t181;
-    const real t183 = H[32] * U[20];
-    const real t184 = t183 * t183;
-    const real t185 = H[26] * U[18];
-    const real t186 = H[32] * U[19];
-    const real t187 = t185 + t186;
-    const real t188 = t187 * t187;
-    const real t189 = H[20] * U[15];
-    const real t190 = H[26] * U[16];
-    const real t191 = t189 + t190;
-    const real t192 = H[32] * U[17];
-    const real t193 = t191 + t192;
-    const real t194 = t193 * t193;
-    const real t195 = H[14] * U[11];
-    const real t196 = H[20] * U[12];
-    const real t197 = t195 + t196;
-    const real t198 = H[26] * U[13];
-    const real t199 = t197 + t198;
-    const real t200 = H[32] * U[14];
-    const real t201 = t199 + t200;
-    const real t202 = t201 * t201;
-    const real t203 = H[8] * U[6];
-    const real t204 = H[14] * U[7];
-    const real t205 = t203 + t204;
-    const real t206 = H[20] * U[8];
-    const real t207 = t205 + t206;
-    const real t208 = H[26] * U[9];
-    const real t209 = t207 + t208;
-    const real t210 = H[32] * U[10];
-    const real t211 = t209 + t210;
-    const real t212 = t211 * t211;
-    const real t213 = H[2] * U[0];
-    const real t214 = H[8] * U[1];
-    const real t215 = t213 + t214;
-    const real t216 = H[14] * U[2];
-    const real t217 = t215 + t216;
-    const real t218 = H[20] * U[3];
-    const real t219 = t217 + t218;
-    const real t220 = H[26] * U[4];
-    const real t221 = t219 + t220;
-    const real t222 = H[32] * U[5];
-    const real t223 = t221 + t222;
-    const real t224 = t223 * t223;
-    const real t225 = J[2] + t224;
-    const real t226 = t212 + t225;
-    const real t227 = t202 + t226;
-    const real t228 = t194 + t227;
-    const real t229 = t188 + t228;
-    const real t230 = t184 + t229;
-    const real t231 = t182 < t230;
-    if (!(t231 != 0)) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
-    const real t232 = H[15] * H[15];
-    const real t233 = H[3] * H[3];
-    const real t234 = H[9] * H[9];
-    const real t235 = t233 + t234;
-    const real t236 = t232 + t235;
-    const real t237 = t18 * t236;
-    const real t238 = H[33] * H[33];
-    const real t239 = H[21] * H[21];
-    const real t240 = H[27] * H[27];
-    const real t241 = t239 + t240;
-    const real t242 = t238 + t241;
-    const real t243 = t56 * t242;
-    const real t244 = t237 + t243;
-    const real t245 = H[33] * U[20];
-    const real t246 = t245 * t245;
-    const real t247 = H[27] * U[18];
-    const real t248 = H[33] * U[19];
-    const real t249 = t247 + t248;
-    const real t250 = t249 * t249;
-    const real t251 = H[21] * U[15];
-    const real t252 = H[27] * U[16];
-    const real t253 = t251 + t252;
-    const real t254 = H[33] * U[17];
-    const real t255 = t253 + t254;
-    const real t256 = t255 * t255;
-    const real t257 = H[15] * U[11];
-    const real t258 = H[21] * U[12];
-    const real t259 = t257 + t258;
-    const real t260 = H[27] * U[13];
-    const real t261 = t259 + t260;
-    const real t262 = H[33] * U[14];
-    const real t263 = t261 + t262;
-    const real t264 = t263 * t263;
-    const real t265 = H[9] * U[6];
-    const real t266 = H[15] * U[7];
-    const real t267 = t265 + t266;
-    const real t268 = H[21] * U[8];
-    const real t269 = t267 + t268;
-    const real t270 = H[27] * U[9];
-    const real t271 = t269 + t270;
-    const real t272 = H[33] * U[10];
-    const real t273 = t271 + t272;
-    const real t274 = t273 * t273;
-    const real t275 = H[3] * U[0];
-    const real t276 = H[9] * U[1];
-    const real t277 = t275 + t276;
-    const real t278 = H[15] * U[2];
-    const real t279 = t277 + t278;
-    const real t280 = H[21] * U[3];
-    const real t281 = t279 + t280;
-    const real t282 = H[27] * U[4];
-    const real t283 = t281 + t282;
-    const real t284 = H[33] * U[5];
-    const real t285 = t283 + t284;
-    const real t286 = t285 * t285;
-    const real t287 = J[3] + t286;
-    const real t288 = t274 + t287;
-    const real t289 = t264 + t288;
-    const real t290 = t256 + t289;
-    const real t291 = t250 + t290;
-    const real t292 = t246 + t291;
-    const real t293 = t244 < t292;
-    if (!(t293 != 0)) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
-    const real t294 = H[16] * H[16];
-    const real t295 = H[4] * H[4];
-    const real t296 = H[10] * H[10];
-    const real t297 = t295 + t296;
-    const real t298 = t294 + t297;
-    const real t299 = t18 * t298;
-    const real t300 = H[34] * H[34];
-    const real t301 = H[22] * H[22];
-    const real t302 = H[28] * H[28];
-    const real t303 = t301 + t302;
-    const real t304 = t300 + t303;
-    const real t305 = t56 * t304;
-    const real t306 = t299 + t305;
-    const real t307 = H[34] * U[20];
-    const real t308 = t307 * t307;
-    const real t309 = H[28] * U[18];
-    const real t310 = H[34] * U[19];
-    const real t311 = t309 + t310;
-    const real t312 = t311 * t311;
-    const real t313 = H[22] * U[15];
-    const real t314 = H[28] * U[16];
-    const real t315 = t313 + t314;
-    const real t316 = H[34] * U[17];
-    const real t317 = t315 + t316;
-    const real t318 = t317 * t317;
-    const real t319 = H[16] * U[11];
-    const real t320 = H[22] * U[12];
-    const real t321 = t319 + t320;
-    const real t322 = H[28] * U[13];
-    const real t323 = t321 + t322;
-    const real t324 = H[34] * U[14];
-    const real t325 = t323 + t324;
-    const real t326 = t325 * t325;
-    const real t327 = H[10] * U[6];
-    const real t328 = H[16] * U[7];
-    const real t329 = t327 + t328;
-    const real t330 = H[22] * U[8];
-    const real t331 = t329 + t330;
-    const real t332 = H[28] * U[9];
-    const real t333 = t331 + t332;
-    const real t334 = H[34] * U[10];
-    const real t335 = t333 + t334;
-    const real t336 = t335 * t335;
-    const real t337 = H[4] * U[0];
-    const real t338 = H[10] * U[1];
-    const real t339 = t337 + t338;
-    const real t340 = H[16] * U[2];
-    const real t341 = t339 + t340;
-    const real t342 = H[22] * U[3];
-    const real t343 = t341 + t342;
-    const real t344 = H[28] * U[4];
-    const real t345 = t343 + t344;
-    const real t346 = H[34] * U[5];
-    const real t347 = t345 + t346;
-    const real t348 = t347 * t347;
-    const real t349 = J[4] + t348;
-    const real t350 = t336 + t349;
-    const real t351 = t326 + t350;
-    const real t352 = t318 + t351;
-    const real t353 = t312 + t352;
-    const real t354 = t308 + t353;
-    const real t355 = t306 < t354;
-    if (!(t355 != 0)) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
-    const real t356 = H[17] * H[17];
-    const real t357 = H[5] * H[5];
-    const real t358 = H[11] * H[11];
-    const real t359 = t357 + t358;
-    const real t360 = t356 + t359;
-    const real t361 = t18 * t360;
-    const real t362 = H[35] * H[35];
-    const real t363 = H[23] * H[23];
-    const real t364 = H[29] * H[29];
-    const real t365 = t363 + t364;
-    const real t366 = t362 + t365;
-    const real t367 = t56 * t366;
-    const real t368 = t361 + t367;
-    const real t369 = H[35] * U[20];
-    const real t370 = t369 * t369;
-    const real t371 = H[29] * U[18];
-    const real t372 = H[35] * U[19];
-    const real t373 = t371 + t372;
-    const real t374 = t373 * t373;
-    const real t375 = H[23] * U[15];
-    const real t376 = H[29] * U[16];
-    const real t377 = t375 + t376;
-    const real t378 = H[35] * U[17];
-    const real t379 = t377 + t378;
-    const real t380 = t379 * t379;
-    const real t381 = H[17] * U[11];
-    const real t382 = H[23] * U[12];
-    const real t383 = t381 + t382;
-    const real t384 = H[29] * U[13];
-    const real t385 = t383 + t384;
-    const real t386 = H[35] * U[14];
-    const real t387 = t385 + t386;
-    const real t388 = t387 * t387;
-    const real t389 = H[11] * U[6];
-    const real t390 = H[17] * U[7];
-    const real t391 = t389 + t390;
-    const real t392 = H[23] * U[8];
-    const real t393 = t391 + t392;
-    const real t394 = H[29] * U[9];
-    const real t395 = t393 + t394;
-    const real t396 = H[35] * U[10];
-    const real t397 = t395 + t396;
-    const real t398 = t397 * t397;
-    const real t399 = H[5] * U[0];
-    const real t400 = H[11] * U[1];
-    const real t401 = t399 + t400;
-    const real t402 = H[17] * U[2];
-    const real t403 = t401 + t402;
-    const real t404 = H[23] * U[3];
-    const real t405 = t403 + t404;
-    const real t406 = H[29] * U[4];
-    const real t407 = t405 + t406;
-    const real t408 = H[35] * U[5];
-    const real t409 = t407 + t408;
-    const real t410 = t409 * t409;
-    const real t411 = J[5] + t410;
-    const real t412 = t398 + t411;
-    const real t413 = t388 + t412;
-    const real t414 = t380 + t413;
-    const real t415 = t374 + t414;
-    const real t416 = t370 + t415;
-    const real t417 = t368 < t416;
-    if (!(t417 != 0)) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
-    const real t418 = 1e-26 * t106;
-    const real t419 = sqrt(J[0]);
-    const real t420 = t419 * t419;
-    const real t421 = t60 + t420;
-    const real t422 = sqrt(t421);
-    const real t423 = t422 * t422;
-    const real t424 = t64 + t423;
-    const real t425 = sqrt(t424);
-    const real t426 = t425 * t425;
-    const real t427 = t70 + t426;
-    const real t428 = sqrt(t427);
-    const real t429 = t428 * t428;
-    const real t430 = t78 + t429;
-    const real t431 = sqrt(t430);
-    const real t432 = t431 * t431;
-    const real t433 = t88 + t432;
-    const real t434 = sqrt(t433);
-    const real t435 = t434 * t434;
-    const real t436 = t100 + t435;
-    const real t437 = sqrt(t436);
-    const real t438 = t437 * t437;
-    const real t439 = t418 < t438;
-    if (!(t439 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t440 = 1e-26 * t168;
-    const real t441 = 0.0 < t434;
-    const real t442 = t441 != 0 ? t434 : 1.0;
-    const real t443 = 1.0 / t442;
-    const real t444 = t87 * t443;
-    const real t445 = t441 != 0 ? t444 : 1.0;
-    const real t446 = t149 * t445;
-    const real t447 = 0.0 < t431;
-    const real t448 = t447 != 0 ? t431 : 1.0;
-    const real t449 = 1.0 / t448;
-    const real t450 = t77 * t449;
-    const real t451 = t447 != 0 ? t450 : 1.0;
-    const real t452 = t139 * t451;
-    const real t453 = 0.0 < t428;
-    const real t454 = t453 != 0 ? t428 : 1.0;
-    const real t455 = 1.0 / t454;
-    const real t456 = t69 * t455;
-    const real t457 = t453 != 0 ? t456 : 1.0;
-    const real t458 = t131 * t457;
-    const real t459 = 0.0 < t425;
-    const real t460 = t459 != 0 ? t425 : 1.0;
-    const real t461 = 1.0 / t460;
-    const real t462 = t63 * t461;
-    const real t463 = t459 != 0 ? t462 : 1.0;
-    const real t464 = t125 * t463;
-    const real t465 = 0.0 < t422;
-    const real t466 = t465 != 0 ? t422 : 1.0;
-    const real t467 = 1.0 / t466;
-    const real t468 = t59 * t467;
-    const real t469 = t465 != 0 ? t468 : 1.0;
-    const real t470 = t121 * t469;
-    const real t471 = t422 * t461;
-    const real t472 = t470 * t471;
-    const real t473 = t464 + t472;
-    const real t474 = t425 * t455;
-    const real t475 = t473 * t474;
-    const real t476 = t458 + t475;
-    const real t477 = t428 * t449;
-    const real t478 = t476 * t477;
-    const real t479 = t452 + t478;
-    const real t480 = t431 * t443;
-    const real t481 = t479 * t480;
-    const real t482 = t446 + t481;
-    const real t483 = 0.0 < t437;
-    const real t484 = t483 != 0 ? t437 : 1.0;
-    const real t485 = 1.0 / t484;
-    const real t486 = t99 * t485;
-    const real t487 = t483 != 0 ? t486 : 1.0;
-    const real t488 = t482 * t487;
-    const real t489 = t434 * t485;
-    const real t490 = t161 * t489;
-    const real t491 = t488 - t490;
-    const real t492 = t491 * t491;
-    const real t493 = t479 * t445;
-    const real t494 = t149 * t480;
-    const real t495 = t493 - t494;
-    const real t496 = t495 * t495;
-    const real t497 = t476 * t451;
-    const real t498 = t139 * t477;
-    const real t499 = t497 - t498;
-    const real t500 = t499 * t499;
-    const real t501 = t473 * t457;
-    const real t502 = t131 * t474;
-    const real t503 = t501 - t502;
-    const real t504 = t503 * t503;
-    const real t505 = t470 * t463;
-    const real t506 = t125 * t471;
-    const real t507 = t505 - t506;
-    const real t508 = t507 * t507;
-    const real t509 = t419 * t467;
-    const real t510 = t121 * t509;
-    const real t511 = t510 * t510;
-    const real t512 = sqrt(J[1]);
-    const real t513 = t512 * t512;
-    const real t514 = t511 + t513;
-    const real t515 = sqrt(t514);
-    const real t516 = t515 * t515;
-    const real t517 = t508 + t516;
-    const real t518 = sqrt(t517);
-    const real t519 = t518 * t518;
-    const real t520 = t504 + t519;
-    const real t521 = sqrt(t520);
-    const real t522 = t521 * t521;
-    const real t523 = t500 + t522;
-    const real t524 = sqrt(t523);
-    const real t525 = t524 * t524;
-    const real t526 = t496 + t525;
-    const real t527 = sqrt(t526);
-    const real t528 = t527 * t527;
-    const real t529 = t492 + t528;
-    const real t530 = sqrt(t529);
-    const real t531 = t530 * t530;
-    const real t532 = t440 < t531;
-    if (!(t532 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t533 = 1e-26 * t230;
-    const real t534 = t201 * t451;
-    const real t535 = t193 * t457;
-    const real t536 = t187 * t463;
-    const real t537 = t183 * t469;
-    const real t538 = t537 * t471;
-    const real t539 = t536 + t538;
-    const real t540 = t539 * t474;
-    const real t541 = t535 + t540;
-    const real t542 = t541 * t477;
-    const real t543 = t534 + t542;
-    const real t544 = t543 * t445;
-    const real t545 = t211 * t480;
-    const real t546 = t544 - t545;
-    const real t547 = 0.0 < t527;
-    const real t548 = t547 != 0 ? t527 : 1.0;
-    const real t549 = 1.0 / t548;
-    const real t550 = t495 * t549;
-    const real t551 = t547 != 0 ? t550 : 1.0;
-    const real t552 = t546 * t551;
-    const real t553 = t541 * t451;
-    const real t554 = t201 * t477;
-    const real t555 = t553 - t554;
-    const real t556 = 0.0 < t524;
-    const real t557 = t556 != 0 ? t524 : 1.0;
-    const real t558 = 1.0 / t557;
-    const real t559 = t499 * t558;
-    const real t560 = t556 != 0 ? t559 : 1.0;
-    const real t561 = t555 * t560;
-    const real t562 = t539 * t457;
-    const real t563 = t193 * t474;
-    const real t564 = t562 - t563;
-    const real t565 = 0.0 < t521;
-    const real t566 = t565 != 0 ? t521 : 1.0;
-    const real t567 = 1.0 / t566;
-    const real t568 = t503 * t567;
-    const real t569 = t565 != 0 ? t568 : 1.0;
-    const real t570 = t564 * t569;
-    const real t571 = t537 * t463;
-    const real t572 = t187 * t471;
-    const real t573 = t571 - t572;
-    const real t574 = 0.0 < t518;
-    const real t575 = t574 != 0 ? t518 : 1.0;
-    const real t576 = 1.0 / t575;
-    const real t577 = t507 * t576;
-    const real t578 = t574 != 0 ? t577 : 1.0;
-    const real t579 = t573 * t578;
-    const real t580 = t183 * t509;
-    const real t581 = 0.0 < t515;
-    const real t582 = t581 != 0 ? t515 : 1.0;
-    const real t583 = 1.0 / t582;
-    const real t584 = t510 * t583;
-    const real t585 = -t584;
-    const real t586 = t581 != 0 ? t585 : 1.0;
-    const real t587 = t580 * t586;
-    const real t588 = t515 * t576;
-    const real t589 = t587 * t588;
-    const real t590 = t579 - t589;
-    const real t591 = t518 * t567;
-    const real t592 = t590 * t591;
-    const real t593 = t570 + t592;
-    const real t594 = t521 * t558;
-    const real t595 = t593 * t594;
-    const real t596 = t561 + t595;
-    const real t597 = t524 * t549;
-    const real t598 = t596 * t597;
-    const real t599 = t552 + t598;
-    const real t600 = 0.0 < t530;
-    const real t601 = t600 != 0 ? t530 : 1.0;
-    const real t602 = 1.0 / t601;
-    const real t603 = t491 * t602;
-    const real t604 = t600 != 0 ? t603 : 1.0;
-    const real t605 = t599 * t604;
-    const real t606 = t211 * t445;
-    const real t607 = t543 * t480;
-    const real t608 = t606 + t607;
-    const real t609 = t608 * t487;
-    const real t610 = t223 * t489;
-    const real t611 = t609 - t610;
-    const real t612 = t527 * t602;
-    const real t613 = t611 * t612;
-    const real t614 = t605 - t613;
-    const real t615 = t614 * t614;
-    const real t616 = t596 * t551;
-    const real t617 = t546 * t597;
-    const real t618 = t616 - t617;
-    const real t619 = t618 * t618;
-    const real t620 = t593 * t560;
-    const real t621 = t555 * t594;
-    const real t622 = t620 - t621;
-    const real t623 = t622 * t622;
-    const real t624 = t590 * t569;
-    const real t625 = t564 * t591;
-    const real t626 = t624 - t625;
-    const real t627 = t626 * t626;
-    const real t628 = t587 * t578;
-    const real t629 = t573 * t588;
-    const real t630 = t628 + t629;
-    const real t631 = t630 * t630;
-    const real t632 = t512 * t583;
-    const real t633 = t580 * t632;
-    const real t634 = t633 * t633;
-    const real t635 = sqrt(J[2]);
-    const real t636 = t635 * t635;
-    const real t637 = t634 + t636;
-    const real t638 = sqrt(t637);
-    const real t639 = t638 * t638;
-    const real t640 = t631 + t639;
-    const real t641 = sqrt(t640);
-    const real t642 = t641 * t641;
-    const real t643 = t627 + t642;
-    const real t644 = sqrt(t643);
-    const real t645 = t644 * t644;
-    const real t646 = t623 + t645;
-    const real t647 = sqrt(t646);
-    const real t648 = t647 * t647;
-    const real t649 = t619 + t648;
-    const real t650 = sqrt(t649);
-    const real t651 = t650 * t650;
-    const real t652 = t615 + t651;
-    const real t653 = sqrt(t652);
-    const real t654 = t653 * t653;
-    const real t655 = t533 < t654;
-    if (!(t655 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t656 = 1e-26 * t292;
-    const real t657 = t255 * t457;
-    const real t658 = t249 * t463;
-    const real t659 = t245 * t469;
-    const real t660 = t659 * t471;
-    const real t661 = t658 + t660;
-    const real t662 = t661 * t474;
-    const real t663 = t657 + t662;
-    const real t664 = t663 * t451;
-    const real t665 = t263 * t477;
-    const real t666 = t664 - t665;
-    const real t667 = t666 * t560;
-    const real t668 = t661 * t457;
-    const real t669 = t255 * t474;
-    const real t670 = t668 - t669;
-    const real t671 = t670 * t569;
-    const real t672 = t659 * t463;
-    const real t673 = t249 * t471;
-    const real t674 = t672 - t673;
-    const real t675 = t674 * t578;
-    const real t676 = t245 * t509;
-    const real t677 = t676 * t586;
-    const real t678 = t677 * t588;
-    const real t679 = t675 - t678;
-    const real t680 = t679 * t591;
-    const real t681 = t671 + t680;
-    const real t682 = t681 * t594;
-    const real t683 = t667 + t682;
-    const real t684 = t683 * t551;
-    const real t685 = t263 * t451;
-    const real t686 = t663 * t477;
-    const real t687 = t685 + t686;
-    const real t688 = t687 * t445;
-    const real t689 = t273 * t480;
-    const real t690 = t688 - t689;
-    const real t691 = t690 * t597;
-    const real t692 = t684 - t691;
-    const real t693 = 0.0 < t650;
-    const real t694 = t693 != 0 ? t650 : 1.0;
-    const real t695 = 1.0 / t694;
-    const real t696 = t618 * t695;
-    const real t697 = t693 != 0 ? t696 : 1.0;
-    const real t698 = t692 * t697;
-    const real t699 = t681 * t560;
-    const real t700 = t666 * t594;
-    const real t701 = t699 - t700;
-    const real t702 = 0.0 < t647;
-    const real t703 = t702 != 0 ? t647 : 1.0;
-    const real t704 = 1.0 / t703;
-    const real t705 = t622 * t704;
-    const real t706 = t702 != 0 ? t705 : 1.0;
-    const real t707 = t701 * t706;
-    const real t708 = t679 * t569;
-    const real t709 = t670 * t591;
-    const real t710 = t708 - t709;
-    const real t711 = 0.0 < t644;
-    const real t712 = t711 != 0 ? t644 : 1.0;
-    const real t713 = 1.0 / t712;
-    const real t714 = t626 * t713;
-    const real t715 = t711 != 0 ? t714 : 1.0;
-    const real t716 = t710 * t715;
-    const real t717 = t676 * t632;
-    const real t718 = 0.0 < t638;
-    const real t719 = t718 != 0 ? t638 : 1.0;
-    const real t720 = 1.0 / t719;
-    const real t721 = t633 * t720;
-    const real t722 = t718 != 0 ? t721 : 1.0;
-    const real t723 = t717 * t722;
-    const real t724 = 0.0 < t641;
-    const real t725 = t724 != 0 ? t641 : 1.0;
-    const real t726 = 1.0 / t725;
-    const real t727 = t638 * t726;
-    const real t728 = t723 * t727;
-    const real t729 = t677 * t578;
-    const real t730 = t674 * t588;
-    const real t731 = t729 + t730;
-    const real t732 = t630 * t726;
-    const real t733 = -t732;
-    const real t734 = t724 != 0 ? t733 : 1.0;
-    const real t735 = t731 * t734;
-    const real t736 = t728 - t735;
-    const real t737 = t641 * t713;
-    const real t738 = t736 * t737;
-    const real t739 = t716 + t738;
-    const real t740 = t644 * t704;
-    const real t741 = t739 * t740;
-    const real t742 = t707 + t741;
-    const real t743 = t647 * t695;
-    const real t744 = t742 * t743;
-    const real t745 = t698 + t744;
-    const real t746 = 0.0 < t653;
-    const real t747 = t746 != 0 ? t653 : 1.0;
-    const real t748 = 1.0 / t747;
-    const real t749 = t614 * t748;
-    const real t750 = t746 != 0 ? t749 : 1.0;
-    const real t751 = t745 * t750;
-    const real t752 = t690 * t551;
-    const real t753 = t683 * t597;
-    const real t754 = t752 + t753;
-    const real t755 = t754 * t604;
-    const real t756 = t273 * t445;
-    const real t757 = t687 * t480;
-    const real t758 = t756 + t757;
-    const real t759 = t758 * t487;
-    const real t760 = t285 * t489;
-    const real t761 = t759 - t760;
-    const real t762 = t761 * t612;
-    const real t763 = t755 - t762;
-    const real t764 = t650 * t748;
-    const real t765 = t763 * t764;
-    const real t766 = t751 - t765;
-    const real t767 = t766 * t766;
-    const real t768 = t742 * t697;
-    const real t769 = t692 * t743;
-    const real t770 = t768 - t769;
-    const real t771 = t770 * t770;
-    const real t772 = t739 * t706;
-    const real t773 = t701 * t740;
-    const real t774 = t772 - t773;
-    const real t775 = t774 * t774;
-    const real t776 = t736 * t715;
-    const real t777 = t710 * t737;
-    const real t778 = t776 - t777;
-    const real t779 = t778 * t778;
-    const real t780 = t723 * t734;
-    const real t781 = t731 * t727;
-    const real t782 = t780 + t781;
-    const real t783 = t782 * t782;
-    const real t784 = t635 * t720;
-    const real t785 = t717 * t784;
-    const real t786 = t785 * t785;
-    const real t787 = sqrt(J[3]);
-    const real t788 = t787 * t787;
-    const real t789 = t786 + t788;
-    const real t790 = sqrt(t789);
-    const real t791 = t790 * t790;
-    const real t792 = t783 + t791;
-    const real t793 = sqrt(t792);
-    const real t794 = t793 * t793;
-    const real t795 = t779 + t794;
-    const real t796 = sqrt(t795);
-    const real t797 = t796 * t796;
-    const real t798 = t775 + t797;
-    const real t799 = sqrt(t798);
-    const real t800 = t799 * t799;
-    const real t801 = t771 + t800;
-    const real t802 = sqrt(t801);
-    const real t803 = t802 * t802;
-    const real t804 = t767 + t803;
-    const real t805 = sqrt(t804);
-    const real t806 = t805 * t805;
-    const real t807 = t656 < t806;
-    if (!(t807 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t808 = 1e-26 * t354;
-    const real t809 = t311 * t463;
-    const real t810 = t307 * t469;
-    const real t811 = t810 * t471;
-    const real t812 = t809 + t811;
-    const real t813 = t812 * t457;
-    const real t814 = t317 * t474;
-    const real t815 = t813 - t814;
-    const real t816 = t815 * t569;
-    const real t817 = t810 * t463;
-    const real t818 = t311 * t471;
-    const real t819 = t817 - t818;
-    const real t820 = t819 * t578;
-    const real t821 = t307 * t509;
-    const real t822 = t821 * t586;
-    const real t823 = t822 * t588;
-    const real t824 = t820 - t823;
-    const real t825 = t824 * t591;
-    const real t826 = t816 + t825;
-    const real t827 = t826 * t560;
-    const real t828 = t317 * t457;
-    const real t829 = t812 * t474;
-    const real t830 = t828 + t829;
-    const real t831 = t830 * t451;
-    const real t832 = t325 * t477;
-    const real t833 = t831 - t832;
-    const real t834 = t833 * t594;
-    const real t835 = t827 - t834;
-    const real t836 = t835 * t706;
-    const real t837 = t824 * t569;
-    const real t838 = t815 * t591;
-    const real t839 = t837 - t838;
-    const real t840 = t839 * t715;
-    const real t841 = t821 * t632;
-    const real t842 = t841 * t722;
-    const real t843 = t842 * t727;
-    const real t844 = t822 * t578;
-    const real t845 = t819 * t588;
-    const real t846 = t844 + t845;
-    const real t847 = t846 * t734;
-    const real t848 = t843 - t847;
-    const real t849 = t848 * t737;
-    const real t850 = t840 + t849;
-    const real t851 = t850 * t740;
-    const real t852 = t836 + t851;
-    const real t853 = t852 * t697;
-    const real t854 = t833 * t560;
-    const real t855 = t826 * t594;
-    const real t856 = t854 + t855;
-    const real t857 = t856 * t551;
-    const real t858 = t325 * t451;
-    const real t859 = t830 * t477;
-    const real t860 = t858 + t859;
-    const real t861 = t860 * t445;
-    const real t862 = t335 * t480;
-    const real t863 = t861 - t862;
-    const real t864 = t863 * t597;
-    const real t865 = t857 - t864;
-    const real t866 = t865 * t743;
-    const real t867 = t853 - t866;
-    const real t868 = 0.0 < t802;
-    const real t869 = t868 != 0 ? t802 : 1.0;
-    const real t870 = 1.0 / t869;
-    const real t871 = t770 * t870;
-    const real t872 = t868 != 0 ? t871 : 1.0;
-    const real t873 = t867 * t872;
-    const real t874 = t850 * t706;
-    const real t875 = t835 * t740;
-    const real t876 = t874 - t875;
-    const real t877 = 0.0 < t799;
-    const real t878 = t877 != 0 ? t799 : 1.0;
-    const real t879 = 1.0 / t878;
-    const real t880 = t774 * t879;
-    const real t881 = t877 != 0 ? t880 : 1.0;
-    const real t882 = t876 * t881;
-    const real t883 = t848 * t715;
-    const real t884 = t839 * t737;
-    const real t885 = t883 - t884;
-    const real t886 = 0.0 < t796;
-    const real t887 = t886 != 0 ? t796 : 1.0;
-    const real t888 = 1.0 / t887;
-    const real t889 = t778 * t888;
-    const real t890 = t886 != 0 ? t889 : 1.0;
-    const real t891 = t885 * t890;
-    const real t892 = t842 * t734;
-    const real t893 = t846 * t727;
-    const real t894 = t892 + t893;
-    const real t895 = 0.0 < t793;
-    const real t896 = t895 != 0 ? t793 : 1.0;
-    const real t897 = 1.0 / t896;
-    const real t898 = t782 * t897;
-    const real t899 = t895 != 0 ? t898 : 1.0;
-    const real t900 = t894 * t899;
-    const real t901 = t841 * t784;
-    const real t902 = 0.0 < t790;
-    const real t903 = t902 != 0 ? t790 : 1.0;
-    const real t904 = 1.0 / t903;
-    const real t905 = t785 * t904;
-    const real t906 = -t905;
-    const real t907 = t902 != 0 ? t906 : 1.0;
-    const real t908 = t901 * t907;
-    const real t909 = t790 * t897;
-    const real t910 = t908 * t909;
-    const real t911 = t900 - t910;
-    const real t912 = t793 * t888;
-    const real t913 = t911 * t912;
-    const real t914 = t891 + t913;
-    const real t915 = t796 * t879;
-    const real t916 = t914 * t915;
-    const real t917 = t882 + t916;
-    const real t918 = t799 * t870;
-    const real t919 = t917 * t918;
-    const real t920 = t873 + t919;
-    const real t921 = 0.0 < t805;
-    const real t922 = t921 != 0 ? t805 : 1.0;
-    const real t923 = 1.0 / t922;
-    const real t924 = t766 * t923;
-    const real t925 = t921 != 0 ? t924 : 1.0;
-    const real t926 = t920 * t925;
-    const real t927 = t865 * t697;
-    const real t928 = t852 * t743;
-    const real t929 = t927 + t928;
-    const real t930 = t929 * t750;
-    const real t931 = t863 * t551;
-    const real t932 = t856 * t597;
-    const real t933 = t931 + t932;
-    const real t934 = t933 * t604;
-    const real t935 = t335 * t445;
-    const real t936 = t860 * t480;
-    const real t937 = t935 + t936;
-    const real t938 = t937 * t487;
-    const real t939 = t347 * t489;
-    const real t940 = t938 - t939;
-    const real t941 = t940 * t612;
-    const real t942 = t934 - t941;
-    const real t943 = t942 * t764;
-    const real t944 = t930 - t943;
-    const real t945 = t802 * t923;
-    const real t946 = t944 * t945;
-    const real t947 = t926 - t946;
-    const real t948 = t947 * t947;
-    const real t949 = t917 * t872;
-    const real t950 = t867 * t918;
-    const real t951 = t949 - t950;
-    const real t952 = t951 * t951;
-    const real t953 = t914 * t881;
-    const real t954 = t876 * t915;
-    const real t955 = t953 - t954;
-    const real t956 = t955 * t955;
-    const real t957 = t911 * t890;
-    const real t958 = t885 * t912;
-    const real t959 = t957 - t958;
-    const real t960 = t959 * t959;
-    const real t961 = t908 * t899;
-    const real t962 = t894 * t909;
-    const real t963 = t961 + t962;
-    const real t964 = t963 * t963;
-    const real t965 = t787 * t904;
-    const real t966 = t901 * t965;
-    const real t967 = t966 * t966;
-    const real t968 = sqrt(J[4]);
-    const real t969 = t968 * t968;
-    const real t970 = t967 + t969;
-    const real t971 = sqrt(t970);
-    const real t972 = t971 * t971;
-    const real t973 = t964 + t972;
-    const real t974 = sqrt(t973);
-    const real t975 = t974 * t974;
-    const real t976 = t960 + t975;
-    const real t977 = sqrt(t976);
-    const real t978 = t977 * t977;
-    const real t979 = t956 + t978;
-    const real t980 = sqrt(t979);
-    const real t981 = t980 * t980;
-    const real t982 = t952 + t981;
-    const real t983 = sqrt(t982);
-    const real t984 = t983 * t983;
-    const real t985 = t948 + t984;
-    const real t986 = sqrt(t985);
-    const real t987 = t986 * t986;
-    const real t988 = t808 < t987;
-    if (!(t988 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t989 = 1e-26 * t416;
-    const real t990 = t369 * t469;
-    const real t991 = t990 * t463;
-    const real t992 = t373 * t471;
-    const real t993 = t991 - t992;
-    const real t994 = t993 * t578;
-    const real t995 = t369 * t509;
-    const real t996 = t995 * t586;
-    const real t997 = t996 * t588;
-    const real t998 = t994 - t997;
-    const real t999 = t998 * t569;
-    const real t1000 = t373 * t463;
-    const real t1001 = t990 * t471;
-    const real t1002 = t1000 + t1001;
-    const real t1003 = t1002 * t457;
-    const real t1004 = t379 * t474;
-    const real t1005 = t1003 - t1004;
-    const real t1006 = t1005 * t591;
-    const real t1007 = t999 - t1006;
-    const real t1008 = t1007 * t715;
-    const real t1009 = t995 * t632;
-    const real t1010 = t1009 * t722;
-    const real t1011 = t1010 * t727;
-    const real t1012 = t996 * t578;
-    const real t1013 = t993 * t588;
-    const real t1014 = t1012 + t1013;
-    const real t1015 = t1014 * t734;
-    const real t1016 = t1011 - t1015;
-    const real t1017 = t1016 * t737;
-    const real t1018 = t1008 + t1017;
-    const real t1019 = t1018 * t706;
-    const real t1020 = t1005 * t569;
-    const real t1021 = t998 * t591;
-    const real t1022 = t1020 + t1021;
-    const real t1023 = t1022 * t560;
-    const real t1024 = t379 * t457;
-    const real t1025 = t1002 * t474;
-    const real t1026 = t1024 + t1025;
-    const real t1027 = t1026 * t451;
-    const real t1028 = t387 * t477;
-    const real t1029 = t1027 - t1028;
-    const real t1030 = t1029 * t594;
-    const real t1031 = t1023 - t1030;
-    const real t1032 = t1031 * t740;
-    const real t1033 = t1019 - t1032;
-    const real t1034 = t1033 * t881;
-    const real t1035 = t1016 * t715;
-    const real t1036 = t1007 * t737;
-    const real t1037 = t1035 - t1036;
-    const real t1038 = t1037 * t890;
-    const real t1039 = t1010 * t734;
-    const real t1040 = t1014 * t727;
-    const real t1041 = t1039 + t1040;
-    const real t1042 = t1041 * t899;
-    const real t1043 = t1009 * t784;
-    const real t1044 = t1043 * t907;
-    const real t1045 = t1044 * t909;
-    const real t1046 = t1042 - t1045;
-    const real t1047 = t1046 * t912;
-    const real t1048 = t1038 + t1047;
-    const real t1049 = t1048 * t915;
-    const real t1050 = t1034 + t1049;
-    const real t1051 = t1050 * t872;
-    const real t1052 = t1031 * t706;
-    const real t1053 = t1018 * t740;
-    const real t1054 = t1052 + t1053;
-    const real t1055 = t1054 * t697;
-    const real t1056 = t1029 * t560;
-    const real t1057 = t1022 * t594;
-    const real t1058 = t1056 + t1057;
-    const real t1059 = t1058 * t551;
-    const real t1060 = t387 * t451;
-    const real t1061 = t1026 * t477;
-    const real t1062 = t1060 + t1061;
-    const real t1063 = t1062 * t445;
-    const real t1064 = t397 * t480;
-    const real t1065 = t1063 - t1064;
-    const real t1066 = t1065 * t597;
-    const real t1067 = t1059 - t1066;
-    const real t1068 = t1067 * t743;
-    const real t1069 = t1055 - t1068;
-    const real t1070 = t1069 * t918;
-    const real t1071 = t1051 - t1070;
-    const real t1072 = 0.0 < t983;
-    const real t1073 = t1072 != 0 ? t983 : 1.0;
-    const real t1074 = 1.0 / t1073;
-    const real t1075 = t951 * t1074;
-    const real t1076 = t1072 != 0 ? t1075 : 1.0;
-    const real t1077 = t1071 * t1076;
-    const real t1078 = t1048 * t881;
-    const real t1079 = t1033 * t915;
-    const real t1080 = t1078 - t1079;
-    const real t1081 = 0.0 < t980;
-    const real t1082 = t1081 != 0 ? t980 : 1.0;
-    const real t1083 = 1.0 / t1082;
-    const real t1084 = t955 * t1083;
-    const real t1085 = t1081 != 0 ? t1084 : 1.0;
-    const real t1086 = t1080 * t1085;
-    const real t1087 = t1046 * t890;
-    const real t1088 = t1037 * t912;
-    const real t1089 = t1087 - t1088;
-    const real t1090 = 0.0 < t977;
-    const real t1091 = t1090 != 0 ? t977 : 1.0;
-    const real t1092 = 1.0 / t1091;
-    const real t1093 = t959 * t1092;
-    const real t1094 = t1090 != 0 ? t1093 : 1.0;
-    const real t1095 = t1089 * t1094;
-    const real t1096 = t1043 * t965;
-    const real t1097 = 0.0 < t971;
-    const real t1098 = t1097 != 0 ? t971 : 1.0;
-    const real t1099 = 1.0 / t1098;
-    const real t1100 = t966 * t1099;
-    const real t1101 = t1097 != 0 ? t1100 : 1.0;
-    const real t1102 = t1096 * t1101;
-    const real t1103 = 0.0 < t974;
-    const real t1104 = t1103 != 0 ? t974 : 1.0;
-    const real t1105 = 1.0 / t1104;
-    const real t1106 = t971 * t1105;
-    const real t1107 = t1102 * t1106;
-    const real t1108 = t1044 * t899;
-    const real t1109 = t1041 * t909;
-    const real t1110 = t1108 + t1109;
-    const real t1111 = t963 * t1105;
-    const real t1112 = -t1111;
-    const real t1113 = t1103 != 0 ? t1112 : 1.0;
-    const real t1114 = t1110 * t1113;
-    const real t1115 = t1107 - t1114;
-    const real t1116 = t974 * t1092;
-    const real t1117 = t1115 * t1116;
-    const real t1118 = t1095 + t1117;
-    const real t1119 = t977 * t1083;
-    const real t1120 = t1118 * t1119;
-    const real t1121 = t1086 + t1120;
-    const real t1122 = t980 * t1074;
-    const real t1123 = t1121 * t1122;
-    const real t1124 = t1077 + t1123;
-    const real t1125 = 0.0 < t986;
-    const real t1126 = t1125 != 0 ? t986 : 1.0;
-    const real t1127 = 1.0 / t1126;
-    const real t1128 = t947 * t1127;
-    const real t1129 = t1125 != 0 ? t1128 : 1.0;
-    const real t1130 = t1124 * t1129;
-    const real t1131 = t1069 * t872;
-    const real t1132 = t1050 * t918;
-    const real t1133 = t1131 + t1132;
-    const real t1134 = t1133 * t925;
-    const real t1135 = t1067 * t697;
-    const real t1136 = t1054 * t743;
-    const real t1137 = t1135 + t1136;
-    const real t1138 = t1137 * t750;
-    const real t1139 = t1065 * t551;
-    const real t1140 = t1058 * t597;
-    const real t1141 = t1139 + t1140;
-    const real t1142 = t1141 * t604;
-    const real t1143 = t397 * t445;
-    const real t1144 = t1062 * t480;
-    const real t1145 = t1143 + t1144;
-    const real t1146 = t1145 * t487;
-    const real t1147 = t409 * t489;
-    const real t1148 = t1146 - t1147;
-    const real t1149 = t1148 * t612;
-    const real t1150 = t1142 - t1149;
-    const real t1151 = t1150 * t764;
-    const real t1152 = t1138 - t1151;
-    const real t1153 = t1152 * t945;
-    const real t1154 = t1134 - t1153;
-    const real t1155 = t983 * t1127;
-    const real t1156 = t1154 * t1155;
-    const real t1157 = t1130 - t1156;
-    const real t1158 = t1157 * t1157;
-    const real t1159 = t1121 * t1076;
-    const real t1160 = t1071 * t1122;
-    const real t1161 = t1159 - t1160;
-    const real t1162 = t1161 * t1161;
-    const real t1163 = t1118 * t1085;
-    const real t1164 = t1080 * t1119;
-    const real t1165 = t1163 - t1164;
-    const real t1166 = t1165 * t1165;
-    const real t1167 = t1115 * t1094;
-    const real t1168 = t1089 * t1116;
-    const real t1169 = t1167 - t1168;
-    const real t1170 = t1169 * t1169;
-    const real t1171 = t1102 * t1113;
-    const real t1172 = t1110 * t1106;
-    const real t1173 = t1171 + t1172;
-    const real t1174 = t1173 * t1173;
-    const real t1175 = t968 * t1099;
-    const real t1176 = t1096 * t1175;
-    const real t1177 = t1176 * t1176;
-    const real t1178 = sqrt(J[5]);
-    const real t1179 = t1178 * t1178;
-    const real t1180 = t1177 + t1179;
-    const real t1181 = sqrt(t1180);
-    const real t1182 = t1181 * t1181;
-    const real t1183 = t1174 + t1182;
-    const real t1184 = sqrt(t1183);
-    const real t1185 = t1184 * t1184;
-    const real t1186 = t1170 + t1185;
-    const real t1187 = sqrt(t1186);
-    const real t1188 = t1187 * t1187;
-    const real t1189 = t1166 + t1188;
-    const real t1190 = sqrt(t1189);
-    const real t1191 = t1190 * t1190;
-    const real t1192 = t1162 + t1191;
-    const real t1193 = sqrt(t1192);
-    const real t1194 = t1193 * t1193;
-    const real t1195 = t1158 + t1194;
-    const real t1196 = sqrt(t1195);
-    const real t1197 = t1196 * t1196;
-    const real t1198 = t989 < t1197;
-    if (!(t1198 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t1199 = U[0] * t487;
-    const real t1200 = 1.0 / t437;
-    const real t1201 = t1199 * t1200;
-    const real t1202 = t161 * t487;
-    const real t1203 = t482 * t489;
-    const real t1204 = t1202 + t1203;
-    const real t1205 = t1204 * t1200;
-    const real t1206 = t1148 * t604;
-    const real t1207 = t1141 * t612;
-    const real t1208 = t1206 + t1207;
-    const real t1209 = 1.0 / t530;
-    const real t1210 = t1208 * t1209;
-    const real t1211 = U[0] * t489;
-    const real t1212 = t1211 * t612;
-    const real t1213 = t1212 * t764;
-    const real t1214 = t1213 * t945;
-    const real t1215 = t1214 * t1155;
-    const real t1216 = 0.0 < t1196;
-    const real t1217 = t1216 != 0 ? t1196 : 1.0;
-    const real t1218 = 1.0 / t1217;
-    const real t1219 = t1157 * t1218;
-    const real t1220 = t1216 != 0 ? t1219 : 1.0;
-    const real t1221 = t1215 * t1220;
-    const real t1222 = 1.0 / t1196;
-    const real t1223 = t1221 * t1222;
-    const real t1224 = t1210 * t1223;
-    const real t1225 = t1211 * t604;
-    const real t1226 = t1225 * t1209;
-    const real t1227 = t611 * t604;
-    const real t1228 = t599 * t612;
-    const real t1229 = t1227 + t1228;
-    const real t1230 = t1229 * t1209;
-    const real t1231 = t1212 * t750;
-    const real t1232 = 1.0 / t653;
-    const real t1233 = t1231 * t1232;
-    const real t1234 = t763 * t750;
-    const real t1235 = t745 * t764;
-    const real t1236 = t1234 + t1235;
-    const real t1237 = t1236 * t1232;
-    const real t1238 = t1152 * t925;
-    const real t1239 = t1133 * t945;
-    const real t1240 = t1238 + t1239;
-    const real t1241 = 1.0 / t805;
-    const real t1242 = t1240 * t1241;
-    const real t1243 = t1242 * t1223;
-    const real t1244 = t1213 * t925;
-    const real t1245 = t1244 * t1241;
-    const real t1246 = t944 * t925;
-    const real t1247 = t920 * t945;
-    const real t1248 = t1246 + t1247;
-    const real t1249 = t1248 * t1241;
-    const real t1250 = t1214 * t1129;
-    const real t1251 = 1.0 / t986;
-    const real t1252 = t1250 * t1251;
-    const real t1253 = t1154 * t1129;
-    const real t1254 = t1124 * t1155;
-    const real t1255 = t1253 + t1254;
-    const real t1256 = t1255 * t1251;
-    const real t1257 = t1256 * t1223;
-    const real t1258 = t1252 + t1257;
-    const real t1259 = t1249 * t1258;
-    const real t1260 = t1245 + t1259;
-    const real t1261 = t1243 - t1260;
-    const real t1262 = t1237 * t1261;
-    const real t1263 = t1233 - t1262;
-    const real t1264 = t942 * t750;
-    const real t1265 = t929 * t764;
-    const real t1266 = t1264 + t1265;
-    const real t1267 = t1266 * t1232;
-    const real t1268 = t1267 * t1258;
-    const real t1269 = t1263 - t1268;
-    const real t1270 = t1150 * t750;
-    const real t1271 = t1137 * t764;
-    const real t1272 = t1270 + t1271;
-    const real t1273 = t1272 * t1232;
-    const real t1274 = t1273 * t1223;
-    const real t1275 = t1269 + t1274;
-    const real t1276 = t1230 * t1275;
-    const real t1277 = t1226 + t1276;
-    const real t1278 = t761 * t604;
-    const real t1279 = t754 * t612;
-    const real t1280 = t1278 + t1279;
-    const real t1281 = t1280 * t1209;
-    const real t1282 = t1281 * t1261;
-    const real t1283 = t1277 + t1282;
-    const real t1284 = t940 * t604;
-    const real t1285 = t933 * t612;
-    const real t1286 = t1284 + t1285;
-    const real t1287 = t1286 * t1209;
-    const real t1288 = t1287 * t1258;
-    const real t1289 = t1283 + t1288;
-    const real t1290 = t1224 - t1289;
-    const real t1291 = t1205 * t1290;
-    const real t1292 = t1201 - t1291;
-    const real t1293 = t223 * t487;
-    const real t1294 = t608 * t489;
-    const real t1295 = t1293 + t1294;
-    const real t1296 = t1295 * t1200;
-    const real t1297 = t1296 * t1275;
-    const real t1298 = t1292 - t1297;
-    const real t1299 = t285 * t487;
-    const real t1300 = t758 * t489;
-    const real t1301 = t1299 + t1300;
-    const real t1302 = t1301 * t1200;
-    const real t1303 = t1302 * t1261;
-    const real t1304 = t1298 - t1303;
-    const real t1305 = t347 * t487;
-    const real t1306 = t937 * t489;
-    const real t1307 = t1305 + t1306;
-    const real t1308 = t1307 * t1200;
-    const real t1309 = t1308 * t1258;
-    const real t1310 = t1304 - t1309;
-    const real t1311 = t409 * t487;
-    const real t1312 = t1145 * t489;
-    const real t1313 = t1311 + t1312;
-    const real t1314 = t1313 * t1200;
-    const real t1315 = t1314 * t1223;
-    const real t1316 = t1310 + t1315;
-    G[0] = t1316;
-    const real t1317 = U[1] * t487;
-    const real t1318 = U[6] * t445;
-    const real t1319 = t1318 * t489;
-    const real t1320 = t1317 + t1319;
-    const real t1321 = t1320 * t1200;
-    const real t1322 = t1318 * t487;
-    const real t1323 = U[1] * t489;
-    const real t1324 = t1322 - t1323;
-    const real t1325 = t1324 * t604;
-    const real t1326 = U[6] * t480;
-    const real t1327 = t1326 * t551;
-    const real t1328 = t1327 * t612;
-    const real t1329 = t1325 - t1328;
-    const real t1330 = t1329 * t1209;
-    const real t1331 = t1326 * t597;
-    const real t1332 = t1331 * t697;
-    const real t1333 = t1332 * t764;
-    const real t1334 = t1327 * t604;
-    const real t1335 = t1324 * t612;
-    const real t1336 = t1334 + t1335;
-    const real t1337 = t1336 * t750;
-    const real t1338 = t1333 - t1337;
-    const real t1339 = t1338 * t1232;
-    const real t1340 = t1332 * t750;
-    const real t1341 = t1336 * t764;
-    const real t1342 = t1340 + t1341;
-    const real t1343 = t1342 * t925;
-    const real t1344 = t1331 * t743;
-    const real t1345 = t1344 * t872;
-    const real t1346 = t1345 * t945;
-    const real t1347 = t1343 - t1346;
-    const real t1348 = t1347 * t1241;
-    const real t1349 = t1344 * t918;
-    const real t1350 = t1349 * t1076;
-    const real t1351 = t1350 * t1155;
-    const real t1352 = t1345 * t925;
-    const real t1353 = t1342 * t945;
-    const real t1354 = t1352 + t1353;
-    const real t1355 = t1354 * t1129;
-    const real t1356 = t1351 - t1355;
-    const real t1357 = t1356 * t1251;
-    const real t1358 = t1350 * t1129;
-    const real t1359 = t1354 * t1155;
-    const real t1360 = t1358 + t1359;
-    const real t1361 = t1360 * t1220;
-    const real t1362 = t1349 * t1122;
-    const real t1363 = 0.0 < t1193;
-    const real t1364 = t1363 != 0 ? t1193 : 1.0;
-    const real t1365 = 1.0 / t1364;
-    const real t1366 = t1161 * t1365;
-    const real t1367 = t1363 != 0 ? t1366 : 1.0;
-    const real t1368 = t1362 * t1367;
-    const real t1369 = t1193 * t1218;
-    const real t1370 = t1368 * t1369;
-    const real t1371 = t1361 - t1370;
-    const real t1372 = t1371 * t1222;
-    const real t1373 = t1256 * t1372;
-    const real t1374 = t1357 - t1373;
-    const real t1375 = t1249 * t1374;
-    const real t1376 = t1348 - t1375;
-    const real t1377 = t1242 * t1372;
-    const real t1378 = t1376 - t1377;
-    const real t1379 = t1237 * t1378;
-    const real t1380 = t1339 - t1379;
-    const real t1381 = t1267 * t1374;
-    const real t1382 = t1380 - t1381;
-    const real t1383 = t1273 * t1372;
-    const real t1384 = t1382 - t1383;
-    const real t1385 = t1230 * t1384;
-    const real t1386 = t1330 - t1385;
-    const real t1387 = t1281 * t1378;
-    const real t1388 = t1386 - t1387;
-    const real t1389 = t1287 * t1374;
-    const real t1390 = t1388 - t1389;
-    const real t1391 = t1210 * t1372;
-    const real t1392 = t1390 - t1391;
-    const real t1393 = t1205 * t1392;
-    const real t1394 = t1321 - t1393;
-    const real t1395 = t1296 * t1384;
-    const real t1396 = t1394 - t1395;
-    const real t1397 = t1302 * t1378;
-    const real t1398 = t1396 - t1397;
-    const real t1399 = t1308 * t1374;
-    const real t1400 = t1398 - t1399;
-    const real t1401 = t1314 * t1372;
-    const real t1402 = t1400 - t1401;
-    G[1] = t1402;
-    const real t1403 = U[2] * t487;
-    const real t1404 = U[7] * t445;
-    const real t1405 = U[11] * t451;
-    const real t1406 = t1405 * t480;
-    const real t1407 = t1404 + t1406;
-    const real t1408 = t1407 * t489;
-    const real t1409 = t1403 + t1408;
-    const real t1410 = t1409 * t1200;
-    const real t1411 = t1407 * t487;
-    const real t1412 = U[2] * t489;
-    const real t1413 = t1411 - t1412;
-    const real t1414 = t1413 * t604;
-    const real t1415 = t1405 * t445;
-    const real t1416 = U[7] * t480;
-    const real t1417 = t1415 - t1416;
-    const real t1418 = t1417 * t551;
-    const real t1419 = U[11] * t477;
-    const real t1420 = t1419 * t560;
-    const real t1421 = t1420 * t597;
-    const real t1422 = t1418 - t1421;
-    const real t1423 = t1422 * t612;
-    const real t1424 = t1414 + t1423;
-    const real t1425 = t1424 * t1209;
-    const real t1426 = t1422 * t604;
-    const real t1427 = t1413 * t612;
-    const real t1428 = t1426 - t1427;
-    const real t1429 = t1428 * t750;
-    const real t1430 = t1419 * t594;
-    const real t1431 = t1430 * t706;
-    const real t1432 = t1431 * t743;
-    const real t1433 = t1420 * t551;
-    const real t1434 = t1417 * t597;
-    const real t1435 = t1433 + t1434;
-    const real t1436 = t1435 * t697;
-    const real t1437 = t1432 - t1436;
-    const real t1438 = t1437 * t764;
-    const real t1439 = t1429 + t1438;
-    const real t1440 = t1439 * t1232;
-    const real t1441 = t1437 * t750;
-    const real t1442 = t1428 * t764;
-    const real t1443 = t1441 - t1442;
-    const real t1444 = t1443 * t925;
-    const real t1445 = t1431 * t697;
-    const real t1446 = t1435 * t743;
-    const real t1447 = t1445 + t1446;
-    const real t1448 = t1447 * t872;
-    const real t1449 = t1430 * t740;
-    const real t1450 = t1449 * t881;
-    const real t1451 = t1450 * t918;
-    const real t1452 = t1448 - t1451;
-    const real t1453 = t1452 * t945;
-    const real t1454 = t1444 + t1453;
-    const real t1455 = t1454 * t1241;
-    const real t1456 = t1452 * t925;
-    const real t1457 = t1443 * t945;
-    const real t1458 = t1456 - t1457;
-    const real t1459 = t1458 * t1129;
-    const real t1460 = t1449 * t915;
-    const real t1461 = t1460 * t1085;
-    const real t1462 = t1461 * t1122;
-    const real t1463 = t1450 * t872;
-    const real t1464 = t1447 * t918;
-    const real t1465 = t1463 + t1464;
-    const real t1466 = t1465 * t1076;
-    const real t1467 = t1462 - t1466;
-    const real t1468 = t1467 * t1155;
-    const real t1469 = t1459 + t1468;
-    const real t1470 = t1469 * t1251;
-    const real t1471 = t1467 * t1129;
-    const real t1472 = t1458 * t1155;
-    const real t1473 = t1471 - t1472;
-    const real t1474 = t1473 * t1220;
-    const real t1475 = t1461 * t1076;
-    const real t1476 = t1465 * t1122;
-    const real t1477 = t1475 + t1476;
-    const real t1478 = t1477 * t1367;
-    const real t1479 = t1460 * t1119;
-    const real t1480 = 0.0 < t1190;
-    const real t1481 = t1480 != 0 ? t1190 : 1.0;
-    const real t1482 = 1.0 / t1481;
-    const real t1483 = t1165 * t1482;
-    const real t1484 = t1480 != 0 ? t1483 : 1.0;
-    const real t1485 = t1479 * t1484;
-    const real t1486 = t1190 * t1365;
-    const real t1487 = t1485 * t1486;
-    const real t1488 = t1478 - t1487;
-    const real t1489 = t1488 * t1369;
-    const real t1490 = t1474 + t1489;
-    const real t1491 = t1490 * t1222;
-    const real t1492 = t1256 * t1491;
-    const real t1493 = t1470 - t1492;
-    const real t1494 = t1249 * t1493;
-    const real t1495 = t1455 - t1494;
-    const real t1496 = t1242 * t1491;
-    const real t1497 = t1495 - t1496;
-    const real t1498 = t1237 * t1497;
-    const real t1499 = t1440 - t1498;
-    const real t1500 = t1267 * t1493;
-    const real t1501 = t1499 - t1500;
-    const real t1502 = t1273 * t1491;
-    const real t1503 = t1501 - t1502;
-    const real t1504 = t1230 * t1503;
-    const real t1505 = t1425 - t1504;
-    const real t1506 = t1281 * t1497;
-    const real t1507 = t1505 - t1506;
-    const real t1508 = t1287 * t1493;
-    const real t1509 = t1507 - t1508;
-    const real t1510 = t1210 * t1491;
-    const real t1511 = t1509 - t1510;
-    const real t1512 = t1205 * t1511;
-    const real t1513 = t1410 - t1512;
-    const real t1514 = t1296 * t1503;
-    const real t1515 = t1513 - t1514;
-    const real t1516 = t1302 * t1497;
-    const real t1517 = t1515 - t1516;
-    const real t1518 = t1308 * t1493;
-    const real t1519 = t1517 - t1518;
-    const real t1520 = t1314 * t1491;
-    const real t1521 = t1519 - t1520;
-    G[2] = t1521;
-    const real t1522 = U[3] * t487;
-    const real t1523 = U[8] * t445;
-    const real t1524 = U[12] * t451;
-    const real t1525 = U[15] * t457;
-    const real t1526 = t1525 * t477;
-    const real t1527 = t1524 + t1526;
-    const real t1528 = t1527 * t480;
-    const real t1529 = t1523 + t1528;
-    const real t1530 = t1529 * t489;
-    const real t1531 = t1522 + t1530;
-    const real t1532 = t1531 * t1200;
-    const real t1533 = t1529 * t487;
-    const real t1534 = U[3] * t489;
-    const real t1535 = t1533 - t1534;
-    const real t1536 = t1535 * t604;
-    const real t1537 = t1527 * t445;
-    const real t1538 = U[8] * t480;
-    const real t1539 = t1537 - t1538;
-    const real t1540 = t1539 * t551;
-    const real t1541 = t1525 * t451;
-    const real t1542 = U[12] * t477;
-    const real t1543 = t1541 - t1542;
-    const real t1544 = t1543 * t560;
-    const real t1545 = U[15] * t474;
-    const real t1546 = t1545 * t569;
-    const real t1547 = t1546 * t594;
-    const real t1548 = t1544 - t1547;
-    const real t1549 = t1548 * t597;
-    const real t1550 = t1540 + t1549;
-    const real t1551 = t1550 * t612;
-    const real t1552 = t1536 + t1551;
-    const real t1553 = t1552 * t1209;
-    const real t1554 = t1550 * t604;
-    const real t1555 = t1535 * t612;
-    const real t1556 = t1554 - t1555;
-    const real t1557 = t1556 * t750;
-    const real t1558 = t1548 * t551;
-    const real t1559 = t1539 * t597;
-    const real t1560 = t1558 - t1559;
-    const real t1561 = t1560 * t697;
-    const real t1562 = t1545 * t591;
-    const real t1563 = t1562 * t715;
-    const real t1564 = t1563 * t740;
-    const real t1565 = t1546 * t560;
-    const real t1566 = t1543 * t594;
-    const real t1567 = t1565 + t1566;
-    const real t1568 = t1567 * t706;
-    const real t1569 = t1564 - t1568;
-    const real t1570 = t1569 * t743;
-    const real t1571 = t1561 + t1570;
-    const real t1572 = t1571 * t764;
-    const real t1573 = t1557 + t1572;
-    const real t1574 = t1573 * t1232;
-    const real t1575 = t1571 * t750;
-    const real t1576 = t1556 * t764;
-    const real t1577 = t1575 - t1576;
-    const real t1578 = t1577 * t925;
-    const real t1579 = t1569 * t697;
-    const real t1580 = t1560 * t743;
-    const real t1581 = t1579 - t1580;
-    const real t1582 = t1581 * t872;
-    const real t1583 = t1563 * t706;
-    const real t1584 = t1567 * t740;
-    const real t1585 = t1583 + t1584;
-    const real t1586 = t1585 * t881;
-    const real t1587 = t1562 * t737;
-    const real t1588 = t1587 * t890;
-    const real t1589 = t1588 * t915;
-    const real t1590 = t1586 - t1589;
-    const real t1591 = t1590 * t918;
-    const real t1592 = t1582 + t1591;
-    const real t1593 = t1592 * t945;
-    const real t1594 = t1578 + t1593;
-    const real t1595 = t1594 * t1241;
-    const real t1596 = t1592 * t925;
-    const real t1597 = t1577 * t945;
-    const real t1598 = t1596 - t1597;
-    const real t1599 = t1598 * t1129;
-    const real t1600 = t1590 * t872;
-    const real t1601 = t1581 * t918;
-    const real t1602 = t1600 - t1601;
-    const real t1603 = t1602 * t1076;
-    const real t1604 = t1587 * t912;
-    const real t1605 = t1604 * t1094;
-    const real t1606 = t1605 * t1119;
-    const real t1607 = t1588 * t881;
-    const real t1608 = t1585 * t915;
-    const real t1609 = t1607 + t1608;
-    const real t1610 = t1609 * t1085;
-    const real t1611 = t1606 - t1610;
-    const real t1612 = t1611 * t1122;
-    const real t1613 = t1603 + t1612;
-    const real t1614 = t1613 * t1155;
-    const real t1615 = t1599 + t1614;
-    const real t1616 = t1615 * t1251;
-    const real t1617 = t1613 * t1129;
-    const real t1618 = t1598 * t1155;
-    const real t1619 = t1617 - t1618;
-    const real t1620 = t1619 * t1220;
-    const real t1621 = t1611 * t1076;
-    const real t1622 = t1602 * t1122;
-    const real t1623 = t1621 - t1622;
-    const real t1624 = t1623 * t1367;
-    const real t1625 = t1605 * t1085;
-    const real t1626 = t1609 * t1119;
-    const real t1627 = t1625 + t1626;
-    const real t1628 = t1627 * t1484;
-    const real t1629 = t1604 * t1116;
-    const real t1630 = 0.0 < t1187;
-    const real t1631 = t1630 != 0 ? t1187 : 1.0;
-    const real t1632 = 1.0 / t1631;
-    const real t1633 = t1169 * t1632;
-    const real t1634 = t1630 != 0 ? t1633 : 1.0;
-    const real t1635 = t1629 * t1634;
-    const real t1636 = t1187 * t1482;
-    const real t1637 = t1635 * t1636;
-    const real t1638 = t1628 - t1637;
-    const real t1639 = t1638 * t1486;
-    const real t1640 = t1624 + t1639;
-    const real t1641 = t1640 * t1369;
-    const real t1642 = t1620 + t1641;
-    const real t1643 = t1642 * t1222;
-    const real t1644 = t1256 * t1643;
-    const real t1645 = t1616 - t1644;
-    const real t1646 = t1249 * t1645;
-    const real t1647 = t1595 - t1646;
-    const real t1648 = t1242 * t1643;
-    const real t1649 = t1647 - t1648;
-    const real t1650 = t1237 * t1649;
-    const real t1651 = t1574 - t1650;
-    const real t1652 = t1267 * t1645;
-    const real t1653 = t1651 - t1652;
-    const real t1654 = t1273 * t1643;
-    const real t1655 = t1653 - t1654;
-    const real t1656 = t1230 * t1655;
-    const real t1657 = t1553 - t1656;
-    const real t1658 = t1281 * t1649;
-    const real t1659 = t1657 - t1658;
-    const real t1660 = t1287 * t1645;
-    const real t1661 = t1659 - t1660;
-    const real t1662 = t1210 * t1643;
-    const real t1663 = t1661 - t1662;
-    const real t1664 = t1205 * t1663;
-    const real t1665 = t1532 - t1664;
-    const real t1666 = t1296 * t1655;
-    const real t1667 = t1665 - t1666;
-    const real t1668 = t1302 * t1649;
-    const real t1669 = t1667 - t1668;
-    const real t1670 = t1308 * t1645;
-    const real t1671 = t1669 - t1670;
-    const real t1672 = t1314 * t1643;
-    const real t1673 = t1671 - t1672;
-    G[3] = t1673;
-    const real t1674 = U[4] * t487;
-    const real t1675 = U[9] * t445;
-    const real t1676 = U[13] * t451;
-    const real t1677 = U[16] * t457;
-    const real t1678 = U[18] * t463;
-    const real t1679 = t1678 * t474;
-    const real t1680 = t1677 + t1679;
-    const real t1681 = t1680 * t477;
-    const real t1682 = t1676 + t1681;
-    const real t1683 = t1682 * t480;
-    const real t1684 = t1675 + t1683;
-    const real t1685 = t1684 * t489;
-    const real t1686 = t1674 + t1685;
-    const real t1687 = t1686 * t1200;
-    const real t1688 = t1684 * t487;
-    const real t1689 = U[4] * t489;
-    const real t1690 = t1688 - t1689;
-    const real t1691 = t1690 * t604;
-    const real t1692 = t1682 * t445;
-    const real t1693 = U[9] * t480;
-    const real t1694 = t1692 - t1693;
-    const real t1695 = t1694 * t551;
-    const real t1696 = t1680 * t451;
-    const real t1697 = U[13] * t477;
-    const real t1698 = t1696 - t1697;
-    const real t1699 = t1698 * t560;
-    const real t1700 = t1678 * t457;
-    const real t1701 = U[16] * t474;
-    const real t1702 = t1700 - t1701;
-    const real t1703 = t1702 * t569;
-    const real t1704 = U[18] * t471;
-    const real t1705 = t1704 * t578;
-    const real t1706 = t1705 * t591;
-    const real t1707 = t1703 - t1706;
-    const real t1708 = t1707 * t594;
-    const real t1709 = t1699 + t1708;
-    const real t1710 = t1709 * t597;
-    const real t1711 = t1695 + t1710;
-    const real t1712 = t1711 * t612;
-    const real t1713 = t1691 + t1712;
-    const real t1714 = t1713 * t1209;
-    const real t1715 = t1711 * t604;
-    const real t1716 = t1690 * t612;
-    const real t1717 = t1715 - t1716;
-    const real t1718 = t1717 * t750;
-    const real t1719 = t1709 * t551;
-    const real t1720 = t1694 * t597;
-    const real t1721 = t1719 - t1720;
-    const real t1722 = t1721 * t697;
-    const real t1723 = t1707 * t560;
-    const real t1724 = t1698 * t594;
-    const real t1725 = t1723 - t1724;
-    const real t1726 = t1725 * t706;
-    const real t1727 = t1704 * t588;
-    const real t1728 = t1727 * t734;
-    const real t1729 = t1728 * t737;
-    const real t1730 = t1705 * t569;
-    const real t1731 = t1702 * t591;
-    const real t1732 = t1730 + t1731;
-    const real t1733 = t1732 * t715;
-    const real t1734 = t1729 - t1733;
-    const real t1735 = t1734 * t740;
-    const real t1736 = t1726 + t1735;
-    const real t1737 = t1736 * t743;
-    const real t1738 = t1722 + t1737;
-    const real t1739 = t1738 * t764;
-    const real t1740 = t1718 + t1739;
-    const real t1741 = t1740 * t1232;
-    const real t1742 = t1738 * t750;
-    const real t1743 = t1717 * t764;
-    const real t1744 = t1742 - t1743;
-    const real t1745 = t1744 * t925;
-    const real t1746 = t1736 * t697;
-    const real t1747 = t1721 * t743;
-    const real t1748 = t1746 - t1747;
-    const real t1749 = t1748 * t872;
-    const real t1750 = t1734 * t706;
-    const real t1751 = t1725 * t740;
-    const real t1752 = t1750 - t1751;
-    const real t1753 = t1752 * t881;
-    const real t1754 = t1728 * t715;
-    const real t1755 = t1732 * t737;
-    const real t1756 = t1754 + t1755;
-    const real t1757 = t1756 * t890;
-    const real t1758 = t1727 * t727;
-    const real t1759 = t1758 * t899;
-    const real t1760 = t1759 * t912;
-    const real t1761 = t1757 - t1760;
-    const real t1762 = t1761 * t915;
-    const real t1763 = t1753 + t1762;
-    const real t1764 = t1763 * t918;
-    const real t1765 = t1749 + t1764;
-    const real t1766 = t1765 * t945;
-    const real t1767 = t1745 + t1766;
-    const real t1768 = t1767 * t1241;
-    const real t1769 = t1765 * t925;
-    const real t1770 = t1744 * t945;
-    const real t1771 = t1769 - t1770;
-    const real t1772 = t1771 * t1129;
-    const real t1773 = t1763 * t872;
-    const real t1774 = t1748 * t918;
-    const real t1775 = t1773 - t1774;
-    const real t1776 = t1775 * t1076;
-    const real t1777 = t1761 * t881;
-    const real t1778 = t1752 * t915;
-    const real t1779 = t1777 - t1778;
-    const real t1780 = t1779 * t1085;
-    const real t1781 = t1758 * t909;
-    const real t1782 = t1781 * t1113;
-    const real t1783 = t1782 * t1116;
-    const real t1784 = t1759 * t890;
-    const real t1785 = t1756 * t912;
-    const real t1786 = t1784 + t1785;
-    const real t1787 = t1786 * t1094;
-    const real t1788 = t1783 - t1787;
-    const real t1789 = t1788 * t1119;
-    const real t1790 = t1780 + t1789;
-    const real t1791 = t1790 * t1122;
-    const real t1792 = t1776 + t1791;
-    const real t1793 = t1792 * t1155;
-    const real t1794 = t1772 + t1793;
-    const real t1795 = t1794 * t1251;
-    const real t1796 = t1792 * t1129;
-    const real t1797 = t1771 * t1155;
-    const real t1798 = t1796 - t1797;
-    const real t1799 = t1798 * t1220;
-    const real t1800 = t1790 * t1076;
-    const real t1801 = t1775 * t1122;
-    const real t1802 = t1800 - t1801;
-    const real t1803 = t1802 * t1367;
-    const real t1804 = t1788 * t1085;
-    const real t1805 = t1779 * t1119;
-    const real t1806 = t1804 - t1805;
-    const real t1807 = t1806 * t1484;
-    const real t1808 = t1782 * t1094;
-    const real t1809 = t1786 * t1116;
-    const real t1810 = t1808 + t1809;
-    const real t1811 = t1810 * t1634;
-    const real t1812 = t1781 * t1106;
-    const real t1813 = 0.0 < t1184;
-    const real t1814 = t1813 != 0 ? t1184 : 1.0;
-    const real t1815 = 1.0 / t1814;
-    const real t1816 = t1173 * t1815;
-    const real t1817 = t1813 != 0 ? t1816 : 1.0;
-    const real t1818 = t1812 * t1817;
-    const real t1819 = t1184 * t1632;
-    const real t1820 = t1818 * t1819;
-    const real t1821 = t1811 - t1820;
-    const real t1822 = t1821 * t1636;
-    const real t1823 = t1807 + t1822;
-    const real t1824 = t1823 * t1486;
-    const real t1825 = t1803 + t1824;
-    const real t1826 = t1825 * t1369;
-    const real t1827 = t1799 + t1826;
-    const real t1828 = t1827 * t1222;
-    const real t1829 = t1256 * t1828;
-    const real t1830 = t1795 - t1829;
-    const real t1831 = t1249 * t1830;
-    const real t1832 = t1768 - t1831;
-    const real t1833 = t1242 * t1828;
-    const real t1834 = t1832 - t1833;
-    const real t1835 = t1237 * t1834;
-    const real t1836 = t1741 - t1835;
-    const real t1837 = t1267 * t1830;
-    const real t1838 = t1836 - t1837;
-    const real t1839 = t1273 * t1828;
-    const real t1840 = t1838 - t1839;
-    const real t1841 = t1230 * t1840;
-    const real t1842 = t1714 - t1841;
-    const real t1843 = t1281 * t1834;
-    const real t1844 = t1842 - t1843;
-    const real t1845 = t1287 * t1830;
-    const real t1846 = t1844 - t1845;
-    const real t1847 = t1210 * t1828;
-    const real t1848 = t1846 - t1847;
-    const real t1849 = t1205 * t1848;
-    const real t1850 = t1687 - t1849;
-    const real t1851 = t1296 * t1840;
-    const real t1852 = t1850 - t1851;
-    const real t1853 = t1302 * t1834;
-    const real t1854 = t1852 - t1853;
-    const real t1855 = t1308 * t1830;
-    const real t1856 = t1854 - t1855;
-    const real t1857 = t1314 * t1828;
-    const real t1858 = t1856 - t1857;
-    G[4] = t1858;
-    const real t1859 = U[5] * t487;
-    const real t1860 = U[10] * t445;
-    const real t1861 = U[14] * t451;
-    const real t1862 = U[17] * t457;
-    const real t1863 = U[19] * t463;
-    const real t1864 = U[20] * t469;
-    const real t1865 = t1864 * t471;
-    const real t1866 = t1863 + t1865;
-    const real t1867 = t1866 * t474;
-    const real t1868 = t1862 + t1867;
-    const real t1869 = t1868 * t477;
-    const real t1870 = t1861 + t1869;
-    const real t1871 = t1870 * t480;
-    const real t1872 = t1860 + t1871;
-    const real t1873 = t1872 * t489;
-    const real t1874 = t1859 + t1873;
-    const real t1875 = t1874 * t1200;
-    const real t1876 = t1872 * t487;
-    const real t1877 = U[5] * t489;
-    const real t1878 = t1876 - t1877;
-    const real t1879 = t1878 * t604;
-    const real t1880 = t1870 * t445;
-    const real t1881 = U[10] * t480;
-    const real t1882 = t1880 - t1881;
-    const real t1883 = t1882 * t551;
-    const real t1884 = t1868 * t451;
-    const real t1885 = U[14] * t477;
-    const real t1886 = t1884 - t1885;
-    const real t1887 = t1886 * t560;
-    const real t1888 = t1866 * t457;
-    const real t1889 = U[17] * t474;
-    const real t1890 = t1888 - t1889;
-    const real t1891 = t1890 * t569;
-    const real t1892 = t1864 * t463;
-    const real t1893 = U[19] * t471;
-    const real t1894 = t1892 - t1893;
-    const real t1895 = t1894 * t578;
-    const real t1896 = U[20] * t509;
-    const real t1897 = t1896 * t586;
-    const real t1898 = t1897 * t588;
-    const real t1899 = t1895 - t1898;
-    const real t1900 = t1899 * t591;
-    const real t1901 = t1891 + t1900;
-    const real t1902 = t1901 * t594;
-    const real t1903 = t1887 + t1902;
-    const real t1904 = t1903 * t597;
-    const real t1905 = t1883 + t1904;
-    const real t1906 = t1905 * t612;
-    const real t1907 = t1879 + t1906;
-    const real t1908 = t1907 * t1209;
-    const real t1909 = t1905 * t604;
-    const real t1910 = t1878 * t612;
-    const real t1911 = t1909 - t1910;
-    const real t1912 = t1911 * t750;
-    const real t1913 = t1903 * t551;
-    const real t1914 = t1882 * t597;
-    const real t1915 = t1913 - t1914;
-    const real t1916 = t1915 * t697;
-    const real t1917 = t1901 * t560;
-    const real t1918 = t1886 * t594;
-    const real t1919 = t1917 - t1918;
-    const real t1920 = t1919 * t706;
-    const real t1921 = t1899 * t569;
-    const real t1922 = t1890 * t591;
-    const real t1923 = t1921 - t1922;
-    const real t1924 = t1923 * t715;
-    const real t1925 = t1896 * t632;
-    const real t1926 = t1925 * t722;
-    const real t1927 = t1926 * t727;
-    const real t1928 = t1897 * t578;
-    const real t1929 = t1894 * t588;
-    const real t1930 = t1928 + t1929;
-    const real t1931 = t1930 * t734;
-    const real t1932 = t1927 - t1931;
-    const real t1933 = t1932 * t737;
-    const real t1934 = t1924 + t1933;
-    const real t1935 = t1934 * t740;
-    const real t1936 = t1920 + t1935;
-    const real t1937 = t1936 * t743;
-    const real t1938 = t1916 + t1937;
-    const real t1939 = t1938 * t764;
-    const real t1940 = t1912 + t1939;
-    const real t1941 = t1940 * t1232;
-    const real t1942 = t1938 * t750;
-    const real t1943 = t1911 * t764;
-    const real t1944 = t1942 - t1943;
-    const real t1945 = t1944 * t925;
-    const real t1946 = t1936 * t697;
-    const real t1947 = t1915 * t743;
-    const real t1948 = t1946 - t1947;
-    const real t1949 = t1948 * t872;
-    const real t1950 = t1934 * t706;
-    const real t1951 = t1919 * t740;
-    const real t1952 = t1950 - t1951;
-    const real t1953 = t1952 * t881;
-    const real t1954 = t1932 * t715;
-    const real t1955 = t1923 * t737;
-    const real t1956 = t1954 - t1955;
-    const real t1957 = t1956 * t890;
-    const real t1958 = t1926 * t734;
-    const real t1959 = t1930 * t727;
-    const real t1960 = t1958 + t1959;
-    const real t1961 = t1960 * t899;
-    const real t1962 = t1925 * t784;
-    const real t1963 = t1962 * t907;
-    const real t1964 = t1963 * t909;
-    const real t1965 = t1961 - t1964;
-    const real t1966 = t1965 * t912;
-    const real t1967 = t1957 + t1966;
-    const real t1968 = t1967 * t915;
-    const real t1969 = t1953 + t1968;
-    const real t1970 = t1969 * t918;
-    const real t1971 = t1949 + t1970;
-    const real t1972 = t1971 * t945;
-    const real t1973 = t1945 + t1972;
-    const real t1974 = t1973 * t1241;
-    const real t1975 = t1971 * t925;
-    const real t1976 = t1944 * t945;
-    const real t1977 = t1975 - t1976;
-    const real t1978 = t1977 * t1129;
-    const real t1979 = t1969 * t872;
-    const real t1980 = t1948 * t918;
-    const real t1981 = t1979 - t1980;
-    const real t1982 = t1981 * t1076;
-    const real t1983 = t1967 * t881;
-    const real t1984 = t1952 * t915;
-    const real t1985 = t1983 - t1984;
-    const real t1986 = t1985 * t1085;
-    const real t1987 = t1965 * t890;
-    const real t1988 = t1956 * t912;
-    const real t1989 = t1987 - t1988;
-    const real t1990 = t1989 * t1094;
-    const real t1991 = t1962 * t965;
-    const real t1992 = t1991 * t1101;
-    const real t1993 = t1992 * t1106;
-    const real t1994 = t1963 * t899;
-    const real t1995 = t1960 * t909;
-    const real t1996 = t1994 + t1995;
-    const real t1997 = t1996 * t1113;
-    const real t1998 = t1993 - t1997;
-    const real t1999 = t1998 * t1116;
-    const real t2000 = t1990 + t1999;
-    const real t2001 = t2000 * t1119;
-    const real t2002 = t1986 + t2001;
-    const real t2003 = t2002 * t1122;
-    const real t2004 = t1982 + t2003;
-    const real t2005 = t2004 * t1155;
-    const real t2006 = t1978 + t2005;
-    const real t2007 = t2006 * t1251;
-    const real t2008 = t2004 * t1129;
-    const real t2009 = t1977 * t1155;
-    const real t2010 = t2008 - t2009;
-    const real t2011 = t2010 * t1220;
-    const real t2012 = t2002 * t1076;
-    const real t2013 = t1981 * t1122;
-    const real t2014 = t2012 - t2013;
-    const real t2015 = t2014 * t1367;
-    const real t2016 = t2000 * t1085;
-    const real t2017 = t1985 * t1119;
-    const real t2018 = t2016 - t2017;
-    const real t2019 = t2018 * t1484;
-    const real t2020 = t1998 * t1094;
-    const real t2021 = t1989 * t1116;
-    const real t2022 = t2020 - t2021;
-    const real t2023 = t2022 * t1634;
-    const real t2024 = t1992 * t1113;
-    const real t2025 = t1996 * t1106;
-    const real t2026 = t2024 + t2025;
-    const real t2027 = t2026 * t1817;
-    const real t2028 = t1991 * t1175;
-    const real t2029 = 0.0 < t1181;
-    const real t2030 = t2029 != 0 ? t1181 : 1.0;
-    const real t2031 = 1.0 / t2030;
-    const real t2032 = t1176 * t2031;
-    const real t2033 = -t2032;
-    const real t2034 = t2029 != 0 ? t2033 : 1.0;
-    const real t2035 = t2028 * t2034;
-    const real t2036 = t1181 * t1815;
-    const real t2037 = t2035 * t2036;
-    const real t2038 = t2027 - t2037;
-    const real t2039 = t2038 * t1819;
-    const real t2040 = t2023 + t2039;
-    const real t2041 = t2040 * t1636;
-    const real t2042 = t2019 + t2041;
-    const real t2043 = t2042 * t1486;
-    const real t2044 = t2015 + t2043;
-    const real t2045 = t2044 * t1369;
-    const real t2046 = t2011 + t2045;
-    const real t2047 = t2046 * t1222;
-    const real t2048 = t1256 * t2047;
-    const real t2049 = t2007 - t2048;
-    const real t2050 = t1249 * t2049;
-    const real t2051 = t1974 - t2050;
-    const real t2052 = t1242 * t2047;
-    const real t2053 = t2051 - t2052;
-    const real t2054 = t1237 * t2053;
-    const real t2055 = t1941 - t2054;
-    const real t2056 = t1267 * t2049;
-    const real t2057 = t2055 - t2056;
-    const real t2058 = t1273 * t2047;
-    const real t2059 = t2057 - t2058;
-    const real t2060 = t1230 * t2059;
-    const real t2061 = t1908 - t2060;
-    const real t2062 = t1281 * t2053;
-    const real t2063 = t2061 - t2062;
-    const real t2064 = t1287 * t2049;
-    const real t2065 = t2063 - t2064;
-    const real t2066 = t1210 * t2047;
-    const real t2067 = t2065 - t2066;
-    const real t2068 = t1205 * t2067;
-    const real t2069 = t1875 - t2068;
-    const real t2070 = t1296 * t2059;
-    const real t2071 = t2069 - t2070;
-    const real t2072 = t1302 * t2053;
-    const real t2073 = t2071 - t2072;
-    const real t2074 = t1308 * t2049;
-    const real t2075 = t2073 - t2074;
-    const real t2076 = t1314 * t2047;
-    const real t2077 = t2075 - t2076;
-    G[5] = t2077;
-    G[6] = t1290;
-    G[7] = t1392;
-    G[8] = t1511;
-    G[9] = t1663;
-    G[10] = t1848;
-    G[11] = t2067;
-    G[12] = t1275;
-    G[13] = t1384;
-    G[14] = t1503;
-    G[15] = t1655;
-    G[16] = t1840;
-    G[17] = t2059;
-    G[18] = t1261;
-    G[19] = t1378;
-    G[20] = t1497;
-    G[21] = t1649;
-    G[22] = t1834;
-    G[23] = t2053;
-    G[24] = t1258;
-    G[25] = t1374;
-    G[26] = t1493;
-    G[27] = t1645;
-    G[28] = t1830;
-    G[29] = t2049;
-    const real t2078 = -t1223;
-    G[30] = t2078;
-    G[31] = t1372;
-    G[32] = t1491;
-    G[33] = t1643;
-    G[34] = t1828;
-    G[35] = t2047;
-    const real t2079 = t10 * 1e-26;
-    const real t2080 = t2079 < t10;
-    const real t2081 = t2080 != 0 ? 0.0 : e[0];
-    const real t2082 = H[0] * t2081;
-    const real t2083 = t8 + t11;
-    const real t2084 = 1e-26 * t2083;
-    const real t2085 = t2084 < t8;
-    const real t2086 = 1.0 / U[0];
-    const real t2087 = e[0] * t2086;
-    const real t2088 = t2080 != 0 ? t2087 : 0.0;
-    const real t2089 = U[1] * t2088;
-    const real t2090 = e[1] - t2089;
-    const real t2091 = t2085 != 0 ? 0.0 : t2090;
-    const real t2092 = H[6] * t2091;
-    const real t2093 = t2082 + t2092;
-    const real t2094 = t9 + t7;
-    const real t2095 = t6 + t2094;
-    const real t2096 = 1e-26 * t2095;
-    const real t2097 = t2096 < t6;
-    const real t2098 = U[2] * t2088;
-    const real t2099 = 1.0 / U[6];
-    const real t2100 = t2090 * t2099;
-    const real t2101 = t2085 != 0 ? t2100 : 0.0;
-    const real t2102 = U[7] * t2101;
-    const real t2103 = t2098 + t2102;
-    const real t2104 = e[2] - t2103;
-    const real t2105 = t2097 != 0 ? 0.0 : t2104;
-    const real t2106 = H[12] * t2105;
-    const real t2107 = t2093 + t2106;
-    const real t2108 = t39 + t37;
-    const real t2109 = t34 + t2108;
-    const real t2110 = t31 + t2109;
-    const real t2111 = 1e-26 * t2110;
-    const real t2112 = t2111 < t31;
-    const real t2113 = 1.0 / U[11];
-    const real t2114 = t2104 * t2113;
-    const real t2115 = t2097 != 0 ? t2114 : 0.0;
-    const real t2116 = U[12] * t2115;
-    const real t2117 = U[3] * t2088;
-    const real t2118 = U[8] * t2101;
-    const real t2119 = t2117 + t2118;
-    const real t2120 = t2116 + t2119;
-    const real t2121 = e[3] - t2120;
-    const real t2122 = t2112 != 0 ? 0.0 : t2121;
-    const real t2123 = H[18] * t2122;
-    const real t2124 = t2107 + t2123;
-    const real t2125 = t40 + t36;
-    const real t2126 = t33 + t2125;
-    const real t2127 = t30 + t2126;
-    const real t2128 = t28 + t2127;
-    const real t2129 = 1e-26 * t2128;
-    const real t2130 = t2129 < t28;
-    const real t2131 = 1.0 / U[15];
-    const real t2132 = t2121 * t2131;
-    const real t2133 = t2112 != 0 ? t2132 : 0.0;
-    const real t2134 = U[16] * t2133;
-    const real t2135 = U[13] * t2115;
-    const real t2136 = U[4] * t2088;
-    const real t2137 = U[9] * t2101;
-    const real t2138 = t2136 + t2137;
-    const real t2139 = t2135 + t2138;
-    const real t2140 = t2134 + t2139;
-    const real t2141 = e[4] - t2140;
-    const real t2142 = t2130 != 0 ? 0.0 : t2141;
-    const real t2143 = H[24] * t2142;
-    const real t2144 = t2124 + t2143;
-    const real t2145 = t38 + t35;
-    const real t2146 = t32 + t2145;
-    const real t2147 = t29 + t2146;
-    const real t2148 = t27 + t2147;
-    const real t2149 = t26 + t2148;
-    const real t2150 = 1e-26 * t2149;
-    const real t2151 = t2150 < t26;
-    const real t2152 = 1.0 / U[18];
-    const real t2153 = t2141 * t2152;
-    const real t2154 = t2130 != 0 ? t2153 : 0.0;
-    const real t2155 = U[19] * t2154;
-    const real t2156 = U[17] * t2133;
-    const real t2157 = U[14] * t2115;
-    const real t2158 = U[5] * t2088;
-    const real t2159 = U[10] * t2101;
-    const real t2160 = t2158 + t2159;
-    const real t2161 = t2157 + t2160;
-    const real t2162 = t2156 + t2161;
-    const real t2163 = t2155 + t2162;
-    const real t2164 = e[5] - t2163;
-    const real t2165 = t2151 != 0 ? 0.0 : t2164;
-    const real t2166 = H[30] * t2165;
-    const real t2167 = t2144 + t2166;
-    const real t2168 = tau[0] - t2167;
-    const real t2169 = t2168 * t1200;
-    const real t2170 = d[0] + t2088;
-    const real t2171 = t2170 * t487;
-    const real t2172 = d[1] + t2101;
-    const real t2173 = t2172 * t445;
-    const real t2174 = d[2] + t2115;
-    const real t2175 = t2174 * t451;
-    const real t2176 = d[3] + t2133;
-    const real t2177 = t2176 * t457;
-    const real t2178 = d[4] + t2154;
-    const real t2179 = t2178 * t463;
-    const real t2180 = 1.0 / U[20];
-    const real t2181 = t2164 * t2180;
-    const real t2182 = t2151 != 0 ? t2181 : 0.0;
-    const real t2183 = d[5] + t2182;
-    const real t2184 = t2183 * t469;
-    const real t2185 = t2184 * t471;
-    const real t2186 = t2179 + t2185;
-    const real t2187 = t2186 * t474;
-    const real t2188 = t2177 + t2187;
-    const real t2189 = t2188 * t477;
-    const real t2190 = t2175 + t2189;
-    const real t2191 = t2190 * t480;
-    const real t2192 = t2173 + t2191;
-    const real t2193 = t2192 * t489;
-    const real t2194 = t2171 + t2193;
-    const real t2195 = t2169 - t2194;
-    const real t2196 = t1200 * t2195;
-    const real t2197 = H[1] * t2081;
-    const real t2198 = H[7] * t2091;
-    const real t2199 = t2197 + t2198;
-    const real t2200 = H[13] * t2105;
-    const real t2201 = t2199 + t2200;
-    const real t2202 = H[19] * t2122;
-    const real t2203 = t2201 + t2202;
-    const real t2204 = H[25] * t2142;
-    const real t2205 = t2203 + t2204;
-    const real t2206 = H[31] * t2165;
-    const real t2207 = t2205 + t2206;
-    const real t2208 = tau[1] - t2207;
-    const real t2209 = t2168 * t1205;
-    const real t2210 = t2208 - t2209;
-    const real t2211 = t1209 * t2210;
-    const real t2212 = t2192 * t487;
-    const real t2213 = t2170 * t489;
-    const real t2214 = t2212 - t2213;
-    const real t2215 = t2214 * t604;
-    const real t2216 = t2190 * t445;
-    const real t2217 = t2172 * t480;
-    const real t2218 = t2216 - t2217;
-    const real t2219 = t2218 * t551;
-    const real t2220 = t2188 * t451;
-    const real t2221 = t2174 * t477;
-    const real t2222 = t2220 - t2221;
-    const real t2223 = t2222 * t560;
-    const real t2224 = t2186 * t457;
-    const real t2225 = t2176 * t474;
-    const real t2226 = t2224 - t2225;
-    const real t2227 = t2226 * t569;
-    const real t2228 = t2184 * t463;
-    const real t2229 = t2178 * t471;
-    const real t2230 = t2228 - t2229;
-    const real t2231 = t2230 * t578;
-    const real t2232 = t2183 * t509;
-    const real t2233 = t2232 * t586;
-    const real t2234 = t2233 * t588;
-    const real t2235 = t2231 - t2234;
-    const real t2236 = t2235 * t591;
-    const real t2237 = t2227 + t2236;
-    const real t2238 = t2237 * t594;
-    const real t2239 = t2223 + t2238;
-    const real t2240 = t2239 * t597;
-    const real t2241 = t2219 + t2240;
-    const real t2242 = t2241 * t612;
-    const real t2243 = t2215 + t2242;
-    const real t2244 = t2211 - t2243;
-    const real t2245 = t1209 * t2244;
-    const real t2246 = H[2] * t2081;
-    const real t2247 = H[8] * t2091;
-    const real t2248 = t2246 + t2247;
-    const real t2249 = H[14] * t2105;
-    const real t2250 = t2248 + t2249;
-    const real t2251 = H[20] * t2122;
-    const real t2252 = t2250 + t2251;
-    const real t2253 = H[26] * t2142;
-    const real t2254 = t2252 + t2253;
-    const real t2255 = H[32] * t2165;
-    const real t2256 = t2254 + t2255;
-    const real t2257 = tau[2] - t2256;
-    const real t2258 = t2168 * t1296;
-    const real t2259 = t2257 - t2258;
-    const real t2260 = t1230 * t2210;
-    const real t2261 = t2259 - t2260;
-    const real t2262 = t1232 * t2261;
-    const real t2263 = t2241 * t604;
-    const real t2264 = t2214 * t612;
-    const real t2265 = t2263 - t2264;
-    const real t2266 = t2265 * t750;
-    const real t2267 = t2239 * t551;
-    const real t2268 = t2218 * t597;
-    const real t2269 = t2267 - t2268;
-    const real t2270 = t2269 * t697;
-    const real t2271 = t2237 * t560;
-    const real t2272 = t2222 * t594;
-    const real t2273 = t2271 - t2272;
-    const real t2274 = t2273 * t706;
-    const real t2275 = t2235 * t569;
-    const real t2276 = t2226 * t591;
-    const real t2277 = t2275 - t2276;
-    const real t2278 = t2277 * t715;
-    const real t2279 = t2232 * t632;
-    const real t2280 = t2279 * t722;
-    const real t2281 = t2280 * t727;
-    const real t2282 = t2233 * t578;
-    const real t2283 = t2230 * t588;
-    const real t2284 = t2282 + t2283;
-    const real t2285 = t2284 * t734;
-    const real t2286 = t2281 - t2285;
-    const real t2287 = t2286 * t737;
-    const real t2288 = t2278 + t2287;
-    const real t2289 = t2288 * t740;
-    const real t2290 = t2274 + t2289;
-    const real t2291 = t2290 * t743;
-    const real t2292 = t2270 + t2291;
-    const real t2293 = t2292 * t764;
-    const real t2294 = t2266 + t2293;
-    const real t2295 = t2262 - t2294;
-    const real t2296 = t1232 * t2295;
-    const real t2297 = H[3] * t2081;
-    const real t2298 = H[9] * t2091;
-    const real t2299 = t2297 + t2298;
-    const real t2300 = H[15] * t2105;
-    const real t2301 = t2299 + t2300;
-    const real t2302 = H[21] * t2122;
-    const real t2303 = t2301 + t2302;
-    const real t2304 = H[27] * t2142;
-    const real t2305 = t2303 + t2304;
-    const real t2306 = H[33] * t2165;
-    const real t2307 = t2305 + t2306;
-    const real t2308 = tau[3] - t2307;
-    const real t2309 = t2168 * t1302;
-    const real t2310 = t2308 - t2309;
-    const real t2311 = t1281 * t2210;
-    const real t2312 = t2310 - t2311;
-    const real t2313 = t1237 * t2261;
-    const real t2314 = t2312 - t2313;
-    const real t2315 = t1241 * t2314;
-    const real t2316 = t2292 * t750;
-    const real t2317 = t2265 * t764;
-    const real t2318 = t2316 - t2317;
-    const real t2319 = t2318 * t925;
-    const real t2320 = t2290 * t697;
-    const real t2321 = t2269 * t743;
-    const real t2322 = t2320 - t2321;
-    const real t2323 = t2322 * t872;
-    const real t2324 = t2288 * t706;
-    const real t2325 = t2273 * t740;
-    const real t2326 = t2324 - t2325;
-    const real t2327 = t2326 * t881;
-    const real t2328 = t2286 * t715;
-    const real t2329 = t2277 * t737;
-    const real t2330 = t2328 - t2329;
-    const real t2331 = t2330 * t890;
-    const real t2332 = t2280 * t734;
-    const real t2333 = t2284 * t727;
-    const real t2334 = t2332 + t2333;
-    const real t2335 = t2334 * t899;
-    const real t2336 = t2279 * t784;
-    const real t2337 = t2336 * t907;
-    const real t2338 = t2337 * t909;
-    const real t2339 = t2335 - t2338;
-    const real t2340 = t2339 * t912;
-    const real t2341 = t2331 + t2340;
-    const real t2342 = t2341 * t915;
-    const real t2343 = t2327 + t2342;
-    const real t2344 = t2343 * t918;
-    const real t2345 = t2323 + t2344;
-    const real t2346 = t2345 * t945;
-    const real t2347 = t2319 + t2346;
-    const real t2348 = t2315 - t2347;
-    const real t2349 = t1241 * t2348;
-    const real t2350 = H[4] * t2081;
-    const real t2351 = H[10] * t2091;
-    const real t2352 = t2350 + t2351;
-    const real t2353 = H[16] * t2105;
-    const real t2354 = t2352 + t2353;
-    const real t2355 = H[22] * t2122;
-    const real t2356 = t2354 + t2355;
-    const real t2357 = H[28] * t2142;
-    const real t2358 = t2356 + t2357;
-    const real t2359 = H[34] * t2165;
-    const real t2360 = t2358 + t2359;
-    const real t2361 = tau[4] - t2360;
-    const real t2362 = t2168 * t1308;
-    const real t2363 = t2361 - t2362;
-    const real t2364 = t1287 * t2210;
-    const real t2365 = t2363 - t2364;
-    const real t2366 = t1267 * t2261;
-    const real t2367 = t2365 - t2366;
-    const real t2368 = t1249 * t2314;
-    const real t2369 = t2367 - t2368;
-    const real t2370 = t1251 * t2369;
-    const real t2371 = t2345 * t925;
-    const real t2372 = t2318 * t945;
-    const real t2373 = t2371 - t2372;
-    const real t2374 = t2373 * t1129;
-    const real t2375 = t2343 * t872;
-    const real t2376 = t2322 * t918;
-    const real t2377 = t2375 - t2376;
-    const real t2378 = t2377 * t1076;
-    const real t2379 = t2341 * t881;
-    const real t2380 = t2326 * t915;
-    const real t2381 = t2379 - t2380;
-    const real t2382 = t2381 * t1085;
-    const real t2383 = t2339 * t890;
-    const real t2384 = t2330 * t912;
-    const real t2385 = t2383 - t2384;
-    const real t2386 = t2385 * t1094;
-    const real t2387 = t2336 * t965;
-    const real t2388 = t2387 * t1101;
-    const real t2389 = t2388 * t1106;
-    const real t2390 = t2337 * t899;
-    const real t2391 = t2334 * t909;
-    const real t2392 = t2390 + t2391;
-    const real t2393 = t2392 * t1113;
-    const real t2394 = t2389 - t2393;
-    const real t2395 = t2394 * t1116;
-    const real t2396 = t2386 + t2395;
-    const real t2397 = t2396 * t1119;
-    const real t2398 = t2382 + t2397;
-    const real t2399 = t2398 * t1122;
-    const real t2400 = t2378 + t2399;
-    const real t2401 = t2400 * t1155;
-    const real t2402 = t2374 + t2401;
-    const real t2403 = t2370 - t2402;
-    const real t2404 = t1251 * t2403;
-    const real t2405 = H[5] * t2081;
-    const real t2406 = H[11] * t2091;
-    const real t2407 = t2405 + t2406;
-    const real t2408 = H[17] * t2105;
-    const real t2409 = t2407 + t2408;
-    const real t2410 = H[23] * t2122;
-    const real t2411 = t2409 + t2410;
-    const real t2412 = H[29] * t2142;
-    const real t2413 = t2411 + t2412;
-    const real t2414 = H[35] * t2165;
-    const real t2415 = t2413 + t2414;
-    const real t2416 = tau[5] - t2415;
-    const real t2417 = t2168 * t1314;
-    const real t2418 = t2416 - t2417;
-    const real t2419 = t1210 * t2210;
-    const real t2420 = t2418 - t2419;
-    const real t2421 = t1273 * t2261;
-    const real t2422 = t2420 - t2421;
-    const real t2423 = t1242 * t2314;
-    const real t2424 = t2422 - t2423;
-    const real t2425 = t1256 * t2369;
-    const real t2426 = t2424 - t2425;
-    const real t2427 = t1222 * t2426;
-    const real t2428 = t2400 * t1129;
-    const real t2429 = t2373 * t1155;
-    const real t2430 = t2428 - t2429;
-    const real t2431 = t2430 * t1220;
-    const real t2432 = t2398 * t1076;
-    const real t2433 = t2377 * t1122;
-    const real t2434 = t2432 - t2433;
-    const real t2435 = t2434 * t1367;
-    const real t2436 = t2396 * t1085;
-    const real t2437 = t2381 * t1119;
-    const real t2438 = t2436 - t2437;
-    const real t2439 = t2438 * t1484;
-    const real t2440 = t2394 * t1094;
-    const real t2441 = t2385 * t1116;
-    const real t2442 = t2440 - t2441;
-    const real t2443 = t2442 * t1634;
-    const real t2444 = t2388 * t1113;
-    const real t2445 = t2392 * t1106;
-    const real t2446 = t2444 + t2445;
-    const real t2447 = t2446 * t1817;
-    const real t2448 = t2387 * t1175;
-    const real t2449 = t2448 * t2034;
-    const real t2450 = t2449 * t2036;
-    const real t2451 = t2447 - t2450;
-    const real t2452 = t2451 * t1819;
-    const real t2453 = t2443 + t2452;
-    const real t2454 = t2453 * t1636;
-    const real t2455 = t2439 + t2454;
-    const real t2456 = t2455 * t1486;
-    const real t2457 = t2435 + t2456;
-    const real t2458 = t2457 * t1369;
-    const real t2459 = t2431 + t2458;
-    const real t2460 = t2427 - t2459;
-    const real t2461 = t1222 * t2460;
-    const real t2462 = t1256 * t2461;
-    const real t2463 = t2404 - t2462;
-    const real t2464 = t1249 * t2463;
-    const real t2465 = t2349 - t2464;
-    const real t2466 = t1242 * t2461;
-    const real t2467 = t2465 - t2466;
-    const real t2468 = t1237 * t2467;
-    const real t2469 = t2296 - t2468;
-    const real t2470 = t1267 * t2463;
-    const real t2471 = t2469 - t2470;
-    const real t2472 = t1273 * t2461;
-    const real t2473 = t2471 - t2472;
-    const real t2474 = t1230 * t2473;
-    const real t2475 = t2245 - t2474;
-    const real t2476 = t1281 * t2467;
-    const real t2477 = t2475 - t2476;
-    const real t2478 = t1287 * t2463;
-    const real t2479 = t2477 - t2478;
-    const real t2480 = t1210 * t2461;
-    const real t2481 = t2479 - t2480;
-    const real t2482 = t1205 * t2481;
-    const real t2483 = t2196 - t2482;
-    const real t2484 = t1296 * t2473;
-    const real t2485 = t2483 - t2484;
-    const real t2486 = t1302 * t2467;
-    const real t2487 = t2485 - t2486;
-    const real t2488 = t1308 * t2463;
-    const real t2489 = t2487 - t2488;
-    const real t2490 = t1314 * t2461;
-    const real t2491 = t2489 - t2490;
-    g[0] = t2491;
-    g[1] = t2481;
-    g[2] = t2473;
-    g[3] = t2467;
-    g[4] = t2463;
-    g[5] = t2461;
-    const real t2492 = t1215 * t1369;
-    const real t2493 = t2492 < 0.0;
-    const real t2494 = t2493 != 0 ? (-1.0) : 1.0;
-    const real t2495 = t2492 * t2494;
-    V[0] = t2495;
-    const real t2496 = t1368 * t1220;
-    const real t2497 = t1360 * t1369;
-    const real t2498 = t2496 + t2497;
-    const real t2499 = t2498 * t2494;
-    const real t2500 = -t2499;
-    V[1] = t2500;
-    const real t2501 = t1488 * t1220;
-    const real t2502 = t1473 * t1369;
-    const real t2503 = t2501 - t2502;
-    const real t2504 = t2503 * t2494;
-    V[2] = t2504;
-    const real t2505 = t1640 * t1220;
-    const real t2506 = t1619 * t1369;
-    const real t2507 = t2505 - t2506;
-    const real t2508 = t2507 * t2494;
-    V[3] = t2508;
-    const real t2509 = t1825 * t1220;
-    const real t2510 = t1798 * t1369;
-    const real t2511 = t2509 - t2510;
-    const real t2512 = t2511 * t2494;
-    V[4] = t2512;
-    const real t2513 = t2044 * t1220;
-    const real t2514 = t2010 * t1369;
-    const real t2515 = t2513 - t2514;
-    const real t2516 = t2515 * t2494;
-    V[5] = t2516;
-    const real t2517 = t1362 * t1486;
-    const real t2518 = t2517 < 0.0;
-    const real t2519 = t2518 != 0 ? (-1.0) : 1.0;
-    const real t2520 = t2517 * t2519;
-    V[6] = t2520;
-    const real t2521 = t1485 * t1367;
-    const real t2522 = t1477 * t1486;
-    const real t2523 = t2521 + t2522;
-    const real t2524 = t2523 * t2519;
-    const real t2525 = -t2524;
-    V[7] = t2525;
-    const real t2526 = t1638 * t1367;
-    const real t2527 = t1623 * t1486;
-    const real t2528 = t2526 - t2527;
-    const real t2529 = t2528 * t2519;
-    V[8] = t2529;
-    const real t2530 = t1823 * t1367;
-    const real t2531 = t1802 * t1486;
-    const real t2532 = t2530 - t2531;
-    const real t2533 = t2532 * t2519;
-    V[9] = t2533;
-    const real t2534 = t2042 * t1367;
-    const real t2535 = t2014 * t1486;
-    const real t2536 = t2534 - t2535;
-    const real t2537 = t2536 * t2519;
-    V[10] = t2537;
-    const real t2538 = t1479 * t1636;
-    const real t2539 = t2538 < 0.0;
-    const real t2540 = t2539 != 0 ? (-1.0) : 1.0;
-    const real t2541 = t2538 * t2540;
-    V[11] = t2541;
-    const real t2542 = t1635 * t1484;
-    const real t2543 = t1627 * t1636;
-    const real t2544 = t2542 + t2543;
-    const real t2545 = t2544 * t2540;
-    const real t2546 = -t2545;
-    V[12] = t2546;
-    const real t2547 = t1821 * t1484;
-    const real t2548 = t1806 * t1636;
-    const real t2549 = t2547 - t2548;
-    const real t2550 = t2549 * t2540;
-    V[13] = t2550;
-    const real t2551 = t2040 * t1484;
-    const real t2552 = t2018 * t1636;
-    const real t2553 = t2551 - t2552;
-    const real t2554 = t2553 * t2540;
-    V[14] = t2554;
-    const real t2555 = t1629 * t1819;
-    const real t2556 = t2555 < 0.0;
-    const real t2557 = t2556 != 0 ? (-1.0) : 1.0;
-    const real t2558 = t2555 * t2557;
-    V[15] = t2558;
-    const real t2559 = t1818 * t1634;
-    const real t2560 = t1810 * t1819;
-    const real t2561 = t2559 + t2560;
-    const real t2562 = t2561 * t2557;
-    const real t2563 = -t2562;
-    V[16] = t2563;
-    const real t2564 = t2038 * t1634;
-    const real t2565 = t2022 * t1819;
-    const real t2566 = t2564 - t2565;
-    const real t2567 = t2566 * t2557;
-    V[17] = t2567;
-    const real t2568 = t1812 * t2036;
-    const real t2569 = t2568 < 0.0;
-    const real t2570 = t2569 != 0 ? (-1.0) : 1.0;
-    const real t2571 = t2568 * t2570;
-    V[18] = t2571;
-    const real t2572 = t2035 * t1817;
-    const real t2573 = t2026 * t2036;
-    const real t2574 = t2572 + t2573;
-    const real t2575 = t2574 * t2570;
-    const real t2576 = -t2575;
-    V[19] = t2576;
-    const real t2577 = t1178 * t2031;
-    const real t2578 = t2028 * t2577;
-    const real t2579 = t2578 < 0.0;
-    const real t2580 = t2579 != 0 ? (-1.0) : 1.0;
-    const real t2581 = t2578 * t2580;
-    V[20] = t2581;
-    const real t2582 = t2457 * t1220;
-    const real t2583 = t2430 * t1369;
-    const real t2584 = t2582 - t2583;
-    const real t2585 = t2584 * t2494;
-    d_V[0] = t2585;
-    const real t2586 = t2455 * t1367;
-    const real t2587 = t2434 * t1486;
-    const real t2588 = t2586 - t2587;
-    const real t2589 = t2588 * t2519;
-    d_V[1] = t2589;
-    const real t2590 = t2453 * t1484;
-    const real t2591 = t2438 * t1636;
-    const real t2592 = t2590 - t2591;
-    const real t2593 = t2592 * t2540;
-    d_V[2] = t2593;
-    const real t2594 = t2451 * t1634;
-    const real t2595 = t2442 * t1819;
-    const real t2596 = t2594 - t2595;
-    const real t2597 = t2596 * t2557;
-    d_V[3] = t2597;
-    const real t2598 = t2449 * t1817;
-    const real t2599 = t2446 * t2036;
-    const real t2600 = t2598 + t2599;
-    const real t2601 = t2600 * t2570;
-    const real t2602 = -t2601;
-    d_V[4] = t2602;
-    const real t2603 = t2448 * t2577;
-    const real t2604 = t2603 * t2580;
-    d_V[5] = t2604;
-    const real t2605 = t2168 * t1316;
-    const real t2606 = t2208 * t1290;
-    const real t2607 = t2605 + t2606;
-    const real t2608 = t2257 * t1275;
-    const real t2609 = t2607 + t2608;
-    const real t2610 = t2308 * t1261;
-    const real t2611 = t2609 + t2610;
-    const real t2612 = t2361 * t1258;
-    const real t2613 = t2611 + t2612;
-    const real t2614 = t2416 * t1223;
-    const real t2615 = t2613 - t2614;
-    const real t2616 = t2081 + t2615;
-    e_Q[0] = t2616;
-    const real t2617 = t2168 * t1402;
-    const real t2618 = t2208 * t1392;
-    const real t2619 = t2617 + t2618;
-    const real t2620 = t2257 * t1384;
-    const real t2621 = t2619 + t2620;
-    const real t2622 = t2308 * t1378;
-    const real t2623 = t2621 + t2622;
-    const real t2624 = t2361 * t1374;
-    const real t2625 = t2623 + t2624;
-    const real t2626 = t2416 * t1372;
-    const real t2627 = t2625 + t2626;
-    const real t2628 = t2091 + t2627;
-    e_Q[1] = t2628;
-    const real t2629 = t2168 * t1521;
-    const real t2630 = t2208 * t1511;
-    const real t2631 = t2629 + t2630;
-    const real t2632 = t2257 * t1503;
-    const real t2633 = t2631 + t2632;
-    const real t2634 = t2308 * t1497;
-    const real t2635 = t2633 + t2634;
-    const real t2636 = t2361 * t1493;
-    const real t2637 = t2635 + t2636;
-    const real t2638 = t2416 * t1491;
-    const real t2639 = t2637 + t2638;
-    const real t2640 = t2105 + t2639;
-    e_Q[2] = t2640;
-    const real t2641 = t2168 * t1673;
-    const real t2642 = t2208 * t1663;
-    const real t2643 = t2641 + t2642;
-    const real t2644 = t2257 * t1655;
-    const real t2645 = t2643 + t2644;
-    const real t2646 = t2308 * t1649;
-    const real t2647 = t2645 + t2646;
-    const real t2648 = t2361 * t1645;
-    const real t2649 = t2647 + t2648;
-    const real t2650 = t2416 * t1643;
-    const real t2651 = t2649 + t2650;
-    const real t2652 = t2122 + t2651;
-    e_Q[3] = t2652;
-    const real t2653 = t2168 * t1858;
-    const real t2654 = t2208 * t1848;
-    const real t2655 = t2653 + t2654;
-    const real t2656 = t2257 * t1840;
-    const real t2657 = t2655 + t2656;
-    const real t2658 = t2308 * t1834;
-    const real t2659 = t2657 + t2658;
-    const real t2660 = t2361 * t1830;
-    const real t2661 = t2659 + t2660;
-    const real t2662 = t2416 * t1828;
-    const real t2663 = t2661 + t2662;
-    const real t2664 = t2142 + t2663;
-    e_Q[4] = t2664;
-    const real t2665 = t2168 * t2077;
-    const real t2666 = t2208 * t2067;
-    const real t2667 = t2665 + t2666;
-    const real t2668 = t2257 * t2059;
-    const real t2669 = t2667 + t2668;
-    const real t2670 = t2308 * t2053;
-    const real t2671 = t2669 + t2670;
-    const real t2672 = t2361 * t2049;
-    const real t2673 = t2671 + t2672;
-    const real t2674 = t2416 * t2047;
-    const real t2675 = t2673 + t2674;
-    const real t2676 = t2165 + t2675;
-    e_Q[5] = t2676;
-    return 0;
+  real t6 = U[11] * U[11];
+  real t7 = U[7] * U[7];
+  real t8 = U[6] * U[6];
+  real t9 = U[2] * U[2];
+  real t10 = U[0] * U[0];
+  real t11 = U[1] * U[1];
+  real t17 = ((real)1 / (real)300000000000000) * (t6 + (t7 + (t8 + (t9 + (t10 + t11)))));
+  real t18 = (0.0 < floor_[0]) ? floor_[0] : t17;
+  real t26 = U[20] * U[20];
+  real t27 = U[19] * U[19];
+  real t28 = U[18] * U[18];
+  real t29 = U[17] * U[17];
+  real t30 = U[16] * U[16];
+  real t31 = U[15] * U[15];
+  real t32 = U[14] * U[14];
+  real t33 = U[13] * U[13];
+  real t34 = U[12] * U[12];
+  real t35 = U[10] * U[10];
+  real t36 = U[9] * U[9];
+  real t37 = U[8] * U[8];
+  real t38 = U[5] * U[5];
+  real t39 = U[3] * U[3];
+  real t40 = U[4] * U[4];
+  real t55 = ((real)1 / (real)300000000000000) * (t26 + (t27 + (t28 + (t29 + (t30 + (t31 + (t32 +
+    (t33 + (t34 + (t35 + (t36 + (t37 + (t38 + (t39 + t40))))))))))))));
+  real t56 = (0.0 < floor_[1]) ? floor_[1] : t55;
+  real t59 = H[30] * U[20];
+  real t60 = t59 * t59;
+  real t63 = H[24] * U[18] + H[30] * U[19];
+  real t64 = t63 * t63;
+  real t69 = H[18] * U[15] + H[24] * U[16] + H[30] * U[17];
+  real t70 = t69 * t69;
+  real t77 = H[12] * U[11] + H[18] * U[12] + H[24] * U[13] + H[30] * U[14];
+  real t78 = t77 * t77;
+  real t87 = H[6] * U[6] + H[12] * U[7] + H[18] * U[8] + H[24] * U[9] + H[30] * U[10];
+  real t88 = t87 * t87;
+  real t99 = H[0] * U[0] + H[6] * U[1] + H[12] * U[2] + H[18] * U[3] + H[24] * U[4] + H[30] * U[5];
+  real t100 = t99 * t99;
+  real t106 = t60 + (t64 + (t70 + (t78 + (t88 + (J[0] + t100)))));
+  if (!(((H[12] * H[12] + (H[0] * H[0] + H[6] * H[6])) * t18 + (H[30] * H[30] + (H[18] * H[18] + H[24] * H[24])) * t56 < t106))) return 1; /* speed 1 of 6 moves no inertia: its acceleration is undetermined */
+  real t121 = H[31] * U[20];
+  real t125 = H[25] * U[18] + H[31] * U[19];
+  real t131 = H[19] * U[15] + H[25] * U[16] + H[31] * U[17];
+  real t139 = H[13] * U[11] + H[19] * U[12] + H[25] * U[13] + H[31] * U[14];
+  real t149 = H[7] * U[6] + H[13] * U[7] + H[19] * U[8] + H[25] * U[9] + H[31] * U[10];
+  real t161 = H[1] * U[0] + H[7] * U[1] + H[13] * U[2] + H[19] * U[3] + H[25] * U[4] + H[31] * U[5];
+  real t168 = t121 * t121 + (t125 * t125 + (t131 * t131 + (t139 * t139 + (t149 * t149 + (J[1] + t161
+    * t161)))));
+  if (!((t18 * (H[13] * H[13] + (H[1] * H[1] + H[7] * H[7])) + t56 * (H[31] * H[31] + (H[19] * H[19] + H[25] * H[25])) < t168))) return 1; /* speed 2 of 6 moves no inertia: its acceleration is undetermined */
+  real t183 = H[32] * U[20];
+  real t187 = H[26] * U[18] + H[32] * U[19];
+  real t193 = H[20] * U[15] + H[26] * U[16] + H[32] * U[17];
+  real t201 = H[14] * U[11] + H[20] * U[12] + H[26] * U[13] + H[32] * U[14];
+  real t211 = H[8] * U[6] + H[14] * U[7] + H[20] * U[8] + H[26] * U[9] + H[32] * U[10];
+  real t223 = H[2] * U[0] + H[8] * U[1] + H[14] * U[2] + H[20] * U[3] + H[26] * U[4] + H[32] * U[5];
+  real t230 = t183 * t183 + (t187 * t187 + (t193 * t193 + (t201 * t201 + (t211 * t211 + (J[2] + t223
+    * t223)))));
+  if (!((t18 * (H[14] * H[14] + (H[2] * H[2] + H[8] * H[8])) + t56 * (H[32] * H[32] + (H[20] * H[20] + H[26] * H[26])) < t230))) return 1; /* speed 3 of 6 moves no inertia: its acceleration is undetermined */
+  real t245 = H[33] * U[20];
+  real t249 = H[27] * U[18] + H[33] * U[19];
+  real t255 = H[21] * U[15] + H[27] * U[16] + H[33] * U[17];
+  real t263 = H[15] * U[11] + H[21] * U[12] + H[27] * U[13] + H[33] * U[14];
+  real t273 = H[9] * U[6] + H[15] * U[7] + H[21] * U[8] + H[27] * U[9] + H[33] * U[10];
+  real t285 = H[3] * U[0] + H[9] * U[1] + H[15] * U[2] + H[21] * U[3] + H[27] * U[4] + H[33] * U[5];
+  real t292 = t245 * t245 + (t249 * t249 + (t255 * t255 + (t263 * t263 + (t273 * t273 + (J[3] + t285
+    * t285)))));
+  if (!((t18 * (H[15] * H[15] + (H[3] * H[3] + H[9] * H[9])) + t56 * (H[33] * H[33] + (H[21] * H[21] + H[27] * H[27])) < t292))) return 1; /* speed 4 of 6 moves no inertia: its acceleration is undetermined */
+  real t307 = H[34] * U[20];
+  real t311 = H[28] * U[18] + H[34] * U[19];
+  real t317 = H[22] * U[15] + H[28] * U[16] + H[34] * U[17];
+  real t325 = H[16] * U[11] + H[22] * U[12] + H[28] * U[13] + H[34] * U[14];
+  real t335 = H[10] * U[6] + H[16] * U[7] + H[22] * U[8] + H[28] * U[9] + H[34] * U[10];
+  real t347 = H[4] * U[0] + H[10] * U[1] + H[16] * U[2] + H[22] * U[3] + H[28] * U[4] + H[34] *
+    U[5];
+  real t354 = t307 * t307 + (t311 * t311 + (t317 * t317 + (t325 * t325 + (t335 * t335 + (J[4] + t347
+    * t347)))));
+  if (!((t18 * (H[16] * H[16] + (H[4] * H[4] + H[10] * H[10])) + t56 * (H[34] * H[34] + (H[22] * H[22] + H[28] * H[28])) < t354))) return 1; /* speed 5 of 6 moves no inertia: its acceleration is undetermined */
+  real t369 = H[35] * U[20];
+  real t373 = H[29] * U[18] + H[35] * U[19];
+  real t379 = H[23] * U[15] + H[29] * U[16] + H[35] * U[17];
+  real t387 = H[17] * U[11] + H[23] * U[12] + H[29] * U[13] + H[35] * U[14];
+  real t397 = H[11] * U[6] + H[17] * U[7] + H[23] * U[8] + H[29] * U[9] + H[35] * U[10];
+  real t409 = H[5] * U[0] + H[11] * U[1] + H[17] * U[2] + H[23] * U[3] + H[29] * U[4] + H[35] *
+    U[5];
+  real t416 = t369 * t369 + (t373 * t373 + (t379 * t379 + (t387 * t387 + (t397 * t397 + (J[5] + t409
+    * t409)))));
+  if (!((t18 * (H[17] * H[17] + (H[5] * H[5] + H[11] * H[11])) + t56 * (H[35] * H[35] + (H[23] * H[23] + H[29] * H[29])) < t416))) return 1; /* speed 6 of 6 moves no inertia: its acceleration is undetermined */
+  real t419 = sqrt(J[0]);
+  real t422 = sqrt(t60 + t419 * t419);
+  real t425 = sqrt(t64 + t422 * t422);
+  real t428 = sqrt(t70 + t425 * t425);
+  real t431 = sqrt(t78 + t428 * t428);
+  real t434 = sqrt(t88 + t431 * t431);
+  real t437 = sqrt(t100 + t434 * t434);
+  if (!((1e-26 * t106 < t437 * t437))) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  real t441 = 0.0 < t434;
+  real t443 = 1.0 / (t441 != 0 ? t434 : 1.0);
+  real t444 = t87 * t443;
+  real t445 = t441 != 0 ? t444 : 1.0;
+  real t447 = 0.0 < t431;
+  real t449 = 1.0 / (t447 != 0 ? t431 : 1.0);
+  real t450 = t77 * t449;
+  real t451 = t447 != 0 ? t450 : 1.0;
+  real t453 = 0.0 < t428;
+  real t455 = 1.0 / (t453 != 0 ? t428 : 1.0);
+  real t456 = t69 * t455;
+  real t457 = t453 != 0 ? t456 : 1.0;
+  real t459 = 0.0 < t425;
+  real t461 = 1.0 / (t459 != 0 ? t425 : 1.0);
+  real t462 = t63 * t461;
+  real t463 = t459 != 0 ? t462 : 1.0;
+  real t465 = 0.0 < t422;
+  real t467 = 1.0 / (t465 != 0 ? t422 : 1.0);
+  real t468 = t59 * t467;
+  real t469 = t465 != 0 ? t468 : 1.0;
+  real t470 = t121 * t469;
+  real t471 = t422 * t461;
+  real t473 = t125 * t463 + t470 * t471;
+  real t474 = t425 * t455;
+  real t476 = t131 * t457 + t473 * t474;
+  real t477 = t428 * t449;
+  real t479 = t139 * t451 + t476 * t477;
+  real t480 = t431 * t443;
+  real t482 = t149 * t445 + t479 * t480;
+  real t483 = 0.0 < t437;
+  real t485 = 1.0 / (t483 != 0 ? t437 : 1.0);
+  real t486 = t99 * t485;
+  real t487 = t483 != 0 ? t486 : 1.0;
+  real t489 = t434 * t485;
+  real t491 = t482 * t487 - t161 * t489;
+  real t495 = t479 * t445 - t149 * t480;
+  real t499 = t476 * t451 - t139 * t477;
+  real t503 = t473 * t457 - t131 * t474;
+  real t507 = t470 * t463 - t125 * t471;
+  real t509 = t419 * t467;
+  real t510 = t121 * t509;
+  real t512 = sqrt(J[1]);
+  real t515 = sqrt(t510 * t510 + t512 * t512);
+  real t518 = sqrt(t507 * t507 + t515 * t515);
+  real t521 = sqrt(t503 * t503 + t518 * t518);
+  real t524 = sqrt(t499 * t499 + t521 * t521);
+  real t527 = sqrt(t495 * t495 + t524 * t524);
+  real t530 = sqrt(t491 * t491 + t527 * t527);
+  if (!((1e-26 * t168 < t530 * t530))) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  real t537 = t183 * t469;
+  real t539 = t187 * t463 + t537 * t471;
+  real t541 = t193 * t457 + t539 * t474;
+  real t543 = t201 * t451 + t541 * t477;
+  real t546 = t543 * t445 - t211 * t480;
+  real t547 = 0.0 < t527;
+  real t549 = 1.0 / (t547 != 0 ? t527 : 1.0);
+  real t550 = t495 * t549;
+  real t551 = t547 != 0 ? t550 : 1.0;
+  real t555 = t541 * t451 - t201 * t477;
+  real t556 = 0.0 < t524;
+  real t558 = 1.0 / (t556 != 0 ? t524 : 1.0);
+  real t559 = t499 * t558;
+  real t560 = t556 != 0 ? t559 : 1.0;
+  real t564 = t539 * t457 - t193 * t474;
+  real t565 = 0.0 < t521;
+  real t567 = 1.0 / (t565 != 0 ? t521 : 1.0);
+  real t568 = t503 * t567;
+  real t569 = t565 != 0 ? t568 : 1.0;
+  real t573 = t537 * t463 - t187 * t471;
+  real t574 = 0.0 < t518;
+  real t576 = 1.0 / (t574 != 0 ? t518 : 1.0);
+  real t577 = t507 * t576;
+  real t578 = t574 != 0 ? t577 : 1.0;
+  real t580 = t183 * t509;
+  real t581 = 0.0 < t515;
+  real t583 = 1.0 / (t581 != 0 ? t515 : 1.0);
+  real t585 = -(t510 * t583);
+  real t586 = t581 != 0 ? t585 : 1.0;
+  real t587 = t580 * t586;
+  real t588 = t515 * t576;
+  real t590 = t573 * t578 - t587 * t588;
+  real t591 = t518 * t567;
+  real t593 = t564 * t569 + t590 * t591;
+  real t594 = t521 * t558;
+  real t596 = t555 * t560 + t593 * t594;
+  real t597 = t524 * t549;
+  real t599 = t546 * t551 + t596 * t597;
+  real t600 = 0.0 < t530;
+  real t602 = 1.0 / (t600 != 0 ? t530 : 1.0);
+  real t603 = t491 * t602;
+  real t604 = t600 != 0 ? t603 : 1.0;
+  real t608 = t211 * t445 + t543 * t480;
+  real t611 = t608 * t487 - t223 * t489;
+  real t612 = t527 * t602;
+  real t614 = t599 * t604 - t611 * t612;
+  real t618 = t596 * t551 - t546 * t597;
+  real t622 = t593 * t560 - t555 * t594;
+  real t626 = t590 * t569 - t564 * t591;
+  real t630 = t587 * t578 + t573 * t588;
+  real t632 = t512 * t583;
+  real t633 = t580 * t632;
+  real t635 = sqrt(J[2]);
+  real t638 = sqrt(t633 * t633 + t635 * t635);
+  real t641 = sqrt(t630 * t630 + t638 * t638);
+  real t644 = sqrt(t626 * t626 + t641 * t641);
+  real t647 = sqrt(t622 * t622 + t644 * t644);
+  real t650 = sqrt(t618 * t618 + t647 * t647);
+  real t653 = sqrt(t614 * t614 + t650 * t650);
+  if (!((1e-26 * t230 < t653 * t653))) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  real t659 = t245 * t469;
+  real t661 = t249 * t463 + t659 * t471;
+  real t663 = t255 * t457 + t661 * t474;
+  real t666 = t663 * t451 - t263 * t477;
+  real t670 = t661 * t457 - t255 * t474;
+  real t674 = t659 * t463 - t249 * t471;
+  real t676 = t245 * t509;
+  real t677 = t676 * t586;
+  real t679 = t674 * t578 - t677 * t588;
+  real t681 = t670 * t569 + t679 * t591;
+  real t683 = t666 * t560 + t681 * t594;
+  real t687 = t263 * t451 + t663 * t477;
+  real t690 = t687 * t445 - t273 * t480;
+  real t692 = t683 * t551 - t690 * t597;
+  real t693 = 0.0 < t650;
+  real t695 = 1.0 / (t693 != 0 ? t650 : 1.0);
+  real t696 = t618 * t695;
+  real t697 = t693 != 0 ? t696 : 1.0;
+  real t701 = t681 * t560 - t666 * t594;
+  real t702 = 0.0 < t647;
+  real t704 = 1.0 / (t702 != 0 ? t647 : 1.0);
+  real t705 = t622 * t704;
+  real t706 = t702 != 0 ? t705 : 1.0;
+  real t710 = t679 * t569 - t670 * t591;
+  real t711 = 0.0 < t644;
+  real t713 = 1.0 / (t711 != 0 ? t644 : 1.0);
+  real t714 = t626 * t713;
+  real t715 = t711 != 0 ? t714 : 1.0;
+  real t717 = t676 * t632;
+  real t718 = 0.0 < t638;
+  real t720 = 1.0 / (t718 != 0 ? t638 : 1.0);
+  real t721 = t633 * t720;
+  real t722 = t718 != 0 ? t721 : 1.0;
+  real t723 = t717 * t722;
+  real t724 = 0.0 < t641;
+  real t726 = 1.0 / (t724 != 0 ? t641 : 1.0);
+  real t727 = t638 * t726;
+  real t731 = t677 * t578 + t674 * t588;
+  real t733 = -(t630 * t726);
+  real t734 = t724 != 0 ? t733 : 1.0;
+  real t736 = t723 * t727 - t731 * t734;
+  real t737 = t641 * t713;
+  real t739 = t710 * t715 + t736 * t737;
+  real t740 = t644 * t704;
+  real t742 = t701 * t706 + t739 * t740;
+  real t743 = t647 * t695;
+  real t745 = t692 * t697 + t742 * t743;
+  real t746 = 0.0 < t653;
+  real t748 = 1.0 / (t746 != 0 ? t653 : 1.0);
+  real t749 = t614 * t748;
+  real t750 = t746 != 0 ? t749 : 1.0;
+  real t754 = t690 * t551 + t683 * t597;
+  real t758 = t273 * t445 + t687 * t480;
+  real t761 = t758 * t487 - t285 * t489;
+  real t763 = t754 * t604 - t761 * t612;
+  real t764 = t650 * t748;
+  real t766 = t745 * t750 - t763 * t764;
+  real t770 = t742 * t697 - t692 * t743;
+  real t774 = t739 * t706 - t701 * t740;
+  real t778 = t736 * t715 - t710 * t737;
+  real t782 = t723 * t734 + t731 * t727;
+  real t784 = t635 * t720;
+  real t785 = t717 * t784;
+  real t787 = sqrt(J[3]);
+  real t790 = sqrt(t785 * t785 + t787 * t787);
+  real t793 = sqrt(t782 * t782 + t790 * t790);
+  real t796 = sqrt(t778 * t778 + t793 * t793);
+  real t799 = sqrt(t774 * t774 + t796 * t796);
+  real t802 = sqrt(t770 * t770 + t799 * t799);
+  real t805 = sqrt(t766 * t766 + t802 * t802);
+  if (!((1e-26 * t292 < t805 * t805))) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  real t810 = t307 * t469;
+  real t812 = t311 * t463 + t810 * t471;
+  real t815 = t812 * t457 - t317 * t474;
+  real t819 = t810 * t463 - t311 * t471;
+  real t821 = t307 * t509;
+  real t822 = t821 * t586;
+  real t824 = t819 * t578 - t822 * t588;
+  real t826 = t815 * t569 + t824 * t591;
+  real t830 = t317 * t457 + t812 * t474;
+  real t833 = t830 * t451 - t325 * t477;
+  real t835 = t826 * t560 - t833 * t594;
+  real t839 = t824 * t569 - t815 * t591;
+  real t841 = t821 * t632;
+  real t842 = t841 * t722;
+  real t846 = t822 * t578 + t819 * t588;
+  real t848 = t842 * t727 - t846 * t734;
+  real t850 = t839 * t715 + t848 * t737;
+  real t852 = t835 * t706 + t850 * t740;
+  real t856 = t833 * t560 + t826 * t594;
+  real t860 = t325 * t451 + t830 * t477;
+  real t863 = t860 * t445 - t335 * t480;
+  real t865 = t856 * t551 - t863 * t597;
+  real t867 = t852 * t697 - t865 * t743;
+  real t868 = 0.0 < t802;
+  real t870 = 1.0 / (t868 != 0 ? t802 : 1.0);
+  real t871 = t770 * t870;
+  real t872 = t868 != 0 ? t871 : 1.0;
+  real t876 = t850 * t706 - t835 * t740;
+  real t877 = 0.0 < t799;
+  real t879 = 1.0 / (t877 != 0 ? t799 : 1.0);
+  real t880 = t774 * t879;
+  real t881 = t877 != 0 ? t880 : 1.0;
+  real t885 = t848 * t715 - t839 * t737;
+  real t886 = 0.0 < t796;
+  real t888 = 1.0 / (t886 != 0 ? t796 : 1.0);
+  real t889 = t778 * t888;
+  real t890 = t886 != 0 ? t889 : 1.0;
+  real t894 = t842 * t734 + t846 * t727;
+  real t895 = 0.0 < t793;
+  real t897 = 1.0 / (t895 != 0 ? t793 : 1.0);
+  real t898 = t782 * t897;
+  real t899 = t895 != 0 ? t898 : 1.0;
+  real t901 = t841 * t784;
+  real t902 = 0.0 < t790;
+  real t904 = 1.0 / (t902 != 0 ? t790 : 1.0);
+  real t906 = -(t785 * t904);
+  real t907 = t902 != 0 ? t906 : 1.0;
+  real t908 = t901 * t907;
+  real t909 = t790 * t897;
+  real t911 = t894 * t899 - t908 * t909;
+  real t912 = t793 * t888;
+  real t914 = t885 * t890 + t911 * t912;
+  real t915 = t796 * t879;
+  real t917 = t876 * t881 + t914 * t915;
+  real t918 = t799 * t870;
+  real t920 = t867 * t872 + t917 * t918;
+  real t921 = 0.0 < t805;
+  real t923 = 1.0 / (t921 != 0 ? t805 : 1.0);
+  real t924 = t766 * t923;
+  real t925 = t921 != 0 ? t924 : 1.0;
+  real t929 = t865 * t697 + t852 * t743;
+  real t933 = t863 * t551 + t856 * t597;
+  real t937 = t335 * t445 + t860 * t480;
+  real t940 = t937 * t487 - t347 * t489;
+  real t942 = t933 * t604 - t940 * t612;
+  real t944 = t929 * t750 - t942 * t764;
+  real t945 = t802 * t923;
+  real t947 = t920 * t925 - t944 * t945;
+  real t951 = t917 * t872 - t867 * t918;
+  real t955 = t914 * t881 - t876 * t915;
+  real t959 = t911 * t890 - t885 * t912;
+  real t963 = t908 * t899 + t894 * t909;
+  real t965 = t787 * t904;
+  real t966 = t901 * t965;
+  real t968 = sqrt(J[4]);
+  real t971 = sqrt(t966 * t966 + t968 * t968);
+  real t974 = sqrt(t963 * t963 + t971 * t971);
+  real t977 = sqrt(t959 * t959 + t974 * t974);
+  real t980 = sqrt(t955 * t955 + t977 * t977);
+  real t983 = sqrt(t951 * t951 + t980 * t980);
+  real t986 = sqrt(t947 * t947 + t983 * t983);
+  if (!((1e-26 * t354 < t986 * t986))) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  real t990 = t369 * t469;
+  real t993 = t990 * t463 - t373 * t471;
+  real t995 = t369 * t509;
+  real t996 = t995 * t586;
+  real t998 = t993 * t578 - t996 * t588;
+  real t1002 = t373 * t463 + t990 * t471;
+  real t1005 = t1002 * t457 - t379 * t474;
+  real t1007 = t998 * t569 - t1005 * t591;
+  real t1009 = t995 * t632;
+  real t1010 = t1009 * t722;
+  real t1014 = t996 * t578 + t993 * t588;
+  real t1016 = t1010 * t727 - t1014 * t734;
+  real t1018 = t1007 * t715 + t1016 * t737;
+  real t1022 = t1005 * t569 + t998 * t591;
+  real t1026 = t379 * t457 + t1002 * t474;
+  real t1029 = t1026 * t451 - t387 * t477;
+  real t1031 = t1022 * t560 - t1029 * t594;
+  real t1033 = t1018 * t706 - t1031 * t740;
+  real t1037 = t1016 * t715 - t1007 * t737;
+  real t1041 = t1010 * t734 + t1014 * t727;
+  real t1043 = t1009 * t784;
+  real t1044 = t1043 * t907;
+  real t1046 = t1041 * t899 - t1044 * t909;
+  real t1048 = t1037 * t890 + t1046 * t912;
+  real t1050 = t1033 * t881 + t1048 * t915;
+  real t1054 = t1031 * t706 + t1018 * t740;
+  real t1058 = t1029 * t560 + t1022 * t594;
+  real t1062 = t387 * t451 + t1026 * t477;
+  real t1065 = t1062 * t445 - t397 * t480;
+  real t1067 = t1058 * t551 - t1065 * t597;
+  real t1069 = t1054 * t697 - t1067 * t743;
+  real t1071 = t1050 * t872 - t1069 * t918;
+  real t1072 = 0.0 < t983;
+  real t1074 = 1.0 / (t1072 != 0 ? t983 : 1.0);
+  real t1075 = t951 * t1074;
+  real t1076 = t1072 != 0 ? t1075 : 1.0;
+  real t1080 = t1048 * t881 - t1033 * t915;
+  real t1081 = 0.0 < t980;
+  real t1083 = 1.0 / (t1081 != 0 ? t980 : 1.0);
+  real t1084 = t955 * t1083;
+  real t1085 = t1081 != 0 ? t1084 : 1.0;
+  real t1089 = t1046 * t890 - t1037 * t912;
+  real t1090 = 0.0 < t977;
+  real t1092 = 1.0 / (t1090 != 0 ? t977 : 1.0);
+  real t1093 = t959 * t1092;
+  real t1094 = t1090 != 0 ? t1093 : 1.0;
+  real t1096 = t1043 * t965;
+  real t1097 = 0.0 < t971;
+  real t1099 = 1.0 / (t1097 != 0 ? t971 : 1.0);
+  real t1100 = t966 * t1099;
+  real t1101 = t1097 != 0 ? t1100 : 1.0;
+  real t1102 = t1096 * t1101;
+  real t1103 = 0.0 < t974;
+  real t1105 = 1.0 / (t1103 != 0 ? t974 : 1.0);
+  real t1106 = t971 * t1105;
+  real t1110 = t1044 * t899 + t1041 * t909;
+  real t1112 = -(t963 * t1105);
+  real t1113 = t1103 != 0 ? t1112 : 1.0;
+  real t1115 = t1102 * t1106 - t1110 * t1113;
+  real t1116 = t974 * t1092;
+  real t1118 = t1089 * t1094 + t1115 * t1116;
+  real t1119 = t977 * t1083;
+  real t1121 = t1080 * t1085 + t1118 * t1119;
+  real t1122 = t980 * t1074;
+  real t1124 = t1071 * t1076 + t1121 * t1122;
+  real t1125 = 0.0 < t986;
+  real t1127 = 1.0 / (t1125 != 0 ? t986 : 1.0);
+  real t1128 = t947 * t1127;
+  real t1129 = t1125 != 0 ? t1128 : 1.0;
+  real t1133 = t1069 * t872 + t1050 * t918;
+  real t1137 = t1067 * t697 + t1054 * t743;
+  real t1141 = t1065 * t551 + t1058 * t597;
+  real t1145 = t397 * t445 + t1062 * t480;
+  real t1148 = t1145 * t487 - t409 * t489;
+  real t1150 = t1141 * t604 - t1148 * t612;
+  real t1152 = t1137 * t750 - t1150 * t764;
+  real t1154 = t1133 * t925 - t1152 * t945;
+  real t1155 = t983 * t1127;
+  real t1157 = t1124 * t1129 - t1154 * t1155;
+  real t1161 = t1121 * t1076 - t1071 * t1122;
+  real t1165 = t1118 * t1085 - t1080 * t1119;
+  real t1169 = t1115 * t1094 - t1089 * t1116;
+  real t1173 = t1102 * t1113 + t1110 * t1106;
+  real t1175 = t968 * t1099;
+  real t1176 = t1096 * t1175;
+  real t1178 = sqrt(J[5]);
+  real t1181 = sqrt(t1176 * t1176 + t1178 * t1178);
+  real t1184 = sqrt(t1173 * t1173 + t1181 * t1181);
+  real t1187 = sqrt(t1169 * t1169 + t1184 * t1184);
+  real t1190 = sqrt(t1165 * t1165 + t1187 * t1187);
+  real t1193 = sqrt(t1161 * t1161 + t1190 * t1190);
+  real t1196 = sqrt(t1157 * t1157 + t1193 * t1193);
+  if (!((1e-26 * t416 < t1196 * t1196))) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  real t1200 = 1.0 / t437;
+  real t1205 = (t161 * t487 + t482 * t489) * t1200;
+  real t1209 = 1.0 / t530;
+  real t1210 = (t1148 * t604 + t1141 * t612) * t1209;
+  real t1211 = U[0] * t489;
+  real t1212 = t1211 * t612;
+  real t1213 = t1212 * t764;
+  real t1214 = t1213 * t945;
+  real t1215 = t1214 * t1155;
+  real t1216 = 0.0 < t1196;
+  real t1218 = 1.0 / (t1216 != 0 ? t1196 : 1.0);
+  real t1219 = t1157 * t1218;
+  real t1220 = t1216 != 0 ? t1219 : 1.0;
+  real t1222 = 1.0 / t1196;
+  real t1223 = t1215 * t1220 * t1222;
+  real t1230 = (t611 * t604 + t599 * t612) * t1209;
+  real t1232 = 1.0 / t653;
+  real t1237 = (t763 * t750 + t745 * t764) * t1232;
+  real t1241 = 1.0 / t805;
+  real t1242 = (t1152 * t925 + t1133 * t945) * t1241;
+  real t1249 = (t944 * t925 + t920 * t945) * t1241;
+  real t1251 = 1.0 / t986;
+  real t1256 = (t1154 * t1129 + t1124 * t1155) * t1251;
+  real t1258 = t1214 * t1129 * t1251 + t1256 * t1223;
+  real t1261 = t1242 * t1223 - (t1213 * t925 * t1241 + t1249 * t1258);
+  real t1267 = (t942 * t750 + t929 * t764) * t1232;
+  real t1273 = (t1150 * t750 + t1137 * t764) * t1232;
+  real t1275 = t1212 * t750 * t1232 - t1237 * t1261 - t1267 * t1258 + t1273 * t1223;
+  real t1281 = (t761 * t604 + t754 * t612) * t1209;
+  real t1287 = (t940 * t604 + t933 * t612) * t1209;
+  real t1290 = t1210 * t1223 - (t1211 * t604 * t1209 + t1230 * t1275 + t1281 * t1261 + t1287 *
+    t1258);
+  real t1296 = (t223 * t487 + t608 * t489) * t1200;
+  real t1302 = (t285 * t487 + t758 * t489) * t1200;
+  real t1308 = (t347 * t487 + t937 * t489) * t1200;
+  real t1314 = (t409 * t487 + t1145 * t489) * t1200;
+  real t1316 = U[0] * t487 * t1200 - t1205 * t1290 - t1296 * t1275 - t1302 * t1261 - t1308 * t1258 +
+    t1314 * t1223;
+  G[0] = t1316;
+  real t1318 = U[6] * t445;
+  real t1324 = t1318 * t487 - U[1] * t489;
+  real t1326 = U[6] * t480;
+  real t1327 = t1326 * t551;
+  real t1331 = t1326 * t597;
+  real t1332 = t1331 * t697;
+  real t1336 = t1327 * t604 + t1324 * t612;
+  real t1342 = t1332 * t750 + t1336 * t764;
+  real t1344 = t1331 * t743;
+  real t1345 = t1344 * t872;
+  real t1349 = t1344 * t918;
+  real t1350 = t1349 * t1076;
+  real t1354 = t1345 * t925 + t1342 * t945;
+  real t1360 = t1350 * t1129 + t1354 * t1155;
+  real t1362 = t1349 * t1122;
+  real t1363 = 0.0 < t1193;
+  real t1365 = 1.0 / (t1363 != 0 ? t1193 : 1.0);
+  real t1366 = t1161 * t1365;
+  real t1367 = t1363 != 0 ? t1366 : 1.0;
+  real t1368 = t1362 * t1367;
+  real t1369 = t1193 * t1218;
+  real t1372 = (t1360 * t1220 - t1368 * t1369) * t1222;
+  real t1374 = (t1350 * t1155 - t1354 * t1129) * t1251 - t1256 * t1372;
+  real t1378 = (t1342 * t925 - t1345 * t945) * t1241 - t1249 * t1374 - t1242 * t1372;
+  real t1384 = (t1332 * t764 - t1336 * t750) * t1232 - t1237 * t1378 - t1267 * t1374 - t1273 *
+    t1372;
+  real t1392 = (t1324 * t604 - t1327 * t612) * t1209 - t1230 * t1384 - t1281 * t1378 - t1287 * t1374
+    - t1210 * t1372;
+  real t1402 = (U[1] * t487 + t1318 * t489) * t1200 - t1205 * t1392 - t1296 * t1384 - t1302 * t1378
+    - t1308 * t1374 - t1314 * t1372;
+  G[1] = t1402;
+  real t1405 = U[11] * t451;
+  real t1407 = U[7] * t445 + t1405 * t480;
+  real t1413 = t1407 * t487 - U[2] * t489;
+  real t1417 = t1405 * t445 - U[7] * t480;
+  real t1419 = U[11] * t477;
+  real t1420 = t1419 * t560;
+  real t1422 = t1417 * t551 - t1420 * t597;
+  real t1428 = t1422 * t604 - t1413 * t612;
+  real t1430 = t1419 * t594;
+  real t1431 = t1430 * t706;
+  real t1435 = t1420 * t551 + t1417 * t597;
+  real t1437 = t1431 * t743 - t1435 * t697;
+  real t1443 = t1437 * t750 - t1428 * t764;
+  real t1447 = t1431 * t697 + t1435 * t743;
+  real t1449 = t1430 * t740;
+  real t1450 = t1449 * t881;
+  real t1452 = t1447 * t872 - t1450 * t918;
+  real t1458 = t1452 * t925 - t1443 * t945;
+  real t1460 = t1449 * t915;
+  real t1461 = t1460 * t1085;
+  real t1465 = t1450 * t872 + t1447 * t918;
+  real t1467 = t1461 * t1122 - t1465 * t1076;
+  real t1473 = t1467 * t1129 - t1458 * t1155;
+  real t1477 = t1461 * t1076 + t1465 * t1122;
+  real t1479 = t1460 * t1119;
+  real t1480 = 0.0 < t1190;
+  real t1482 = 1.0 / (t1480 != 0 ? t1190 : 1.0);
+  real t1483 = t1165 * t1482;
+  real t1484 = t1480 != 0 ? t1483 : 1.0;
+  real t1485 = t1479 * t1484;
+  real t1486 = t1190 * t1365;
+  real t1488 = t1477 * t1367 - t1485 * t1486;
+  real t1491 = (t1473 * t1220 + t1488 * t1369) * t1222;
+  real t1493 = (t1458 * t1129 + t1467 * t1155) * t1251 - t1256 * t1491;
+  real t1497 = (t1443 * t925 + t1452 * t945) * t1241 - t1249 * t1493 - t1242 * t1491;
+  real t1503 = (t1428 * t750 + t1437 * t764) * t1232 - t1237 * t1497 - t1267 * t1493 - t1273 *
+    t1491;
+  real t1511 = (t1413 * t604 + t1422 * t612) * t1209 - t1230 * t1503 - t1281 * t1497 - t1287 * t1493
+    - t1210 * t1491;
+  real t1521 = (U[2] * t487 + t1407 * t489) * t1200 - t1205 * t1511 - t1296 * t1503 - t1302 * t1497
+    - t1308 * t1493 - t1314 * t1491;
+  G[2] = t1521;
+  real t1525 = U[15] * t457;
+  real t1527 = U[12] * t451 + t1525 * t477;
+  real t1529 = U[8] * t445 + t1527 * t480;
+  real t1535 = t1529 * t487 - U[3] * t489;
+  real t1539 = t1527 * t445 - U[8] * t480;
+  real t1543 = t1525 * t451 - U[12] * t477;
+  real t1545 = U[15] * t474;
+  real t1546 = t1545 * t569;
+  real t1548 = t1543 * t560 - t1546 * t594;
+  real t1550 = t1539 * t551 + t1548 * t597;
+  real t1556 = t1550 * t604 - t1535 * t612;
+  real t1560 = t1548 * t551 - t1539 * t597;
+  real t1562 = t1545 * t591;
+  real t1563 = t1562 * t715;
+  real t1567 = t1546 * t560 + t1543 * t594;
+  real t1569 = t1563 * t740 - t1567 * t706;
+  real t1571 = t1560 * t697 + t1569 * t743;
+  real t1577 = t1571 * t750 - t1556 * t764;
+  real t1581 = t1569 * t697 - t1560 * t743;
+  real t1585 = t1563 * t706 + t1567 * t740;
+  real t1587 = t1562 * t737;
+  real t1588 = t1587 * t890;
+  real t1590 = t1585 * t881 - t1588 * t915;
+  real t1592 = t1581 * t872 + t1590 * t918;
+  real t1598 = t1592 * t925 - t1577 * t945;
+  real t1602 = t1590 * t872 - t1581 * t918;
+  real t1604 = t1587 * t912;
+  real t1605 = t1604 * t1094;
+  real t1609 = t1588 * t881 + t1585 * t915;
+  real t1611 = t1605 * t1119 - t1609 * t1085;
+  real t1613 = t1602 * t1076 + t1611 * t1122;
+  real t1619 = t1613 * t1129 - t1598 * t1155;
+  real t1623 = t1611 * t1076 - t1602 * t1122;
+  real t1627 = t1605 * t1085 + t1609 * t1119;
+  real t1629 = t1604 * t1116;
+  real t1630 = 0.0 < t1187;
+  real t1632 = 1.0 / (t1630 != 0 ? t1187 : 1.0);
+  real t1633 = t1169 * t1632;
+  real t1634 = t1630 != 0 ? t1633 : 1.0;
+  real t1635 = t1629 * t1634;
+  real t1636 = t1187 * t1482;
+  real t1638 = t1627 * t1484 - t1635 * t1636;
+  real t1640 = t1623 * t1367 + t1638 * t1486;
+  real t1643 = (t1619 * t1220 + t1640 * t1369) * t1222;
+  real t1645 = (t1598 * t1129 + t1613 * t1155) * t1251 - t1256 * t1643;
+  real t1649 = (t1577 * t925 + t1592 * t945) * t1241 - t1249 * t1645 - t1242 * t1643;
+  real t1655 = (t1556 * t750 + t1571 * t764) * t1232 - t1237 * t1649 - t1267 * t1645 - t1273 *
+    t1643;
+  real t1663 = (t1535 * t604 + t1550 * t612) * t1209 - t1230 * t1655 - t1281 * t1649 - t1287 * t1645
+    - t1210 * t1643;
+  real t1673 = (U[3] * t487 + t1529 * t489) * t1200 - t1205 * t1663 - t1296 * t1655 - t1302 * t1649
+    - t1308 * t1645 - t1314 * t1643;
+  G[3] = t1673;
+  real t1678 = U[18] * t463;
+  real t1680 = U[16] * t457 + t1678 * t474;
+  real t1682 = U[13] * t451 + t1680 * t477;
+  real t1684 = U[9] * t445 + t1682 * t480;
+  real t1690 = t1684 * t487 - U[4] * t489;
+  real t1694 = t1682 * t445 - U[9] * t480;
+  real t1698 = t1680 * t451 - U[13] * t477;
+  real t1702 = t1678 * t457 - U[16] * t474;
+  real t1704 = U[18] * t471;
+  real t1705 = t1704 * t578;
+  real t1707 = t1702 * t569 - t1705 * t591;
+  real t1709 = t1698 * t560 + t1707 * t594;
+  real t1711 = t1694 * t551 + t1709 * t597;
+  real t1717 = t1711 * t604 - t1690 * t612;
+  real t1721 = t1709 * t551 - t1694 * t597;
+  real t1725 = t1707 * t560 - t1698 * t594;
+  real t1727 = t1704 * t588;
+  real t1728 = t1727 * t734;
+  real t1732 = t1705 * t569 + t1702 * t591;
+  real t1734 = t1728 * t737 - t1732 * t715;
+  real t1736 = t1725 * t706 + t1734 * t740;
+  real t1738 = t1721 * t697 + t1736 * t743;
+  real t1744 = t1738 * t750 - t1717 * t764;
+  real t1748 = t1736 * t697 - t1721 * t743;
+  real t1752 = t1734 * t706 - t1725 * t740;
+  real t1756 = t1728 * t715 + t1732 * t737;
+  real t1758 = t1727 * t727;
+  real t1759 = t1758 * t899;
+  real t1761 = t1756 * t890 - t1759 * t912;
+  real t1763 = t1752 * t881 + t1761 * t915;
+  real t1765 = t1748 * t872 + t1763 * t918;
+  real t1771 = t1765 * t925 - t1744 * t945;
+  real t1775 = t1763 * t872 - t1748 * t918;
+  real t1779 = t1761 * t881 - t1752 * t915;
+  real t1781 = t1758 * t909;
+  real t1782 = t1781 * t1113;
+  real t1786 = t1759 * t890 + t1756 * t912;
+  real t1788 = t1782 * t1116 - t1786 * t1094;
+  real t1790 = t1779 * t1085 + t1788 * t1119;
+  real t1792 = t1775 * t1076 + t1790 * t1122;
+  real t1798 = t1792 * t1129 - t1771 * t1155;
+  real t1802 = t1790 * t1076 - t1775 * t1122;
+  real t1806 = t1788 * t1085 - t1779 * t1119;
+  real t1810 = t1782 * t1094 + t1786 * t1116;
+  real t1812 = t1781 * t1106;
+  real t1813 = 0.0 < t1184;
+  real t1815 = 1.0 / (t1813 != 0 ? t1184 : 1.0);
+  real t1816 = t1173 * t1815;
+  real t1817 = t1813 != 0 ? t1816 : 1.0;
+  real t1818 = t1812 * t1817;
+  real t1819 = t1184 * t1632;
+  real t1821 = t1810 * t1634 - t1818 * t1819;
+  real t1823 = t1806 * t1484 + t1821 * t1636;
+  real t1825 = t1802 * t1367 + t1823 * t1486;
+  real t1828 = (t1798 * t1220 + t1825 * t1369) * t1222;
+  real t1830 = (t1771 * t1129 + t1792 * t1155) * t1251 - t1256 * t1828;
+  real t1834 = (t1744 * t925 + t1765 * t945) * t1241 - t1249 * t1830 - t1242 * t1828;
+  real t1840 = (t1717 * t750 + t1738 * t764) * t1232 - t1237 * t1834 - t1267 * t1830 - t1273 *
+    t1828;
+  real t1848 = (t1690 * t604 + t1711 * t612) * t1209 - t1230 * t1840 - t1281 * t1834 - t1287 * t1830
+    - t1210 * t1828;
+  real t1858 = (U[4] * t487 + t1684 * t489) * t1200 - t1205 * t1848 - t1296 * t1840 - t1302 * t1834
+    - t1308 * t1830 - t1314 * t1828;
+  G[4] = t1858;
+  real t1864 = U[20] * t469;
+  real t1866 = U[19] * t463 + t1864 * t471;
+  real t1868 = U[17] * t457 + t1866 * t474;
+  real t1870 = U[14] * t451 + t1868 * t477;
+  real t1872 = U[10] * t445 + t1870 * t480;
+  real t1878 = t1872 * t487 - U[5] * t489;
+  real t1882 = t1870 * t445 - U[10] * t480;
+  real t1886 = t1868 * t451 - U[14] * t477;
+  real t1890 = t1866 * t457 - U[17] * t474;
+  real t1894 = t1864 * t463 - U[19] * t471;
+  real t1896 = U[20] * t509;
+  real t1897 = t1896 * t586;
+  real t1899 = t1894 * t578 - t1897 * t588;
+  real t1901 = t1890 * t569 + t1899 * t591;
+  real t1903 = t1886 * t560 + t1901 * t594;
+  real t1905 = t1882 * t551 + t1903 * t597;
+  real t1911 = t1905 * t604 - t1878 * t612;
+  real t1915 = t1903 * t551 - t1882 * t597;
+  real t1919 = t1901 * t560 - t1886 * t594;
+  real t1923 = t1899 * t569 - t1890 * t591;
+  real t1925 = t1896 * t632;
+  real t1926 = t1925 * t722;
+  real t1930 = t1897 * t578 + t1894 * t588;
+  real t1932 = t1926 * t727 - t1930 * t734;
+  real t1934 = t1923 * t715 + t1932 * t737;
+  real t1936 = t1919 * t706 + t1934 * t740;
+  real t1938 = t1915 * t697 + t1936 * t743;
+  real t1944 = t1938 * t750 - t1911 * t764;
+  real t1948 = t1936 * t697 - t1915 * t743;
+  real t1952 = t1934 * t706 - t1919 * t740;
+  real t1956 = t1932 * t715 - t1923 * t737;
+  real t1960 = t1926 * t734 + t1930 * t727;
+  real t1962 = t1925 * t784;
+  real t1963 = t1962 * t907;
+  real t1965 = t1960 * t899 - t1963 * t909;
+  real t1967 = t1956 * t890 + t1965 * t912;
+  real t1969 = t1952 * t881 + t1967 * t915;
+  real t1971 = t1948 * t872 + t1969 * t918;
+  real t1977 = t1971 * t925 - t1944 * t945;
+  real t1981 = t1969 * t872 - t1948 * t918;
+  real t1985 = t1967 * t881 - t1952 * t915;
+  real t1989 = t1965 * t890 - t1956 * t912;
+  real t1991 = t1962 * t965;
+  real t1992 = t1991 * t1101;
+  real t1996 = t1963 * t899 + t1960 * t909;
+  real t1998 = t1992 * t1106 - t1996 * t1113;
+  real t2000 = t1989 * t1094 + t1998 * t1116;
+  real t2002 = t1985 * t1085 + t2000 * t1119;
+  real t2004 = t1981 * t1076 + t2002 * t1122;
+  real t2010 = t2004 * t1129 - t1977 * t1155;
+  real t2014 = t2002 * t1076 - t1981 * t1122;
+  real t2018 = t2000 * t1085 - t1985 * t1119;
+  real t2022 = t1998 * t1094 - t1989 * t1116;
+  real t2026 = t1992 * t1113 + t1996 * t1106;
+  real t2028 = t1991 * t1175;
+  real t2029 = 0.0 < t1181;
+  real t2031 = 1.0 / (t2029 != 0 ? t1181 : 1.0);
+  real t2033 = -(t1176 * t2031);
+  real t2034 = t2029 != 0 ? t2033 : 1.0;
+  real t2035 = t2028 * t2034;
+  real t2036 = t1181 * t1815;
+  real t2038 = t2026 * t1817 - t2035 * t2036;
+  real t2040 = t2022 * t1634 + t2038 * t1819;
+  real t2042 = t2018 * t1484 + t2040 * t1636;
+  real t2044 = t2014 * t1367 + t2042 * t1486;
+  real t2047 = (t2010 * t1220 + t2044 * t1369) * t1222;
+  real t2049 = (t1977 * t1129 + t2004 * t1155) * t1251 - t1256 * t2047;
+  real t2053 = (t1944 * t925 + t1971 * t945) * t1241 - t1249 * t2049 - t1242 * t2047;
+  real t2059 = (t1911 * t750 + t1938 * t764) * t1232 - t1237 * t2053 - t1267 * t2049 - t1273 *
+    t2047;
+  real t2067 = (t1878 * t604 + t1905 * t612) * t1209 - t1230 * t2059 - t1281 * t2053 - t1287 * t2049
+    - t1210 * t2047;
+  real t2077 = (U[5] * t487 + t1872 * t489) * t1200 - t1205 * t2067 - t1296 * t2059 - t1302 * t2053
+    - t1308 * t2049 - t1314 * t2047;
+  G[5] = t2077;
+  G[6] = t1290;
+  G[7] = t1392;
+  G[8] = t1511;
+  G[9] = t1663;
+  G[10] = t1848;
+  G[11] = t2067;
+  G[12] = t1275;
+  G[13] = t1384;
+  G[14] = t1503;
+  G[15] = t1655;
+  G[16] = t1840;
+  G[17] = t2059;
+  G[18] = t1261;
+  G[19] = t1378;
+  G[20] = t1497;
+  G[21] = t1649;
+  G[22] = t1834;
+  G[23] = t2053;
+  G[24] = t1258;
+  G[25] = t1374;
+  G[26] = t1493;
+  G[27] = t1645;
+  G[28] = t1830;
+  G[29] = t2049;
+  G[30] = -t1223;
+  G[31] = t1372;
+  G[32] = t1491;
+  G[33] = t1643;
+  G[34] = t1828;
+  G[35] = t2047;
+  real t2080 = t10 * 1e-26 < t10;
+  real t2081 = t2080 != 0 ? 0.0 : e[0];
+  real t2085 = 1e-26 * (t8 + t11) < t8;
+  real t2087 = e[0] * (1.0 / U[0]);
+  real t2088 = t2080 != 0 ? t2087 : 0.0;
+  real t2090 = e[1] - U[1] * t2088;
+  real t2091 = t2085 != 0 ? 0.0 : t2090;
+  real t2097 = 1e-26 * (t6 + (t9 + t7)) < t6;
+  real t2100 = t2090 * (1.0 / U[6]);
+  real t2101 = t2085 != 0 ? t2100 : 0.0;
+  real t2104 = e[2] - (U[2] * t2088 + U[7] * t2101);
+  real t2105 = t2097 != 0 ? 0.0 : t2104;
+  real t2112 = 1e-26 * (t31 + (t34 + (t39 + t37))) < t31;
+  real t2114 = t2104 * (1.0 / U[11]);
+  real t2115 = t2097 != 0 ? t2114 : 0.0;
+  real t2121 = e[3] - (U[12] * t2115 + (U[3] * t2088 + U[8] * t2101));
+  real t2122 = t2112 != 0 ? 0.0 : t2121;
+  real t2130 = 1e-26 * (t28 + (t30 + (t33 + (t40 + t36)))) < t28;
+  real t2132 = t2121 * (1.0 / U[15]);
+  real t2133 = t2112 != 0 ? t2132 : 0.0;
+  real t2141 = e[4] - (U[16] * t2133 + (U[13] * t2115 + (U[4] * t2088 + U[9] * t2101)));
+  real t2142 = t2130 != 0 ? 0.0 : t2141;
+  real t2151 = 1e-26 * (t26 + (t27 + (t29 + (t32 + (t38 + t35))))) < t26;
+  real t2153 = t2141 * (1.0 / U[18]);
+  real t2154 = t2130 != 0 ? t2153 : 0.0;
+  real t2164 = e[5] - (U[19] * t2154 + (U[17] * t2133 + (U[14] * t2115 + (U[5] * t2088 + U[10] *
+    t2101))));
+  real t2165 = t2151 != 0 ? 0.0 : t2164;
+  real t2168 = tau[0] - (H[0] * t2081 + H[6] * t2091 + H[12] * t2105 + H[18] * t2122 + H[24] * t2142
+    + H[30] * t2165);
+  real t2170 = d[0] + t2088;
+  real t2172 = d[1] + t2101;
+  real t2174 = d[2] + t2115;
+  real t2176 = d[3] + t2133;
+  real t2178 = d[4] + t2154;
+  real t2181 = t2164 * (1.0 / U[20]);
+  real t2183 = d[5] + (t2151 != 0 ? t2181 : 0.0);
+  real t2184 = t2183 * t469;
+  real t2186 = t2178 * t463 + t2184 * t471;
+  real t2188 = t2176 * t457 + t2186 * t474;
+  real t2190 = t2174 * t451 + t2188 * t477;
+  real t2192 = t2172 * t445 + t2190 * t480;
+  real t2208 = tau[1] - (H[1] * t2081 + H[7] * t2091 + H[13] * t2105 + H[19] * t2122 + H[25] * t2142
+    + H[31] * t2165);
+  real t2210 = t2208 - t2168 * t1205;
+  real t2214 = t2192 * t487 - t2170 * t489;
+  real t2218 = t2190 * t445 - t2172 * t480;
+  real t2222 = t2188 * t451 - t2174 * t477;
+  real t2226 = t2186 * t457 - t2176 * t474;
+  real t2230 = t2184 * t463 - t2178 * t471;
+  real t2232 = t2183 * t509;
+  real t2233 = t2232 * t586;
+  real t2235 = t2230 * t578 - t2233 * t588;
+  real t2237 = t2226 * t569 + t2235 * t591;
+  real t2239 = t2222 * t560 + t2237 * t594;
+  real t2241 = t2218 * t551 + t2239 * t597;
+  real t2257 = tau[2] - (H[2] * t2081 + H[8] * t2091 + H[14] * t2105 + H[20] * t2122 + H[26] * t2142
+    + H[32] * t2165);
+  real t2261 = t2257 - t2168 * t1296 - t1230 * t2210;
+  real t2265 = t2241 * t604 - t2214 * t612;
+  real t2269 = t2239 * t551 - t2218 * t597;
+  real t2273 = t2237 * t560 - t2222 * t594;
+  real t2277 = t2235 * t569 - t2226 * t591;
+  real t2279 = t2232 * t632;
+  real t2280 = t2279 * t722;
+  real t2284 = t2233 * t578 + t2230 * t588;
+  real t2286 = t2280 * t727 - t2284 * t734;
+  real t2288 = t2277 * t715 + t2286 * t737;
+  real t2290 = t2273 * t706 + t2288 * t740;
+  real t2292 = t2269 * t697 + t2290 * t743;
+  real t2308 = tau[3] - (H[3] * t2081 + H[9] * t2091 + H[15] * t2105 + H[21] * t2122 + H[27] * t2142
+    + H[33] * t2165);
+  real t2314 = t2308 - t2168 * t1302 - t1281 * t2210 - t1237 * t2261;
+  real t2318 = t2292 * t750 - t2265 * t764;
+  real t2322 = t2290 * t697 - t2269 * t743;
+  real t2326 = t2288 * t706 - t2273 * t740;
+  real t2330 = t2286 * t715 - t2277 * t737;
+  real t2334 = t2280 * t734 + t2284 * t727;
+  real t2336 = t2279 * t784;
+  real t2337 = t2336 * t907;
+  real t2339 = t2334 * t899 - t2337 * t909;
+  real t2341 = t2330 * t890 + t2339 * t912;
+  real t2343 = t2326 * t881 + t2341 * t915;
+  real t2345 = t2322 * t872 + t2343 * t918;
+  real t2361 = tau[4] - (H[4] * t2081 + H[10] * t2091 + H[16] * t2105 + H[22] * t2122 + H[28] *
+    t2142 + H[34] * t2165);
+  real t2369 = t2361 - t2168 * t1308 - t1287 * t2210 - t1267 * t2261 - t1249 * t2314;
+  real t2373 = t2345 * t925 - t2318 * t945;
+  real t2377 = t2343 * t872 - t2322 * t918;
+  real t2381 = t2341 * t881 - t2326 * t915;
+  real t2385 = t2339 * t890 - t2330 * t912;
+  real t2387 = t2336 * t965;
+  real t2388 = t2387 * t1101;
+  real t2392 = t2337 * t899 + t2334 * t909;
+  real t2394 = t2388 * t1106 - t2392 * t1113;
+  real t2396 = t2385 * t1094 + t2394 * t1116;
+  real t2398 = t2381 * t1085 + t2396 * t1119;
+  real t2400 = t2377 * t1076 + t2398 * t1122;
+  real t2416 = tau[5] - (H[5] * t2081 + H[11] * t2091 + H[17] * t2105 + H[23] * t2122 + H[29] *
+    t2142 + H[35] * t2165);
+  real t2430 = t2400 * t1129 - t2373 * t1155;
+  real t2434 = t2398 * t1076 - t2377 * t1122;
+  real t2438 = t2396 * t1085 - t2381 * t1119;
+  real t2442 = t2394 * t1094 - t2385 * t1116;
+  real t2446 = t2388 * t1113 + t2392 * t1106;
+  real t2448 = t2387 * t1175;
+  real t2449 = t2448 * t2034;
+  real t2451 = t2446 * t1817 - t2449 * t2036;
+  real t2453 = t2442 * t1634 + t2451 * t1819;
+  real t2455 = t2438 * t1484 + t2453 * t1636;
+  real t2457 = t2434 * t1367 + t2455 * t1486;
+  real t2461 = t1222 * (t1222 * (t2416 - t2168 * t1314 - t1210 * t2210 - t1273 * t2261 - t1242 *
+    t2314 - t1256 * t2369) - (t2430 * t1220 + t2457 * t1369));
+  real t2463 = t1251 * (t1251 * t2369 - (t2373 * t1129 + t2400 * t1155)) - t1256 * t2461;
+  real t2467 = t1241 * (t1241 * t2314 - (t2318 * t925 + t2345 * t945)) - t1249 * t2463 - t1242 *
+    t2461;
+  real t2473 = t1232 * (t1232 * t2261 - (t2265 * t750 + t2292 * t764)) - t1237 * t2467 - t1267 *
+    t2463 - t1273 * t2461;
+  real t2481 = t1209 * (t1209 * t2210 - (t2214 * t604 + t2241 * t612)) - t1230 * t2473 - t1281 *
+    t2467 - t1287 * t2463 - t1210 * t2461;
+  g[0] = t1200 * (t2168 * t1200 - (t2170 * t487 + t2192 * t489)) - t1205 * t2481 - t1296 * t2473 -
+    t1302 * t2467 - t1308 * t2463 - t1314 * t2461;
+  g[1] = t2481;
+  g[2] = t2473;
+  g[3] = t2467;
+  g[4] = t2463;
+  g[5] = t2461;
+  real t2492 = t1215 * t1369;
+  real t2494 = (t2492 < 0.0) ? (-1.0) : 1.0;
+  V[0] = t2492 * t2494;
+  V[1] = -((t1368 * t1220 + t1360 * t1369) * t2494);
+  V[2] = (t1488 * t1220 - t1473 * t1369) * t2494;
+  V[3] = (t1640 * t1220 - t1619 * t1369) * t2494;
+  V[4] = (t1825 * t1220 - t1798 * t1369) * t2494;
+  V[5] = (t2044 * t1220 - t2010 * t1369) * t2494;
+  real t2517 = t1362 * t1486;
+  real t2519 = (t2517 < 0.0) ? (-1.0) : 1.0;
+  V[6] = t2517 * t2519;
+  V[7] = -((t1485 * t1367 + t1477 * t1486) * t2519);
+  V[8] = (t1638 * t1367 - t1623 * t1486) * t2519;
+  V[9] = (t1823 * t1367 - t1802 * t1486) * t2519;
+  V[10] = (t2042 * t1367 - t2014 * t1486) * t2519;
+  real t2538 = t1479 * t1636;
+  real t2540 = (t2538 < 0.0) ? (-1.0) : 1.0;
+  V[11] = t2538 * t2540;
+  V[12] = -((t1635 * t1484 + t1627 * t1636) * t2540);
+  V[13] = (t1821 * t1484 - t1806 * t1636) * t2540;
+  V[14] = (t2040 * t1484 - t2018 * t1636) * t2540;
+  real t2555 = t1629 * t1819;
+  real t2557 = (t2555 < 0.0) ? (-1.0) : 1.0;
+  V[15] = t2555 * t2557;
+  V[16] = -((t1818 * t1634 + t1810 * t1819) * t2557);
+  V[17] = (t2038 * t1634 - t2022 * t1819) * t2557;
+  real t2568 = t1812 * t2036;
+  real t2570 = (t2568 < 0.0) ? (-1.0) : 1.0;
+  V[18] = t2568 * t2570;
+  V[19] = -((t2035 * t1817 + t2026 * t2036) * t2570);
+  real t2577 = t1178 * t2031;
+  real t2578 = t2028 * t2577;
+  real t2580 = (t2578 < 0.0) ? (-1.0) : 1.0;
+  V[20] = t2578 * t2580;
+  d_V[0] = (t2457 * t1220 - t2430 * t1369) * t2494;
+  d_V[1] = (t2455 * t1367 - t2434 * t1486) * t2519;
+  d_V[2] = (t2453 * t1484 - t2438 * t1636) * t2540;
+  d_V[3] = (t2451 * t1634 - t2442 * t1819) * t2557;
+  d_V[4] = -((t2449 * t1817 + t2446 * t2036) * t2570);
+  d_V[5] = t2448 * t2577 * t2580;
+  e_Q[0] = t2081 + (t2168 * t1316 + t2208 * t1290 + t2257 * t1275 + t2308 * t1261 + t2361 * t1258 -
+    t2416 * t1223);
+  e_Q[1] = t2091 + (t2168 * t1402 + t2208 * t1392 + t2257 * t1384 + t2308 * t1378 + t2361 * t1374 +
+    t2416 * t1372);
+  e_Q[2] = t2105 + (t2168 * t1521 + t2208 * t1511 + t2257 * t1503 + t2308 * t1497 + t2361 * t1493 +
+    t2416 * t1491);
+  e_Q[3] = t2122 + (t2168 * t1673 + t2208 * t1663 + t2257 * t1655 + t2308 * t1649 + t2361 * t1645 +
+    t2416 * t1643);
+  e_Q[4] = t2142 + (t2168 * t1858 + t2208 * t1848 + t2257 * t1840 + t2308 * t1834 + t2361 * t1830 +
+    t2416 * t1828);
+  e_Q[5] = t2165 + (t2168 * t2077 + t2208 * t2067 + t2257 * t2059 + t2308 * t2053 + t2361 * t2049 +
+    t2416 * t2047);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_qr_eliminate_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_qr_eliminate(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_qr_eliminate_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"floor", 2, "kg, kg*m2", 0, 0},
-    {"U", 21, "", 0, 0},
-    {"d", 6, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_qr_eliminate_outputs[] = {
-    {"G", 36, "", 0, 0},
-    {"g", 6, "", 0, 0},
-    {"V", 21, "", 0, 0},
-    {"d_V", 6, "", 0, 0},
-    {"e_Q", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic6_qr_eliminate_guards[] = {
-    {1, "speed 1 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 4 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 5 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 6 of 6 moves no inertia: its acceleration is undetermined"},
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic6_qr_eliminate, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4]))
 
 /* motion of Q across a hinge with 6 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9017,151 +2310,31 @@ static const mstmm_guard mstmm_sweep_generic6_qr_eliminate_guards[] = {
  * in  motion[9]
  * out Q[9] motion of Q in body axes: w, wd, and a of its carrier at P
  */
-int mstmm_sweep_generic6_tangent_carrier(const real *restrict H, const real *restrict s,
-    const real *restrict v, const real *restrict w, const real *restrict c,
-    const real *restrict motion, real *restrict Q)
+int mstmm_sweep_generic6_tangent_carrier(in_t H, in_t s, in_t v, in_t w, in_t c, in_t motion,
+    out_t Q)
 {
-    const real t0 = motion[0] - w[0];
-    Q[0] = t0;
-    const real t1 = motion[1] - w[1];
-    Q[1] = t1;
-    const real t2 = motion[2] - w[2];
-    Q[2] = t2;
-    const real t3 = w[1] * t2;
-    const real t4 = w[2] * t1;
-    const real t5 = t3 - t4;
-    const real t6 = H[18] * s[0];
-    const real t7 = H[19] * s[1];
-    const real t8 = t6 + t7;
-    const real t9 = H[20] * s[2];
-    const real t10 = t8 + t9;
-    const real t11 = H[21] * s[3];
-    const real t12 = t10 + t11;
-    const real t13 = H[22] * s[4];
-    const real t14 = t12 + t13;
-    const real t15 = H[23] * s[5];
-    const real t16 = t14 + t15;
-    const real t17 = c[3] + t16;
-    const real t18 = t5 - t17;
-    const real t19 = motion[3] + t18;
-    Q[3] = t19;
-    const real t20 = w[2] * t0;
-    const real t21 = w[0] * t2;
-    const real t22 = t20 - t21;
-    const real t23 = H[24] * s[0];
-    const real t24 = H[25] * s[1];
-    const real t25 = t23 + t24;
-    const real t26 = H[26] * s[2];
-    const real t27 = t25 + t26;
-    const real t28 = H[27] * s[3];
-    const real t29 = t27 + t28;
-    const real t30 = H[28] * s[4];
-    const real t31 = t29 + t30;
-    const real t32 = H[29] * s[5];
-    const real t33 = t31 + t32;
-    const real t34 = c[4] + t33;
-    const real t35 = t22 - t34;
-    const real t36 = motion[4] + t35;
-    Q[4] = t36;
-    const real t37 = w[0] * t1;
-    const real t38 = w[1] * t0;
-    const real t39 = t37 - t38;
-    const real t40 = H[30] * s[0];
-    const real t41 = H[31] * s[1];
-    const real t42 = t40 + t41;
-    const real t43 = H[32] * s[2];
-    const real t44 = t42 + t43;
-    const real t45 = H[33] * s[3];
-    const real t46 = t44 + t45;
-    const real t47 = H[34] * s[4];
-    const real t48 = t46 + t47;
-    const real t49 = H[35] * s[5];
-    const real t50 = t48 + t49;
-    const real t51 = c[5] + t50;
-    const real t52 = t39 - t51;
-    const real t53 = motion[5] + t52;
-    Q[5] = t53;
-    const real t54 = v[1] * t2;
-    const real t55 = t54 * 2.0;
-    const real t56 = v[2] * t1;
-    const real t57 = 2.0 * t56;
-    const real t58 = t55 - t57;
-    const real t59 = H[0] * s[0];
-    const real t60 = H[1] * s[1];
-    const real t61 = t59 + t60;
-    const real t62 = H[2] * s[2];
-    const real t63 = t61 + t62;
-    const real t64 = H[3] * s[3];
-    const real t65 = t63 + t64;
-    const real t66 = H[4] * s[4];
-    const real t67 = t65 + t66;
-    const real t68 = H[5] * s[5];
-    const real t69 = t67 + t68;
-    const real t70 = c[0] + t69;
-    const real t71 = t58 - t70;
-    const real t72 = motion[6] + t71;
-    Q[6] = t72;
-    const real t73 = v[2] * t0;
-    const real t74 = 2.0 * t73;
-    const real t75 = v[0] * t2;
-    const real t76 = 2.0 * t75;
-    const real t77 = t74 - t76;
-    const real t78 = H[6] * s[0];
-    const real t79 = H[7] * s[1];
-    const real t80 = t78 + t79;
-    const real t81 = H[8] * s[2];
-    const real t82 = t80 + t81;
-    const real t83 = H[9] * s[3];
-    const real t84 = t82 + t83;
-    const real t85 = H[10] * s[4];
-    const real t86 = t84 + t85;
-    const real t87 = H[11] * s[5];
-    const real t88 = t86 + t87;
-    const real t89 = c[1] + t88;
-    const real t90 = t77 - t89;
-    const real t91 = motion[7] + t90;
-    Q[7] = t91;
-    const real t92 = v[0] * t1;
-    const real t93 = 2.0 * t92;
-    const real t94 = v[1] * t0;
-    const real t95 = 2.0 * t94;
-    const real t96 = t93 - t95;
-    const real t97 = H[12] * s[0];
-    const real t98 = H[13] * s[1];
-    const real t99 = t97 + t98;
-    const real t100 = H[14] * s[2];
-    const real t101 = t99 + t100;
-    const real t102 = H[15] * s[3];
-    const real t103 = t101 + t102;
-    const real t104 = H[16] * s[4];
-    const real t105 = t103 + t104;
-    const real t106 = H[17] * s[5];
-    const real t107 = t105 + t106;
-    const real t108 = c[2] + t107;
-    const real t109 = t96 - t108;
-    const real t110 = motion[8] + t109;
-    Q[8] = t110;
-    return 0;
+  real t0 = motion[0] - w[0];
+  Q[0] = t0;
+  real t1 = motion[1] - w[1];
+  Q[1] = t1;
+  real t2 = motion[2] - w[2];
+  Q[2] = t2;
+  Q[3] = motion[3] + (w[1] * t2 - w[2] * t1 - (c[3] + (H[18] * s[0] + H[19] * s[1] + H[20] * s[2] +
+    H[21] * s[3] + H[22] * s[4] + H[23] * s[5])));
+  Q[4] = motion[4] + (w[2] * t0 - w[0] * t2 - (c[4] + (H[24] * s[0] + H[25] * s[1] + H[26] * s[2] +
+    H[27] * s[3] + H[28] * s[4] + H[29] * s[5])));
+  Q[5] = motion[5] + (w[0] * t1 - w[1] * t0 - (c[5] + (H[30] * s[0] + H[31] * s[1] + H[32] * s[2] +
+    H[33] * s[3] + H[34] * s[4] + H[35] * s[5])));
+  Q[6] = motion[6] + (v[1] * t2 * 2.0 - 2.0 * (v[2] * t1) - (c[0] + (H[0] * s[0] + H[1] * s[1] +
+    H[2] * s[2] + H[3] * s[3] + H[4] * s[4] + H[5] * s[5])));
+  Q[7] = motion[7] + (2.0 * (v[2] * t0) - 2.0 * (v[0] * t2) - (c[1] + (H[6] * s[0] + H[7] * s[1] +
+    H[8] * s[2] + H[9] * s[3] + H[10] * s[4] + H[11] * s[5])));
+  Q[8] = motion[8] + (2.0 * (v[0] * t1) - 2.0 * (v[1] * t0) - (c[2] + (H[12] * s[0] + H[13] * s[1] +
+    H[14] * s[2] + H[15] * s[3] + H[16] * s[4] + H[17] * s[5])));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_carrier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_carrier(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_carrier_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_carrier_outputs[] = {
-    {"Q", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_carrier, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* a direction of a hinge with 6 speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9185,450 +2358,72 @@ static const mstmm_port mstmm_sweep_generic6_tangent_carrier_outputs[] = {
  * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic6_tangent_column(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict s, const real *restrict v, const real *restrict w,
-    const real *restrict Q, const real *restrict f, const real *restrict d_H,
-    const real *restrict d_v, const real *restrict d_w, const real *restrict d_c,
-    const real *restrict d_s, const real *restrict J, const real *restrict laws, real *restrict B,
-    real *restrict G, real *restrict row)
+int mstmm_sweep_generic6_tangent_column(in_t theta, in_t x, in_t H, in_t s, in_t v, in_t w, in_t Q,
+    in_t f, in_t d_H, in_t d_v, in_t d_w, in_t d_c, in_t d_s, in_t J, in_t laws, out_t B, out_t G,
+    out_t row)
 {
-    const real t0 = theta[2] * Q[1];
-    const real t1 = theta[1] * Q[2];
-    const real t2 = t0 - t1;
-    const real t3 = d_w[0] + t2;
-    B[0] = t3;
-    const real t4 = theta[0] * Q[2];
-    const real t5 = theta[2] * Q[0];
-    const real t6 = t4 - t5;
-    const real t7 = d_w[1] + t6;
-    B[1] = t7;
-    const real t8 = theta[1] * Q[0];
-    const real t9 = theta[0] * Q[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_w[2] + t10;
-    B[2] = t11;
-    const real t12 = w[2] * t6;
-    const real t13 = w[1] * t10;
-    const real t14 = t12 - t13;
-    const real t15 = H[18] * d_s[0];
-    const real t16 = H[19] * d_s[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[20] * d_s[2];
-    const real t19 = t17 + t18;
-    const real t20 = H[21] * d_s[3];
-    const real t21 = t19 + t20;
-    const real t22 = H[22] * d_s[4];
-    const real t23 = t21 + t22;
-    const real t24 = H[23] * d_s[5];
-    const real t25 = t23 + t24;
-    const real t26 = s[0] * d_H[18];
-    const real t27 = s[1] * d_H[19];
-    const real t28 = t26 + t27;
-    const real t29 = s[2] * d_H[20];
-    const real t30 = t28 + t29;
-    const real t31 = s[3] * d_H[21];
-    const real t32 = t30 + t31;
-    const real t33 = s[4] * d_H[22];
-    const real t34 = t32 + t33;
-    const real t35 = s[5] * d_H[23];
-    const real t36 = t34 + t35;
-    const real t37 = t25 + t36;
-    const real t38 = d_c[3] + t37;
-    const real t39 = theta[2] * Q[4];
-    const real t40 = Q[1] * d_w[2];
-    const real t41 = Q[2] * d_w[1];
-    const real t42 = t40 - t41;
-    const real t43 = t39 + t42;
-    const real t44 = theta[1] * Q[5];
-    const real t45 = t43 - t44;
-    const real t46 = t38 + t45;
-    const real t47 = t14 + t46;
-    B[3] = t47;
-    const real t48 = w[0] * t10;
-    const real t49 = w[2] * t2;
-    const real t50 = t48 - t49;
-    const real t51 = H[24] * d_s[0];
-    const real t52 = H[25] * d_s[1];
-    const real t53 = t51 + t52;
-    const real t54 = H[26] * d_s[2];
-    const real t55 = t53 + t54;
-    const real t56 = H[27] * d_s[3];
-    const real t57 = t55 + t56;
-    const real t58 = H[28] * d_s[4];
-    const real t59 = t57 + t58;
-    const real t60 = H[29] * d_s[5];
-    const real t61 = t59 + t60;
-    const real t62 = s[0] * d_H[24];
-    const real t63 = s[1] * d_H[25];
-    const real t64 = t62 + t63;
-    const real t65 = s[2] * d_H[26];
-    const real t66 = t64 + t65;
-    const real t67 = s[3] * d_H[27];
-    const real t68 = t66 + t67;
-    const real t69 = s[4] * d_H[28];
-    const real t70 = t68 + t69;
-    const real t71 = s[5] * d_H[29];
-    const real t72 = t70 + t71;
-    const real t73 = t61 + t72;
-    const real t74 = d_c[4] + t73;
-    const real t75 = theta[0] * Q[5];
-    const real t76 = Q[2] * d_w[0];
-    const real t77 = Q[0] * d_w[2];
-    const real t78 = t76 - t77;
-    const real t79 = theta[2] * Q[3];
-    const real t80 = t78 - t79;
-    const real t81 = t75 + t80;
-    const real t82 = t74 + t81;
-    const real t83 = t50 + t82;
-    B[4] = t83;
-    const real t84 = w[1] * t2;
-    const real t85 = w[0] * t6;
-    const real t86 = t84 - t85;
-    const real t87 = H[30] * d_s[0];
-    const real t88 = H[31] * d_s[1];
-    const real t89 = t87 + t88;
-    const real t90 = H[32] * d_s[2];
-    const real t91 = t89 + t90;
-    const real t92 = H[33] * d_s[3];
-    const real t93 = t91 + t92;
-    const real t94 = H[34] * d_s[4];
-    const real t95 = t93 + t94;
-    const real t96 = H[35] * d_s[5];
-    const real t97 = t95 + t96;
-    const real t98 = s[0] * d_H[30];
-    const real t99 = s[1] * d_H[31];
-    const real t100 = t98 + t99;
-    const real t101 = s[2] * d_H[32];
-    const real t102 = t100 + t101;
-    const real t103 = s[3] * d_H[33];
-    const real t104 = t102 + t103;
-    const real t105 = s[4] * d_H[34];
-    const real t106 = t104 + t105;
-    const real t107 = s[5] * d_H[35];
-    const real t108 = t106 + t107;
-    const real t109 = t97 + t108;
-    const real t110 = d_c[5] + t109;
-    const real t111 = theta[1] * Q[3];
-    const real t112 = Q[0] * d_w[1];
-    const real t113 = Q[1] * d_w[0];
-    const real t114 = t112 - t113;
-    const real t115 = t111 + t114;
-    const real t116 = theta[0] * Q[4];
-    const real t117 = t115 - t116;
-    const real t118 = t110 + t117;
-    const real t119 = t86 + t118;
-    B[5] = t119;
-    const real t120 = v[2] * 2.0;
-    const real t121 = t6 * t120;
-    const real t122 = v[1] * 2.0;
-    const real t123 = t10 * t122;
-    const real t124 = t121 - t123;
-    const real t125 = H[0] * d_s[0];
-    const real t126 = H[1] * d_s[1];
-    const real t127 = t125 + t126;
-    const real t128 = H[2] * d_s[2];
-    const real t129 = t127 + t128;
-    const real t130 = H[3] * d_s[3];
-    const real t131 = t129 + t130;
-    const real t132 = H[4] * d_s[4];
-    const real t133 = t131 + t132;
-    const real t134 = H[5] * d_s[5];
-    const real t135 = t133 + t134;
-    const real t136 = s[0] * d_H[0];
-    const real t137 = s[1] * d_H[1];
-    const real t138 = t136 + t137;
-    const real t139 = s[2] * d_H[2];
-    const real t140 = t138 + t139;
-    const real t141 = s[3] * d_H[3];
-    const real t142 = t140 + t141;
-    const real t143 = s[4] * d_H[4];
-    const real t144 = t142 + t143;
-    const real t145 = s[5] * d_H[5];
-    const real t146 = t144 + t145;
-    const real t147 = t135 + t146;
-    const real t148 = d_c[0] + t147;
-    const real t149 = theta[2] * Q[7];
-    const real t150 = x[2] * Q[4];
-    const real t151 = Q[1] * d_v[2];
-    const real t152 = 2.0 * t151;
-    const real t153 = x[1] * Q[0];
-    const real t154 = x[0] * Q[1];
-    const real t155 = t153 - t154;
-    const real t156 = Q[1] * t155;
-    const real t157 = x[0] * Q[2];
-    const real t158 = x[2] * Q[0];
-    const real t159 = t157 - t158;
-    const real t160 = Q[2] * t159;
-    const real t161 = t156 - t160;
-    const real t162 = t152 + t161;
-    const real t163 = Q[2] * d_v[1];
-    const real t164 = 2.0 * t163;
-    const real t165 = t162 - t164;
-    const real t166 = t150 + t165;
-    const real t167 = x[1] * Q[5];
-    const real t168 = t166 - t167;
-    const real t169 = t149 + t168;
-    const real t170 = theta[1] * Q[8];
-    const real t171 = t169 - t170;
-    const real t172 = t148 + t171;
-    const real t173 = t124 + t172;
-    B[6] = t173;
-    const real t174 = v[0] * 2.0;
-    const real t175 = t10 * t174;
-    const real t176 = t2 * t120;
-    const real t177 = t175 - t176;
-    const real t178 = H[6] * d_s[0];
-    const real t179 = H[7] * d_s[1];
-    const real t180 = t178 + t179;
-    const real t181 = H[8] * d_s[2];
-    const real t182 = t180 + t181;
-    const real t183 = H[9] * d_s[3];
-    const real t184 = t182 + t183;
-    const real t185 = H[10] * d_s[4];
-    const real t186 = t184 + t185;
-    const real t187 = H[11] * d_s[5];
-    const real t188 = t186 + t187;
-    const real t189 = s[0] * d_H[6];
-    const real t190 = s[1] * d_H[7];
-    const real t191 = t189 + t190;
-    const real t192 = s[2] * d_H[8];
-    const real t193 = t191 + t192;
-    const real t194 = s[3] * d_H[9];
-    const real t195 = t193 + t194;
-    const real t196 = s[4] * d_H[10];
-    const real t197 = t195 + t196;
-    const real t198 = s[5] * d_H[11];
-    const real t199 = t197 + t198;
-    const real t200 = t188 + t199;
-    const real t201 = d_c[1] + t200;
-    const real t202 = theta[0] * Q[8];
-    const real t203 = x[0] * Q[5];
-    const real t204 = Q[2] * d_v[0];
-    const real t205 = 2.0 * t204;
-    const real t206 = x[2] * Q[1];
-    const real t207 = x[1] * Q[2];
-    const real t208 = t206 - t207;
-    const real t209 = Q[2] * t208;
-    const real t210 = Q[0] * t155;
-    const real t211 = t209 - t210;
-    const real t212 = Q[0] * d_v[2];
-    const real t213 = 2.0 * t212;
-    const real t214 = t211 - t213;
-    const real t215 = t205 + t214;
-    const real t216 = x[2] * Q[3];
-    const real t217 = t215 - t216;
-    const real t218 = t203 + t217;
-    const real t219 = theta[2] * Q[6];
-    const real t220 = t218 - t219;
-    const real t221 = t202 + t220;
-    const real t222 = t201 + t221;
-    const real t223 = t177 + t222;
-    B[7] = t223;
-    const real t224 = t2 * t122;
-    const real t225 = t6 * t174;
-    const real t226 = t224 - t225;
-    const real t227 = H[12] * d_s[0];
-    const real t228 = H[13] * d_s[1];
-    const real t229 = t227 + t228;
-    const real t230 = H[14] * d_s[2];
-    const real t231 = t229 + t230;
-    const real t232 = H[15] * d_s[3];
-    const real t233 = t231 + t232;
-    const real t234 = H[16] * d_s[4];
-    const real t235 = t233 + t234;
-    const real t236 = H[17] * d_s[5];
-    const real t237 = t235 + t236;
-    const real t238 = s[0] * d_H[12];
-    const real t239 = s[1] * d_H[13];
-    const real t240 = t238 + t239;
-    const real t241 = s[2] * d_H[14];
-    const real t242 = t240 + t241;
-    const real t243 = s[3] * d_H[15];
-    const real t244 = t242 + t243;
-    const real t245 = s[4] * d_H[16];
-    const real t246 = t244 + t245;
-    const real t247 = s[5] * d_H[17];
-    const real t248 = t246 + t247;
-    const real t249 = t237 + t248;
-    const real t250 = d_c[2] + t249;
-    const real t251 = theta[1] * Q[6];
-    const real t252 = x[1] * Q[3];
-    const real t253 = Q[0] * d_v[1];
-    const real t254 = 2.0 * t253;
-    const real t255 = Q[0] * t159;
-    const real t256 = Q[1] * t208;
-    const real t257 = t255 - t256;
-    const real t258 = t254 + t257;
-    const real t259 = Q[1] * d_v[0];
-    const real t260 = 2.0 * t259;
-    const real t261 = t258 - t260;
-    const real t262 = t252 + t261;
-    const real t263 = x[0] * Q[4];
-    const real t264 = t262 - t263;
-    const real t265 = t251 + t264;
-    const real t266 = theta[0] * Q[7];
-    const real t267 = t265 - t266;
-    const real t268 = t250 + t267;
-    const real t269 = t226 + t268;
-    B[8] = t269;
-    const real t270 = theta[1] * f[2];
-    const real t271 = theta[2] * f[1];
-    const real t272 = t270 - t271;
-    G[0] = t272;
-    const real t273 = theta[2] * f[0];
-    const real t274 = theta[0] * f[2];
-    const real t275 = t273 - t274;
-    G[1] = t275;
-    const real t276 = theta[0] * f[1];
-    const real t277 = theta[1] * f[0];
-    const real t278 = t276 - t277;
-    G[2] = t278;
-    const real t279 = theta[1] * f[5];
-    const real t280 = x[1] * f[2];
-    const real t281 = x[2] * f[1];
-    const real t282 = t280 - t281;
-    const real t283 = theta[2] * f[4];
-    const real t284 = t282 - t283;
-    const real t285 = t279 + t284;
-    G[3] = t285;
-    const real t286 = theta[2] * f[3];
-    const real t287 = x[2] * f[0];
-    const real t288 = x[0] * f[2];
-    const real t289 = t287 - t288;
-    const real t290 = t286 + t289;
-    const real t291 = theta[0] * f[5];
-    const real t292 = t290 - t291;
-    G[4] = t292;
-    const real t293 = theta[0] * f[4];
-    const real t294 = x[0] * f[1];
-    const real t295 = x[1] * f[0];
-    const real t296 = t294 - t295;
-    const real t297 = theta[1] * f[3];
-    const real t298 = t296 - t297;
-    const real t299 = t293 + t298;
-    G[5] = t299;
-    const real t300 = d_s[0] * J[0];
-    const real t301 = f[0] * d_H[0];
-    const real t302 = f[1] * d_H[6];
-    const real t303 = t301 + t302;
-    const real t304 = f[2] * d_H[12];
-    const real t305 = t303 + t304;
-    const real t306 = f[3] * d_H[18];
-    const real t307 = t305 + t306;
-    const real t308 = f[4] * d_H[24];
-    const real t309 = t307 + t308;
-    const real t310 = f[5] * d_H[30];
-    const real t311 = t309 + t310;
-    const real t312 = t311 - laws[0];
-    const real t313 = t300 + t312;
-    row[0] = t313;
-    const real t314 = d_s[1] * J[1];
-    const real t315 = f[0] * d_H[1];
-    const real t316 = f[1] * d_H[7];
-    const real t317 = t315 + t316;
-    const real t318 = f[2] * d_H[13];
-    const real t319 = t317 + t318;
-    const real t320 = f[3] * d_H[19];
-    const real t321 = t319 + t320;
-    const real t322 = f[4] * d_H[25];
-    const real t323 = t321 + t322;
-    const real t324 = f[5] * d_H[31];
-    const real t325 = t323 + t324;
-    const real t326 = t325 - laws[1];
-    const real t327 = t314 + t326;
-    row[1] = t327;
-    const real t328 = d_s[2] * J[2];
-    const real t329 = f[0] * d_H[2];
-    const real t330 = f[1] * d_H[8];
-    const real t331 = t329 + t330;
-    const real t332 = f[2] * d_H[14];
-    const real t333 = t331 + t332;
-    const real t334 = f[3] * d_H[20];
-    const real t335 = t333 + t334;
-    const real t336 = f[4] * d_H[26];
-    const real t337 = t335 + t336;
-    const real t338 = f[5] * d_H[32];
-    const real t339 = t337 + t338;
-    const real t340 = t339 - laws[2];
-    const real t341 = t328 + t340;
-    row[2] = t341;
-    const real t342 = d_s[3] * J[3];
-    const real t343 = f[0] * d_H[3];
-    const real t344 = f[1] * d_H[9];
-    const real t345 = t343 + t344;
-    const real t346 = f[2] * d_H[15];
-    const real t347 = t345 + t346;
-    const real t348 = f[3] * d_H[21];
-    const real t349 = t347 + t348;
-    const real t350 = f[4] * d_H[27];
-    const real t351 = t349 + t350;
-    const real t352 = f[5] * d_H[33];
-    const real t353 = t351 + t352;
-    const real t354 = t353 - laws[3];
-    const real t355 = t342 + t354;
-    row[3] = t355;
-    const real t356 = d_s[4] * J[4];
-    const real t357 = f[0] * d_H[4];
-    const real t358 = f[1] * d_H[10];
-    const real t359 = t357 + t358;
-    const real t360 = f[2] * d_H[16];
-    const real t361 = t359 + t360;
-    const real t362 = f[3] * d_H[22];
-    const real t363 = t361 + t362;
-    const real t364 = f[4] * d_H[28];
-    const real t365 = t363 + t364;
-    const real t366 = f[5] * d_H[34];
-    const real t367 = t365 + t366;
-    const real t368 = t367 - laws[4];
-    const real t369 = t356 + t368;
-    row[4] = t369;
-    const real t370 = d_s[5] * J[5];
-    const real t371 = f[0] * d_H[5];
-    const real t372 = f[1] * d_H[11];
-    const real t373 = t371 + t372;
-    const real t374 = f[2] * d_H[17];
-    const real t375 = t373 + t374;
-    const real t376 = f[3] * d_H[23];
-    const real t377 = t375 + t376;
-    const real t378 = f[4] * d_H[29];
-    const real t379 = t377 + t378;
-    const real t380 = f[5] * d_H[35];
-    const real t381 = t379 + t380;
-    const real t382 = t381 - laws[5];
-    const real t383 = t370 + t382;
-    row[5] = t383;
-    return 0;
+  real t2 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = d_w[0] + t2;
+  real t6 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = d_w[1] + t6;
+  real t10 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = d_w[2] + t10;
+  B[3] = w[2] * t6 - w[1] * t10 + (d_c[3] + (H[18] * d_s[0] + H[19] * d_s[1] + H[20] * d_s[2] +
+    H[21] * d_s[3] + H[22] * d_s[4] + H[23] * d_s[5] + (s[0] * d_H[18] + s[1] * d_H[19] + s[2] *
+    d_H[20] + s[3] * d_H[21] + s[4] * d_H[22] + s[5] * d_H[23])) + (theta[2] * Q[4] + (Q[1] * d_w[2]
+    - Q[2] * d_w[1]) - theta[1] * Q[5]));
+  B[4] = w[0] * t10 - w[2] * t2 + (d_c[4] + (H[24] * d_s[0] + H[25] * d_s[1] + H[26] * d_s[2] +
+    H[27] * d_s[3] + H[28] * d_s[4] + H[29] * d_s[5] + (s[0] * d_H[24] + s[1] * d_H[25] + s[2] *
+    d_H[26] + s[3] * d_H[27] + s[4] * d_H[28] + s[5] * d_H[29])) + (theta[0] * Q[5] + (Q[2] * d_w[0]
+    - Q[0] * d_w[2] - theta[2] * Q[3])));
+  B[5] = w[1] * t2 - w[0] * t6 + (d_c[5] + (H[30] * d_s[0] + H[31] * d_s[1] + H[32] * d_s[2] + H[33]
+    * d_s[3] + H[34] * d_s[4] + H[35] * d_s[5] + (s[0] * d_H[30] + s[1] * d_H[31] + s[2] * d_H[32] +
+    s[3] * d_H[33] + s[4] * d_H[34] + s[5] * d_H[35])) + (theta[1] * Q[3] + (Q[0] * d_w[1] - Q[1] *
+    d_w[0]) - theta[0] * Q[4]));
+  real t120 = v[2] * 2.0;
+  real t122 = v[1] * 2.0;
+  real t155 = x[1] * Q[0] - x[0] * Q[1];
+  real t159 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t6 * t120 - t10 * t122 + (d_c[0] + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + H[3] *
+    d_s[3] + H[4] * d_s[4] + H[5] * d_s[5] + (s[0] * d_H[0] + s[1] * d_H[1] + s[2] * d_H[2] + s[3] *
+    d_H[3] + s[4] * d_H[4] + s[5] * d_H[5])) + (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] *
+    d_v[2]) + (Q[1] * t155 - Q[2] * t159) - 2.0 * (Q[2] * d_v[1])) - x[1] * Q[5]) - theta[1] *
+    Q[8]));
+  real t174 = v[0] * 2.0;
+  real t208 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t10 * t174 - t2 * t120 + (d_c[1] + (H[6] * d_s[0] + H[7] * d_s[1] + H[8] * d_s[2] + H[9] *
+    d_s[3] + H[10] * d_s[4] + H[11] * d_s[5] + (s[0] * d_H[6] + s[1] * d_H[7] + s[2] * d_H[8] + s[3]
+    * d_H[9] + s[4] * d_H[10] + s[5] * d_H[11])) + (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] *
+    d_v[0]) + (Q[2] * t208 - Q[0] * t155 - 2.0 * (Q[0] * d_v[2])) - x[2] * Q[3]) - theta[2] *
+    Q[6])));
+  B[8] = t2 * t122 - t6 * t174 + (d_c[2] + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] + H[15]
+    * d_s[3] + H[16] * d_s[4] + H[17] * d_s[5] + (s[0] * d_H[12] + s[1] * d_H[13] + s[2] * d_H[14] +
+    s[3] * d_H[15] + s[4] * d_H[16] + s[5] * d_H[17])) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 *
+    (Q[0] * d_v[1]) + (Q[0] * t159 - Q[1] * t208) - 2.0 * (Q[1] * d_v[0])) - x[0] * Q[4]) - theta[0]
+    * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] + (f[0] * d_H[0] + f[1] * d_H[6] + f[2] * d_H[12] + f[3] * d_H[18] + f[4] *
+    d_H[24] + f[5] * d_H[30] - laws[0]);
+  row[1] = d_s[1] * J[1] + (f[0] * d_H[1] + f[1] * d_H[7] + f[2] * d_H[13] + f[3] * d_H[19] + f[4] *
+    d_H[25] + f[5] * d_H[31] - laws[1]);
+  row[2] = d_s[2] * J[2] + (f[0] * d_H[2] + f[1] * d_H[8] + f[2] * d_H[14] + f[3] * d_H[20] + f[4] *
+    d_H[26] + f[5] * d_H[32] - laws[2]);
+  row[3] = d_s[3] * J[3] + (f[0] * d_H[3] + f[1] * d_H[9] + f[2] * d_H[15] + f[3] * d_H[21] + f[4] *
+    d_H[27] + f[5] * d_H[33] - laws[3]);
+  row[4] = d_s[4] * J[4] + (f[0] * d_H[4] + f[1] * d_H[10] + f[2] * d_H[16] + f[3] * d_H[22] + f[4]
+    * d_H[28] + f[5] * d_H[34] - laws[4]);
+  row[5] = d_s[5] * J[5] + (f[0] * d_H[5] + f[1] * d_H[11] + f[2] * d_H[17] + f[3] * d_H[23] + f[4]
+    * d_H[29] + f[5] * d_H[35] - laws[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_column(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_column_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 36, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 6, "", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"laws", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_column_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_column, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], out[0], out[1], out[2]))
 
 /* rotation and displacement along coordinates of a hinge with 6 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9638,99 +2433,24 @@ static const mstmm_port mstmm_sweep_generic6_tangent_column_outputs[] = {
  * out theta[3] rotation of the body along the direction, body axes
  * out x[3] displacement of P along the direction, body axes
  */
-int mstmm_sweep_generic6_tangent_coordinate_change(const real *restrict H, const real *restrict d_q,
-    real *restrict theta, real *restrict x)
+int mstmm_sweep_generic6_tangent_coordinate_change(in_t H, in_t d_q, out_t theta, out_t x)
 {
-    const real t0 = H[18] * d_q[0];
-    const real t1 = H[19] * d_q[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[20] * d_q[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[21] * d_q[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[22] * d_q[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[23] * d_q[5];
-    const real t10 = t8 + t9;
-    theta[0] = t10;
-    const real t11 = H[24] * d_q[0];
-    const real t12 = H[25] * d_q[1];
-    const real t13 = t11 + t12;
-    const real t14 = H[26] * d_q[2];
-    const real t15 = t13 + t14;
-    const real t16 = H[27] * d_q[3];
-    const real t17 = t15 + t16;
-    const real t18 = H[28] * d_q[4];
-    const real t19 = t17 + t18;
-    const real t20 = H[29] * d_q[5];
-    const real t21 = t19 + t20;
-    theta[1] = t21;
-    const real t22 = H[30] * d_q[0];
-    const real t23 = H[31] * d_q[1];
-    const real t24 = t22 + t23;
-    const real t25 = H[32] * d_q[2];
-    const real t26 = t24 + t25;
-    const real t27 = H[33] * d_q[3];
-    const real t28 = t26 + t27;
-    const real t29 = H[34] * d_q[4];
-    const real t30 = t28 + t29;
-    const real t31 = H[35] * d_q[5];
-    const real t32 = t30 + t31;
-    theta[2] = t32;
-    const real t33 = H[0] * d_q[0];
-    const real t34 = H[1] * d_q[1];
-    const real t35 = t33 + t34;
-    const real t36 = H[2] * d_q[2];
-    const real t37 = t35 + t36;
-    const real t38 = H[3] * d_q[3];
-    const real t39 = t37 + t38;
-    const real t40 = H[4] * d_q[4];
-    const real t41 = t39 + t40;
-    const real t42 = H[5] * d_q[5];
-    const real t43 = t41 + t42;
-    x[0] = t43;
-    const real t44 = H[6] * d_q[0];
-    const real t45 = H[7] * d_q[1];
-    const real t46 = t44 + t45;
-    const real t47 = H[8] * d_q[2];
-    const real t48 = t46 + t47;
-    const real t49 = H[9] * d_q[3];
-    const real t50 = t48 + t49;
-    const real t51 = H[10] * d_q[4];
-    const real t52 = t50 + t51;
-    const real t53 = H[11] * d_q[5];
-    const real t54 = t52 + t53;
-    x[1] = t54;
-    const real t55 = H[12] * d_q[0];
-    const real t56 = H[13] * d_q[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[14] * d_q[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[15] * d_q[3];
-    const real t61 = t59 + t60;
-    const real t62 = H[16] * d_q[4];
-    const real t63 = t61 + t62;
-    const real t64 = H[17] * d_q[5];
-    const real t65 = t63 + t64;
-    x[2] = t65;
-    return 0;
+  theta[0] = H[18] * d_q[0] + H[19] * d_q[1] + H[20] * d_q[2] + H[21] * d_q[3] + H[22] * d_q[4] +
+    H[23] * d_q[5];
+  theta[1] = H[24] * d_q[0] + H[25] * d_q[1] + H[26] * d_q[2] + H[27] * d_q[3] + H[28] * d_q[4] +
+    H[29] * d_q[5];
+  theta[2] = H[30] * d_q[0] + H[31] * d_q[1] + H[32] * d_q[2] + H[33] * d_q[3] + H[34] * d_q[4] +
+    H[35] * d_q[5];
+  x[0] = H[0] * d_q[0] + H[1] * d_q[1] + H[2] * d_q[2] + H[3] * d_q[3] + H[4] * d_q[4] + H[5] *
+    d_q[5];
+  x[1] = H[6] * d_q[0] + H[7] * d_q[1] + H[8] * d_q[2] + H[9] * d_q[3] + H[10] * d_q[4] + H[11] *
+    d_q[5];
+  x[2] = H[12] * d_q[0] + H[13] * d_q[1] + H[14] * d_q[2] + H[15] * d_q[3] + H[16] * d_q[4] + H[17]
+    * d_q[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_coordinate_change_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_coordinate_change(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_coordinate_change_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"d_q", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_coordinate_change_outputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_coordinate_change, (in[0], in[1], out[0], out[1]))
 
 /* a direction of a hinge with 6 free speeds, whose subspace is constant
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -9750,385 +2470,71 @@ static const mstmm_port mstmm_sweep_generic6_tangent_coordinate_change_outputs[]
  * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic6_tangent_steady(const real *restrict theta, const real *restrict x,
-    const real *restrict H, const real *restrict v, const real *restrict w, const real *restrict Q,
-    const real *restrict f, const real *restrict d_u, const real *restrict d_s,
-    const real *restrict J, const real *restrict laws, real *restrict B, real *restrict G,
-    real *restrict row)
+int mstmm_sweep_generic6_tangent_steady(in_t theta, in_t x, in_t H, in_t v, in_t w, in_t Q, in_t f,
+    in_t d_u, in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[18] * d_u[0];
-    const real t1 = H[19] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[20] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[21] * d_u[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[22] * d_u[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[23] * d_u[5];
-    const real t10 = t8 + t9;
-    const real t11 = theta[2] * Q[1];
-    const real t12 = theta[1] * Q[2];
-    const real t13 = t11 - t12;
-    const real t14 = t10 + t13;
-    B[0] = t14;
-    const real t15 = H[24] * d_u[0];
-    const real t16 = H[25] * d_u[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[26] * d_u[2];
-    const real t19 = t17 + t18;
-    const real t20 = H[27] * d_u[3];
-    const real t21 = t19 + t20;
-    const real t22 = H[28] * d_u[4];
-    const real t23 = t21 + t22;
-    const real t24 = H[29] * d_u[5];
-    const real t25 = t23 + t24;
-    const real t26 = theta[0] * Q[2];
-    const real t27 = theta[2] * Q[0];
-    const real t28 = t26 - t27;
-    const real t29 = t25 + t28;
-    B[1] = t29;
-    const real t30 = H[30] * d_u[0];
-    const real t31 = H[31] * d_u[1];
-    const real t32 = t30 + t31;
-    const real t33 = H[32] * d_u[2];
-    const real t34 = t32 + t33;
-    const real t35 = H[33] * d_u[3];
-    const real t36 = t34 + t35;
-    const real t37 = H[34] * d_u[4];
-    const real t38 = t36 + t37;
-    const real t39 = H[35] * d_u[5];
-    const real t40 = t38 + t39;
-    const real t41 = theta[1] * Q[0];
-    const real t42 = theta[0] * Q[1];
-    const real t43 = t41 - t42;
-    const real t44 = t40 + t43;
-    B[2] = t44;
-    const real t45 = w[2] * t28;
-    const real t46 = w[1] * t43;
-    const real t47 = t45 - t46;
-    const real t48 = H[18] * d_s[0];
-    const real t49 = H[19] * d_s[1];
-    const real t50 = t48 + t49;
-    const real t51 = H[20] * d_s[2];
-    const real t52 = t50 + t51;
-    const real t53 = H[21] * d_s[3];
-    const real t54 = t52 + t53;
-    const real t55 = H[22] * d_s[4];
-    const real t56 = t54 + t55;
-    const real t57 = H[23] * d_s[5];
-    const real t58 = t56 + t57;
-    const real t59 = theta[2] * Q[4];
-    const real t60 = Q[1] * t40;
-    const real t61 = Q[2] * t25;
-    const real t62 = t60 - t61;
-    const real t63 = t59 + t62;
-    const real t64 = theta[1] * Q[5];
-    const real t65 = t63 - t64;
-    const real t66 = t58 + t65;
-    const real t67 = t47 + t66;
-    B[3] = t67;
-    const real t68 = w[0] * t43;
-    const real t69 = w[2] * t13;
-    const real t70 = t68 - t69;
-    const real t71 = H[24] * d_s[0];
-    const real t72 = H[25] * d_s[1];
-    const real t73 = t71 + t72;
-    const real t74 = H[26] * d_s[2];
-    const real t75 = t73 + t74;
-    const real t76 = H[27] * d_s[3];
-    const real t77 = t75 + t76;
-    const real t78 = H[28] * d_s[4];
-    const real t79 = t77 + t78;
-    const real t80 = H[29] * d_s[5];
-    const real t81 = t79 + t80;
-    const real t82 = theta[0] * Q[5];
-    const real t83 = Q[2] * t10;
-    const real t84 = Q[0] * t40;
-    const real t85 = t83 - t84;
-    const real t86 = theta[2] * Q[3];
-    const real t87 = t85 - t86;
-    const real t88 = t82 + t87;
-    const real t89 = t81 + t88;
-    const real t90 = t70 + t89;
-    B[4] = t90;
-    const real t91 = w[1] * t13;
-    const real t92 = w[0] * t28;
-    const real t93 = t91 - t92;
-    const real t94 = H[30] * d_s[0];
-    const real t95 = H[31] * d_s[1];
-    const real t96 = t94 + t95;
-    const real t97 = H[32] * d_s[2];
-    const real t98 = t96 + t97;
-    const real t99 = H[33] * d_s[3];
-    const real t100 = t98 + t99;
-    const real t101 = H[34] * d_s[4];
-    const real t102 = t100 + t101;
-    const real t103 = H[35] * d_s[5];
-    const real t104 = t102 + t103;
-    const real t105 = theta[1] * Q[3];
-    const real t106 = Q[0] * t25;
-    const real t107 = Q[1] * t10;
-    const real t108 = t106 - t107;
-    const real t109 = t105 + t108;
-    const real t110 = theta[0] * Q[4];
-    const real t111 = t109 - t110;
-    const real t112 = t104 + t111;
-    const real t113 = t93 + t112;
-    B[5] = t113;
-    const real t114 = v[2] * 2.0;
-    const real t115 = t28 * t114;
-    const real t116 = v[1] * 2.0;
-    const real t117 = t43 * t116;
-    const real t118 = t115 - t117;
-    const real t119 = H[0] * d_s[0];
-    const real t120 = H[1] * d_s[1];
-    const real t121 = t119 + t120;
-    const real t122 = H[2] * d_s[2];
-    const real t123 = t121 + t122;
-    const real t124 = H[3] * d_s[3];
-    const real t125 = t123 + t124;
-    const real t126 = H[4] * d_s[4];
-    const real t127 = t125 + t126;
-    const real t128 = H[5] * d_s[5];
-    const real t129 = t127 + t128;
-    const real t130 = v[2] * t25;
-    const real t131 = H[12] * d_u[0];
-    const real t132 = H[13] * d_u[1];
-    const real t133 = t131 + t132;
-    const real t134 = H[14] * d_u[2];
-    const real t135 = t133 + t134;
-    const real t136 = H[15] * d_u[3];
-    const real t137 = t135 + t136;
-    const real t138 = H[16] * d_u[4];
-    const real t139 = t137 + t138;
-    const real t140 = H[17] * d_u[5];
-    const real t141 = t139 + t140;
-    const real t142 = w[1] * t141;
-    const real t143 = H[6] * d_u[0];
-    const real t144 = H[7] * d_u[1];
-    const real t145 = t143 + t144;
-    const real t146 = H[8] * d_u[2];
-    const real t147 = t145 + t146;
-    const real t148 = H[9] * d_u[3];
-    const real t149 = t147 + t148;
-    const real t150 = H[10] * d_u[4];
-    const real t151 = t149 + t150;
-    const real t152 = H[11] * d_u[5];
-    const real t153 = t151 + t152;
-    const real t154 = w[2] * t153;
-    const real t155 = t142 - t154;
-    const real t156 = t130 + t155;
-    const real t157 = v[1] * t40;
-    const real t158 = t156 - t157;
-    const real t159 = t129 + t158;
-    const real t160 = theta[2] * Q[7];
-    const real t161 = x[2] * Q[4];
-    const real t162 = Q[1] * t141;
-    const real t163 = 2.0 * t162;
-    const real t164 = x[1] * Q[0];
-    const real t165 = x[0] * Q[1];
-    const real t166 = t164 - t165;
-    const real t167 = Q[1] * t166;
-    const real t168 = x[0] * Q[2];
-    const real t169 = x[2] * Q[0];
-    const real t170 = t168 - t169;
-    const real t171 = Q[2] * t170;
-    const real t172 = t167 - t171;
-    const real t173 = t163 + t172;
-    const real t174 = Q[2] * t153;
-    const real t175 = 2.0 * t174;
-    const real t176 = t173 - t175;
-    const real t177 = t161 + t176;
-    const real t178 = x[1] * Q[5];
-    const real t179 = t177 - t178;
-    const real t180 = t160 + t179;
-    const real t181 = theta[1] * Q[8];
-    const real t182 = t180 - t181;
-    const real t183 = t159 + t182;
-    const real t184 = t118 + t183;
-    B[6] = t184;
-    const real t185 = v[0] * 2.0;
-    const real t186 = t43 * t185;
-    const real t187 = t13 * t114;
-    const real t188 = t186 - t187;
-    const real t189 = H[6] * d_s[0];
-    const real t190 = H[7] * d_s[1];
-    const real t191 = t189 + t190;
-    const real t192 = H[8] * d_s[2];
-    const real t193 = t191 + t192;
-    const real t194 = H[9] * d_s[3];
-    const real t195 = t193 + t194;
-    const real t196 = H[10] * d_s[4];
-    const real t197 = t195 + t196;
-    const real t198 = H[11] * d_s[5];
-    const real t199 = t197 + t198;
-    const real t200 = v[0] * t40;
-    const real t201 = H[0] * d_u[0];
-    const real t202 = H[1] * d_u[1];
-    const real t203 = t201 + t202;
-    const real t204 = H[2] * d_u[2];
-    const real t205 = t203 + t204;
-    const real t206 = H[3] * d_u[3];
-    const real t207 = t205 + t206;
-    const real t208 = H[4] * d_u[4];
-    const real t209 = t207 + t208;
-    const real t210 = H[5] * d_u[5];
-    const real t211 = t209 + t210;
-    const real t212 = w[2] * t211;
-    const real t213 = w[0] * t141;
-    const real t214 = t212 - t213;
-    const real t215 = v[2] * t10;
-    const real t216 = t214 - t215;
-    const real t217 = t200 + t216;
-    const real t218 = t199 + t217;
-    const real t219 = theta[0] * Q[8];
-    const real t220 = x[0] * Q[5];
-    const real t221 = Q[2] * t211;
-    const real t222 = 2.0 * t221;
-    const real t223 = x[2] * Q[1];
-    const real t224 = x[1] * Q[2];
-    const real t225 = t223 - t224;
-    const real t226 = Q[2] * t225;
-    const real t227 = Q[0] * t166;
-    const real t228 = t226 - t227;
-    const real t229 = Q[0] * t141;
-    const real t230 = 2.0 * t229;
-    const real t231 = t228 - t230;
-    const real t232 = t222 + t231;
-    const real t233 = x[2] * Q[3];
-    const real t234 = t232 - t233;
-    const real t235 = t220 + t234;
-    const real t236 = theta[2] * Q[6];
-    const real t237 = t235 - t236;
-    const real t238 = t219 + t237;
-    const real t239 = t218 + t238;
-    const real t240 = t188 + t239;
-    B[7] = t240;
-    const real t241 = t13 * t116;
-    const real t242 = t28 * t185;
-    const real t243 = t241 - t242;
-    const real t244 = H[12] * d_s[0];
-    const real t245 = H[13] * d_s[1];
-    const real t246 = t244 + t245;
-    const real t247 = H[14] * d_s[2];
-    const real t248 = t246 + t247;
-    const real t249 = H[15] * d_s[3];
-    const real t250 = t248 + t249;
-    const real t251 = H[16] * d_s[4];
-    const real t252 = t250 + t251;
-    const real t253 = H[17] * d_s[5];
-    const real t254 = t252 + t253;
-    const real t255 = v[1] * t10;
-    const real t256 = w[0] * t153;
-    const real t257 = w[1] * t211;
-    const real t258 = t256 - t257;
-    const real t259 = t255 + t258;
-    const real t260 = v[0] * t25;
-    const real t261 = t259 - t260;
-    const real t262 = t254 + t261;
-    const real t263 = theta[1] * Q[6];
-    const real t264 = x[1] * Q[3];
-    const real t265 = Q[0] * t153;
-    const real t266 = 2.0 * t265;
-    const real t267 = Q[0] * t170;
-    const real t268 = Q[1] * t225;
-    const real t269 = t267 - t268;
-    const real t270 = t266 + t269;
-    const real t271 = Q[1] * t211;
-    const real t272 = 2.0 * t271;
-    const real t273 = t270 - t272;
-    const real t274 = t264 + t273;
-    const real t275 = x[0] * Q[4];
-    const real t276 = t274 - t275;
-    const real t277 = t263 + t276;
-    const real t278 = theta[0] * Q[7];
-    const real t279 = t277 - t278;
-    const real t280 = t262 + t279;
-    const real t281 = t243 + t280;
-    B[8] = t281;
-    const real t282 = theta[1] * f[2];
-    const real t283 = theta[2] * f[1];
-    const real t284 = t282 - t283;
-    G[0] = t284;
-    const real t285 = theta[2] * f[0];
-    const real t286 = theta[0] * f[2];
-    const real t287 = t285 - t286;
-    G[1] = t287;
-    const real t288 = theta[0] * f[1];
-    const real t289 = theta[1] * f[0];
-    const real t290 = t288 - t289;
-    G[2] = t290;
-    const real t291 = theta[1] * f[5];
-    const real t292 = x[1] * f[2];
-    const real t293 = x[2] * f[1];
-    const real t294 = t292 - t293;
-    const real t295 = theta[2] * f[4];
-    const real t296 = t294 - t295;
-    const real t297 = t291 + t296;
-    G[3] = t297;
-    const real t298 = theta[2] * f[3];
-    const real t299 = x[2] * f[0];
-    const real t300 = x[0] * f[2];
-    const real t301 = t299 - t300;
-    const real t302 = t298 + t301;
-    const real t303 = theta[0] * f[5];
-    const real t304 = t302 - t303;
-    G[4] = t304;
-    const real t305 = theta[0] * f[4];
-    const real t306 = x[0] * f[1];
-    const real t307 = x[1] * f[0];
-    const real t308 = t306 - t307;
-    const real t309 = theta[1] * f[3];
-    const real t310 = t308 - t309;
-    const real t311 = t305 + t310;
-    G[5] = t311;
-    const real t312 = d_s[0] * J[0];
-    const real t313 = t312 - laws[0];
-    row[0] = t313;
-    const real t314 = d_s[1] * J[1];
-    const real t315 = t314 - laws[1];
-    row[1] = t315;
-    const real t316 = d_s[2] * J[2];
-    const real t317 = t316 - laws[2];
-    row[2] = t317;
-    const real t318 = d_s[3] * J[3];
-    const real t319 = t318 - laws[3];
-    row[3] = t319;
-    const real t320 = d_s[4] * J[4];
-    const real t321 = t320 - laws[4];
-    row[4] = t321;
-    const real t322 = d_s[5] * J[5];
-    const real t323 = t322 - laws[5];
-    row[5] = t323;
-    return 0;
+  real t10 = H[18] * d_u[0] + H[19] * d_u[1] + H[20] * d_u[2] + H[21] * d_u[3] + H[22] * d_u[4] +
+    H[23] * d_u[5];
+  real t13 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t10 + t13;
+  real t25 = H[24] * d_u[0] + H[25] * d_u[1] + H[26] * d_u[2] + H[27] * d_u[3] + H[28] * d_u[4] +
+    H[29] * d_u[5];
+  real t28 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t25 + t28;
+  real t40 = H[30] * d_u[0] + H[31] * d_u[1] + H[32] * d_u[2] + H[33] * d_u[3] + H[34] * d_u[4] +
+    H[35] * d_u[5];
+  real t43 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t40 + t43;
+  B[3] = w[2] * t28 - w[1] * t43 + (H[18] * d_s[0] + H[19] * d_s[1] + H[20] * d_s[2] + H[21] *
+    d_s[3] + H[22] * d_s[4] + H[23] * d_s[5] + (theta[2] * Q[4] + (Q[1] * t40 - Q[2] * t25) -
+    theta[1] * Q[5]));
+  B[4] = w[0] * t43 - w[2] * t13 + (H[24] * d_s[0] + H[25] * d_s[1] + H[26] * d_s[2] + H[27] *
+    d_s[3] + H[28] * d_s[4] + H[29] * d_s[5] + (theta[0] * Q[5] + (Q[2] * t10 - Q[0] * t40 -
+    theta[2] * Q[3])));
+  B[5] = w[1] * t13 - w[0] * t28 + (H[30] * d_s[0] + H[31] * d_s[1] + H[32] * d_s[2] + H[33] *
+    d_s[3] + H[34] * d_s[4] + H[35] * d_s[5] + (theta[1] * Q[3] + (Q[0] * t25 - Q[1] * t10) -
+    theta[0] * Q[4]));
+  real t114 = v[2] * 2.0;
+  real t116 = v[1] * 2.0;
+  real t141 = H[12] * d_u[0] + H[13] * d_u[1] + H[14] * d_u[2] + H[15] * d_u[3] + H[16] * d_u[4] +
+    H[17] * d_u[5];
+  real t153 = H[6] * d_u[0] + H[7] * d_u[1] + H[8] * d_u[2] + H[9] * d_u[3] + H[10] * d_u[4] + H[11]
+    * d_u[5];
+  real t166 = x[1] * Q[0] - x[0] * Q[1];
+  real t170 = x[0] * Q[2] - x[2] * Q[0];
+  B[6] = t28 * t114 - t43 * t116 + (H[0] * d_s[0] + H[1] * d_s[1] + H[2] * d_s[2] + H[3] * d_s[3] +
+    H[4] * d_s[4] + H[5] * d_s[5] + (v[2] * t25 + (w[1] * t141 - w[2] * t153) - v[1] * t40) +
+    (theta[2] * Q[7] + (x[2] * Q[4] + (2.0 * (Q[1] * t141) + (Q[1] * t166 - Q[2] * t170) - 2.0 *
+    (Q[2] * t153)) - x[1] * Q[5]) - theta[1] * Q[8]));
+  real t185 = v[0] * 2.0;
+  real t211 = H[0] * d_u[0] + H[1] * d_u[1] + H[2] * d_u[2] + H[3] * d_u[3] + H[4] * d_u[4] + H[5] *
+    d_u[5];
+  real t225 = x[2] * Q[1] - x[1] * Q[2];
+  B[7] = t43 * t185 - t13 * t114 + (H[6] * d_s[0] + H[7] * d_s[1] + H[8] * d_s[2] + H[9] * d_s[3] +
+    H[10] * d_s[4] + H[11] * d_s[5] + (v[0] * t40 + (w[2] * t211 - w[0] * t141 - v[2] * t10)) +
+    (theta[0] * Q[8] + (x[0] * Q[5] + (2.0 * (Q[2] * t211) + (Q[2] * t225 - Q[0] * t166 - 2.0 *
+    (Q[0] * t141)) - x[2] * Q[3]) - theta[2] * Q[6])));
+  B[8] = t13 * t116 - t28 * t185 + (H[12] * d_s[0] + H[13] * d_s[1] + H[14] * d_s[2] + H[15] *
+    d_s[3] + H[16] * d_s[4] + H[17] * d_s[5] + (v[1] * t10 + (w[0] * t153 - w[1] * t211) - v[0] *
+    t25) + (theta[1] * Q[6] + (x[1] * Q[3] + (2.0 * (Q[0] * t153) + (Q[0] * t170 - Q[1] * t225) -
+    2.0 * (Q[1] * t211)) - x[0] * Q[4]) - theta[0] * Q[7]));
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] + (x[1] * f[2] - x[2] * f[1] - theta[2] * f[4]);
+  G[4] = theta[2] * f[3] + (x[2] * f[0] - x[0] * f[2]) - theta[0] * f[5];
+  G[5] = theta[0] * f[4] + (x[0] * f[1] - x[1] * f[0] - theta[1] * f[3]);
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  row[3] = d_s[3] * J[3] - laws[3];
+  row[4] = d_s[4] * J[4] - laws[4];
+  row[5] = d_s[5] * J[5] - laws[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_steady_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_steady(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_steady_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"x", 3, "", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 6, "", 0, 0},
-    {"d_s", 6, "", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"laws", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_steady_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_steady, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], out[0], out[1], out[2]))
 
 /* a direction of a hinge with 6 free speeds, which rotates about constant axes
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -10146,211 +2552,50 @@ static const mstmm_port mstmm_sweep_generic6_tangent_steady_outputs[] = {
  * out G[6] change of the carried load
  * out row[6] change of the rows by load, rotors and laws
  */
-int mstmm_sweep_generic6_tangent_rotational(const real *restrict theta, const real *restrict H,
-    const real *restrict w, const real *restrict Q, const real *restrict f,
-    const real *restrict d_u, const real *restrict d_s, const real *restrict J,
-    const real *restrict laws, real *restrict B, real *restrict G, real *restrict row)
+int mstmm_sweep_generic6_tangent_rotational(in_t theta, in_t H, in_t w, in_t Q, in_t f, in_t d_u,
+    in_t d_s, in_t J, in_t laws, out_t B, out_t G, out_t row)
 {
-    const real t0 = H[18] * d_u[0];
-    const real t1 = H[19] * d_u[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[20] * d_u[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[21] * d_u[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[22] * d_u[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[23] * d_u[5];
-    const real t10 = t8 + t9;
-    const real t11 = theta[2] * Q[1];
-    const real t12 = theta[1] * Q[2];
-    const real t13 = t11 - t12;
-    const real t14 = t10 + t13;
-    B[0] = t14;
-    const real t15 = H[24] * d_u[0];
-    const real t16 = H[25] * d_u[1];
-    const real t17 = t15 + t16;
-    const real t18 = H[26] * d_u[2];
-    const real t19 = t17 + t18;
-    const real t20 = H[27] * d_u[3];
-    const real t21 = t19 + t20;
-    const real t22 = H[28] * d_u[4];
-    const real t23 = t21 + t22;
-    const real t24 = H[29] * d_u[5];
-    const real t25 = t23 + t24;
-    const real t26 = theta[0] * Q[2];
-    const real t27 = theta[2] * Q[0];
-    const real t28 = t26 - t27;
-    const real t29 = t25 + t28;
-    B[1] = t29;
-    const real t30 = H[30] * d_u[0];
-    const real t31 = H[31] * d_u[1];
-    const real t32 = t30 + t31;
-    const real t33 = H[32] * d_u[2];
-    const real t34 = t32 + t33;
-    const real t35 = H[33] * d_u[3];
-    const real t36 = t34 + t35;
-    const real t37 = H[34] * d_u[4];
-    const real t38 = t36 + t37;
-    const real t39 = H[35] * d_u[5];
-    const real t40 = t38 + t39;
-    const real t41 = theta[1] * Q[0];
-    const real t42 = theta[0] * Q[1];
-    const real t43 = t41 - t42;
-    const real t44 = t40 + t43;
-    B[2] = t44;
-    const real t45 = w[2] * t28;
-    const real t46 = w[1] * t43;
-    const real t47 = t45 - t46;
-    const real t48 = H[18] * d_s[0];
-    const real t49 = H[19] * d_s[1];
-    const real t50 = t48 + t49;
-    const real t51 = H[20] * d_s[2];
-    const real t52 = t50 + t51;
-    const real t53 = H[21] * d_s[3];
-    const real t54 = t52 + t53;
-    const real t55 = H[22] * d_s[4];
-    const real t56 = t54 + t55;
-    const real t57 = H[23] * d_s[5];
-    const real t58 = t56 + t57;
-    const real t59 = theta[2] * Q[4];
-    const real t60 = Q[1] * t40;
-    const real t61 = Q[2] * t25;
-    const real t62 = t60 - t61;
-    const real t63 = t59 + t62;
-    const real t64 = theta[1] * Q[5];
-    const real t65 = t63 - t64;
-    const real t66 = t58 + t65;
-    const real t67 = t47 + t66;
-    B[3] = t67;
-    const real t68 = w[0] * t43;
-    const real t69 = w[2] * t13;
-    const real t70 = t68 - t69;
-    const real t71 = H[24] * d_s[0];
-    const real t72 = H[25] * d_s[1];
-    const real t73 = t71 + t72;
-    const real t74 = H[26] * d_s[2];
-    const real t75 = t73 + t74;
-    const real t76 = H[27] * d_s[3];
-    const real t77 = t75 + t76;
-    const real t78 = H[28] * d_s[4];
-    const real t79 = t77 + t78;
-    const real t80 = H[29] * d_s[5];
-    const real t81 = t79 + t80;
-    const real t82 = theta[0] * Q[5];
-    const real t83 = Q[2] * t10;
-    const real t84 = Q[0] * t40;
-    const real t85 = t83 - t84;
-    const real t86 = theta[2] * Q[3];
-    const real t87 = t85 - t86;
-    const real t88 = t82 + t87;
-    const real t89 = t81 + t88;
-    const real t90 = t70 + t89;
-    B[4] = t90;
-    const real t91 = w[1] * t13;
-    const real t92 = w[0] * t28;
-    const real t93 = t91 - t92;
-    const real t94 = H[30] * d_s[0];
-    const real t95 = H[31] * d_s[1];
-    const real t96 = t94 + t95;
-    const real t97 = H[32] * d_s[2];
-    const real t98 = t96 + t97;
-    const real t99 = H[33] * d_s[3];
-    const real t100 = t98 + t99;
-    const real t101 = H[34] * d_s[4];
-    const real t102 = t100 + t101;
-    const real t103 = H[35] * d_s[5];
-    const real t104 = t102 + t103;
-    const real t105 = theta[1] * Q[3];
-    const real t106 = Q[0] * t25;
-    const real t107 = Q[1] * t10;
-    const real t108 = t106 - t107;
-    const real t109 = t105 + t108;
-    const real t110 = theta[0] * Q[4];
-    const real t111 = t109 - t110;
-    const real t112 = t104 + t111;
-    const real t113 = t93 + t112;
-    B[5] = t113;
-    const real t114 = theta[2] * Q[7];
-    const real t115 = theta[1] * Q[8];
-    const real t116 = t114 - t115;
-    B[6] = t116;
-    const real t117 = theta[0] * Q[8];
-    const real t118 = theta[2] * Q[6];
-    const real t119 = t117 - t118;
-    B[7] = t119;
-    const real t120 = theta[1] * Q[6];
-    const real t121 = theta[0] * Q[7];
-    const real t122 = t120 - t121;
-    B[8] = t122;
-    const real t123 = theta[1] * f[2];
-    const real t124 = theta[2] * f[1];
-    const real t125 = t123 - t124;
-    G[0] = t125;
-    const real t126 = theta[2] * f[0];
-    const real t127 = theta[0] * f[2];
-    const real t128 = t126 - t127;
-    G[1] = t128;
-    const real t129 = theta[0] * f[1];
-    const real t130 = theta[1] * f[0];
-    const real t131 = t129 - t130;
-    G[2] = t131;
-    const real t132 = theta[1] * f[5];
-    const real t133 = theta[2] * f[4];
-    const real t134 = t132 - t133;
-    G[3] = t134;
-    const real t135 = theta[2] * f[3];
-    const real t136 = theta[0] * f[5];
-    const real t137 = t135 - t136;
-    G[4] = t137;
-    const real t138 = theta[0] * f[4];
-    const real t139 = theta[1] * f[3];
-    const real t140 = t138 - t139;
-    G[5] = t140;
-    const real t141 = d_s[0] * J[0];
-    const real t142 = t141 - laws[0];
-    row[0] = t142;
-    const real t143 = d_s[1] * J[1];
-    const real t144 = t143 - laws[1];
-    row[1] = t144;
-    const real t145 = d_s[2] * J[2];
-    const real t146 = t145 - laws[2];
-    row[2] = t146;
-    const real t147 = d_s[3] * J[3];
-    const real t148 = t147 - laws[3];
-    row[3] = t148;
-    const real t149 = d_s[4] * J[4];
-    const real t150 = t149 - laws[4];
-    row[4] = t150;
-    const real t151 = d_s[5] * J[5];
-    const real t152 = t151 - laws[5];
-    row[5] = t152;
-    return 0;
+  real t10 = H[18] * d_u[0] + H[19] * d_u[1] + H[20] * d_u[2] + H[21] * d_u[3] + H[22] * d_u[4] +
+    H[23] * d_u[5];
+  real t13 = theta[2] * Q[1] - theta[1] * Q[2];
+  B[0] = t10 + t13;
+  real t25 = H[24] * d_u[0] + H[25] * d_u[1] + H[26] * d_u[2] + H[27] * d_u[3] + H[28] * d_u[4] +
+    H[29] * d_u[5];
+  real t28 = theta[0] * Q[2] - theta[2] * Q[0];
+  B[1] = t25 + t28;
+  real t40 = H[30] * d_u[0] + H[31] * d_u[1] + H[32] * d_u[2] + H[33] * d_u[3] + H[34] * d_u[4] +
+    H[35] * d_u[5];
+  real t43 = theta[1] * Q[0] - theta[0] * Q[1];
+  B[2] = t40 + t43;
+  B[3] = w[2] * t28 - w[1] * t43 + (H[18] * d_s[0] + H[19] * d_s[1] + H[20] * d_s[2] + H[21] *
+    d_s[3] + H[22] * d_s[4] + H[23] * d_s[5] + (theta[2] * Q[4] + (Q[1] * t40 - Q[2] * t25) -
+    theta[1] * Q[5]));
+  B[4] = w[0] * t43 - w[2] * t13 + (H[24] * d_s[0] + H[25] * d_s[1] + H[26] * d_s[2] + H[27] *
+    d_s[3] + H[28] * d_s[4] + H[29] * d_s[5] + (theta[0] * Q[5] + (Q[2] * t10 - Q[0] * t40 -
+    theta[2] * Q[3])));
+  B[5] = w[1] * t13 - w[0] * t28 + (H[30] * d_s[0] + H[31] * d_s[1] + H[32] * d_s[2] + H[33] *
+    d_s[3] + H[34] * d_s[4] + H[35] * d_s[5] + (theta[1] * Q[3] + (Q[0] * t25 - Q[1] * t10) -
+    theta[0] * Q[4]));
+  B[6] = theta[2] * Q[7] - theta[1] * Q[8];
+  B[7] = theta[0] * Q[8] - theta[2] * Q[6];
+  B[8] = theta[1] * Q[6] - theta[0] * Q[7];
+  G[0] = theta[1] * f[2] - theta[2] * f[1];
+  G[1] = theta[2] * f[0] - theta[0] * f[2];
+  G[2] = theta[0] * f[1] - theta[1] * f[0];
+  G[3] = theta[1] * f[5] - theta[2] * f[4];
+  G[4] = theta[2] * f[3] - theta[0] * f[5];
+  G[5] = theta[0] * f[4] - theta[1] * f[3];
+  row[0] = d_s[0] * J[0] - laws[0];
+  row[1] = d_s[1] * J[1] - laws[1];
+  row[2] = d_s[2] * J[2] - laws[2];
+  row[3] = d_s[3] * J[3] - laws[3];
+  row[4] = d_s[4] * J[4] - laws[4];
+  row[5] = d_s[5] * J[5] - laws[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_rotational_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_rotational(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_rotational_inputs[] = {
-    {"theta", 3, "", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"Q", 9, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_u", 6, "", 0, 0},
-    {"d_s", 6, "", 0, 0},
-    {"J", 6, "kg*m2 or kg", 0, 0},
-    {"laws", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_rotational_outputs[] = {
-    {"B", 9, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"row", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_rotational, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2]))
 
 /* rows of a hinge with 6 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -10364,735 +2609,357 @@ static const mstmm_port mstmm_sweep_generic6_tangent_rotational_outputs[] = {
  * out D[6][6] rows by unknowns
  * out one[6][6] unit matrix
  */
-int mstmm_sweep_generic6_tangent_rows(const real *restrict H, const real *restrict B,
-    const real *restrict W, const real *restrict S, real *restrict K, real *restrict right,
-    real *restrict D, real *restrict one)
+int mstmm_sweep_generic6_tangent_rows(in_t H, in_t B, in_t W, in_t S, out_t K, out_t right, out_t D,
+    out_t one)
 {
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(S + 0 + k);
-        const two_t v1 = B[0] * v0;
-        const two_t v2 = mstmm_beside(S + 6 + k);
-        const two_t v3 = B[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(S + 12 + k);
-        const two_t v6 = B[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(S + 18 + k);
-        const two_t v9 = B[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(S + 24 + k);
-        const two_t v12 = B[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(S + 30 + k);
-        const two_t v15 = B[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = mstmm_beside(S + 36 + k);
-        const two_t v18 = B[6] * v17;
-        const two_t v19 = v16 + v18;
-        const two_t v20 = mstmm_beside(S + 42 + k);
-        const two_t v21 = B[7] * v20;
-        const two_t v22 = v19 + v21;
-        const two_t v23 = mstmm_beside(S + 48 + k);
-        const two_t v24 = B[8] * v23;
-        const two_t v25 = v22 + v24;
-        const two_t v26 = B[9] * v0;
-        const two_t v27 = B[10] * v2;
-        const two_t v28 = v26 + v27;
-        const two_t v29 = B[11] * v5;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = B[12] * v8;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = B[13] * v11;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = B[14] * v14;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = B[15] * v17;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = B[16] * v20;
-        const two_t v40 = v38 + v39;
-        const two_t v41 = B[17] * v23;
-        const two_t v42 = v40 + v41;
-        const two_t v43 = B[18] * v0;
-        const two_t v44 = B[19] * v2;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = B[20] * v5;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = B[21] * v8;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = B[22] * v11;
-        const two_t v51 = v49 + v50;
-        const two_t v52 = B[23] * v14;
-        const two_t v53 = v51 + v52;
-        const two_t v54 = B[24] * v17;
-        const two_t v55 = v53 + v54;
-        const two_t v56 = B[25] * v20;
-        const two_t v57 = v55 + v56;
-        const two_t v58 = B[26] * v23;
-        const two_t v59 = v57 + v58;
-        const two_t v60 = B[27] * v0;
-        const two_t v61 = B[28] * v2;
-        const two_t v62 = v60 + v61;
-        const two_t v63 = B[29] * v5;
-        const two_t v64 = v62 + v63;
-        const two_t v65 = B[30] * v8;
-        const two_t v66 = v64 + v65;
-        const two_t v67 = B[31] * v11;
-        const two_t v68 = v66 + v67;
-        const two_t v69 = B[32] * v14;
-        const two_t v70 = v68 + v69;
-        const two_t v71 = B[33] * v17;
-        const two_t v72 = v70 + v71;
-        const two_t v73 = B[34] * v20;
-        const two_t v74 = v72 + v73;
-        const two_t v75 = B[35] * v23;
-        const two_t v76 = v74 + v75;
-        const two_t v77 = B[36] * v0;
-        const two_t v78 = B[37] * v2;
-        const two_t v79 = v77 + v78;
-        const two_t v80 = B[38] * v5;
-        const two_t v81 = v79 + v80;
-        const two_t v82 = B[39] * v8;
-        const two_t v83 = v81 + v82;
-        const two_t v84 = B[40] * v11;
-        const two_t v85 = v83 + v84;
-        const two_t v86 = B[41] * v14;
-        const two_t v87 = v85 + v86;
-        const two_t v88 = B[42] * v17;
-        const two_t v89 = v87 + v88;
-        const two_t v90 = B[43] * v20;
-        const two_t v91 = v89 + v90;
-        const two_t v92 = B[44] * v23;
-        const two_t v93 = v91 + v92;
-        const two_t v94 = B[45] * v0;
-        const two_t v95 = B[46] * v2;
-        const two_t v96 = v94 + v95;
-        const two_t v97 = B[47] * v5;
-        const two_t v98 = v96 + v97;
-        const two_t v99 = B[48] * v8;
-        const two_t v100 = v98 + v99;
-        const two_t v101 = B[49] * v11;
-        const two_t v102 = v100 + v101;
-        const two_t v103 = B[50] * v14;
-        const two_t v104 = v102 + v103;
-        const two_t v105 = B[51] * v17;
-        const two_t v106 = v104 + v105;
-        const two_t v107 = B[52] * v20;
-        const two_t v108 = v106 + v107;
-        const two_t v109 = B[53] * v23;
-        const two_t v110 = v108 + v109;
-        *(two_free_t *)(K + 0 + k) = v25;
-        *(two_free_t *)(K + 6 + k) = v42;
-        *(two_free_t *)(K + 12 + k) = v59;
-        *(two_free_t *)(K + 18 + k) = v76;
-        *(two_free_t *)(K + 24 + k) = v93;
-        *(two_free_t *)(K + 30 + k) = v110;
-    }
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
-        const two_t v1 = H[0] * v0;
-        const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
-        const two_t v3 = H[6] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
-        const two_t v6 = H[12] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
-        const two_t v9 = H[18] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
-        const two_t v12 = H[24] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
-        const two_t v15 = H[30] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = H[1] * v0;
-        const two_t v18 = H[7] * v2;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = H[13] * v5;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = H[19] * v8;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = H[25] * v11;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = H[31] * v14;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = H[2] * v0;
-        const two_t v29 = H[8] * v2;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = H[14] * v5;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = H[20] * v8;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = H[26] * v11;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = H[32] * v14;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = H[3] * v0;
-        const two_t v40 = H[9] * v2;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = H[15] * v5;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = H[21] * v8;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = H[27] * v11;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = H[33] * v14;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = H[4] * v0;
-        const two_t v51 = H[10] * v2;
-        const two_t v52 = v50 + v51;
-        const two_t v53 = H[16] * v5;
-        const two_t v54 = v52 + v53;
-        const two_t v55 = H[22] * v8;
-        const two_t v56 = v54 + v55;
-        const two_t v57 = H[28] * v11;
-        const two_t v58 = v56 + v57;
-        const two_t v59 = H[34] * v14;
-        const two_t v60 = v58 + v59;
-        const two_t v61 = H[5] * v0;
-        const two_t v62 = H[11] * v2;
-        const two_t v63 = v61 + v62;
-        const two_t v64 = H[17] * v5;
-        const two_t v65 = v63 + v64;
-        const two_t v66 = H[23] * v8;
-        const two_t v67 = v65 + v66;
-        const two_t v68 = H[29] * v11;
-        const two_t v69 = v67 + v68;
-        const two_t v70 = H[35] * v14;
-        const two_t v71 = v69 + v70;
-        *(two_free_t *)(right + 0 + k) = v16;
-        *(two_free_t *)(right + 9 + k) = v27;
-        *(two_free_t *)(right + 18 + k) = v38;
-        *(two_free_t *)(right + 27 + k) = v49;
-        *(two_free_t *)(right + 36 + k) = v60;
-        *(two_free_t *)(right + 45 + k) = v71;
-    }
-    const real t1206 = H[0] * K[0];
-    const real t1207 = H[6] * K[1];
-    const real t1208 = t1206 + t1207;
-    const real t1209 = H[12] * K[2];
-    const real t1210 = t1208 + t1209;
-    const real t1211 = H[18] * K[3];
-    const real t1212 = t1210 + t1211;
-    const real t1213 = H[24] * K[4];
-    const real t1214 = t1212 + t1213;
-    const real t1215 = H[30] * K[5];
-    const real t1216 = t1214 + t1215;
-    const real t1217 = W[0] + t1216;
-    D[0] = t1217;
-    const real t1218 = H[0] * K[6];
-    const real t1219 = H[6] * K[7];
-    const real t1220 = t1218 + t1219;
-    const real t1221 = H[12] * K[8];
-    const real t1222 = t1220 + t1221;
-    const real t1223 = H[18] * K[9];
-    const real t1224 = t1222 + t1223;
-    const real t1225 = H[24] * K[10];
-    const real t1226 = t1224 + t1225;
-    const real t1227 = H[30] * K[11];
-    const real t1228 = t1226 + t1227;
-    const real t1229 = W[6] + t1228;
-    D[1] = t1229;
-    const real t1230 = H[0] * K[12];
-    const real t1231 = H[6] * K[13];
-    const real t1232 = t1230 + t1231;
-    const real t1233 = H[12] * K[14];
-    const real t1234 = t1232 + t1233;
-    const real t1235 = H[18] * K[15];
-    const real t1236 = t1234 + t1235;
-    const real t1237 = H[24] * K[16];
-    const real t1238 = t1236 + t1237;
-    const real t1239 = H[30] * K[17];
-    const real t1240 = t1238 + t1239;
-    const real t1241 = W[12] + t1240;
-    D[2] = t1241;
-    const real t1242 = H[0] * K[18];
-    const real t1243 = H[6] * K[19];
-    const real t1244 = t1242 + t1243;
-    const real t1245 = H[12] * K[20];
-    const real t1246 = t1244 + t1245;
-    const real t1247 = H[18] * K[21];
-    const real t1248 = t1246 + t1247;
-    const real t1249 = H[24] * K[22];
-    const real t1250 = t1248 + t1249;
-    const real t1251 = H[30] * K[23];
-    const real t1252 = t1250 + t1251;
-    const real t1253 = W[18] + t1252;
-    D[3] = t1253;
-    const real t1254 = H[0] * K[24];
-    const real t1255 = H[6] * K[25];
-    const real t1256 = t1254 + t1255;
-    const real t1257 = H[12] * K[26];
-    const real t1258 = t1256 + t1257;
-    const real t1259 = H[18] * K[27];
-    const real t1260 = t1258 + t1259;
-    const real t1261 = H[24] * K[28];
-    const real t1262 = t1260 + t1261;
-    const real t1263 = H[30] * K[29];
-    const real t1264 = t1262 + t1263;
-    const real t1265 = W[24] + t1264;
-    D[4] = t1265;
-    const real t1266 = H[0] * K[30];
-    const real t1267 = H[6] * K[31];
-    const real t1268 = t1266 + t1267;
-    const real t1269 = H[12] * K[32];
-    const real t1270 = t1268 + t1269;
-    const real t1271 = H[18] * K[33];
-    const real t1272 = t1270 + t1271;
-    const real t1273 = H[24] * K[34];
-    const real t1274 = t1272 + t1273;
-    const real t1275 = H[30] * K[35];
-    const real t1276 = t1274 + t1275;
-    const real t1277 = W[30] + t1276;
-    D[5] = t1277;
-    const real t1278 = H[1] * K[0];
-    const real t1279 = H[7] * K[1];
-    const real t1280 = t1278 + t1279;
-    const real t1281 = H[13] * K[2];
-    const real t1282 = t1280 + t1281;
-    const real t1283 = H[19] * K[3];
-    const real t1284 = t1282 + t1283;
-    const real t1285 = H[25] * K[4];
-    const real t1286 = t1284 + t1285;
-    const real t1287 = H[31] * K[5];
-    const real t1288 = t1286 + t1287;
-    const real t1289 = W[1] + t1288;
-    D[6] = t1289;
-    const real t1290 = H[1] * K[6];
-    const real t1291 = H[7] * K[7];
-    const real t1292 = t1290 + t1291;
-    const real t1293 = H[13] * K[8];
-    const real t1294 = t1292 + t1293;
-    const real t1295 = H[19] * K[9];
-    const real t1296 = t1294 + t1295;
-    const real t1297 = H[25] * K[10];
-    const real t1298 = t1296 + t1297;
-    const real t1299 = H[31] * K[11];
-    const real t1300 = t1298 + t1299;
-    const real t1301 = W[7] + t1300;
-    D[7] = t1301;
-    const real t1302 = H[1] * K[12];
-    const real t1303 = H[7] * K[13];
-    const real t1304 = t1302 + t1303;
-    const real t1305 = H[13] * K[14];
-    const real t1306 = t1304 + t1305;
-    const real t1307 = H[19] * K[15];
-    const real t1308 = t1306 + t1307;
-    const real t1309 = H[25] * K[16];
-    const real t1310 = t1308 + t1309;
-    const real t1311 = H[31] * K[17];
-    const real t1312 = t1310 + t1311;
-    const real t1313 = W[13] + t1312;
-    D[8] = t1313;
-    const real t1314 = H[1] * K[18];
-    const real t1315 = H[7] * K[19];
-    const real t1316 = t1314 + t1315;
-    const real t1317 = H[13] * K[20];
-    const real t1318 = t1316 + t1317;
-    const real t1319 = H[19] * K[21];
-    const real t1320 = t1318 + t1319;
-    const real t1321 = H[25] * K[22];
-    const real t1322 = t1320 + t1321;
-    const real t1323 = H[31] * K[23];
-    const real t1324 = t1322 + t1323;
-    const real t1325 = W[19] + t1324;
-    D[9] = t1325;
-    const real t1326 = H[1] * K[24];
-    const real t1327 = H[7] * K[25];
-    const real t1328 = t1326 + t1327;
-    const real t1329 = H[13] * K[26];
-    const real t1330 = t1328 + t1329;
-    const real t1331 = H[19] * K[27];
-    const real t1332 = t1330 + t1331;
-    const real t1333 = H[25] * K[28];
-    const real t1334 = t1332 + t1333;
-    const real t1335 = H[31] * K[29];
-    const real t1336 = t1334 + t1335;
-    const real t1337 = W[25] + t1336;
-    D[10] = t1337;
-    const real t1338 = H[1] * K[30];
-    const real t1339 = H[7] * K[31];
-    const real t1340 = t1338 + t1339;
-    const real t1341 = H[13] * K[32];
-    const real t1342 = t1340 + t1341;
-    const real t1343 = H[19] * K[33];
-    const real t1344 = t1342 + t1343;
-    const real t1345 = H[25] * K[34];
-    const real t1346 = t1344 + t1345;
-    const real t1347 = H[31] * K[35];
-    const real t1348 = t1346 + t1347;
-    const real t1349 = W[31] + t1348;
-    D[11] = t1349;
-    const real t1350 = H[2] * K[0];
-    const real t1351 = H[8] * K[1];
-    const real t1352 = t1350 + t1351;
-    const real t1353 = H[14] * K[2];
-    const real t1354 = t1352 + t1353;
-    const real t1355 = H[20] * K[3];
-    const real t1356 = t1354 + t1355;
-    const real t1357 = H[26] * K[4];
-    const real t1358 = t1356 + t1357;
-    const real t1359 = H[32] * K[5];
-    const real t1360 = t1358 + t1359;
-    const real t1361 = W[2] + t1360;
-    D[12] = t1361;
-    const real t1362 = H[2] * K[6];
-    const real t1363 = H[8] * K[7];
-    const real t1364 = t1362 + t1363;
-    const real t1365 = H[14] * K[8];
-    const real t1366 = t1364 + t1365;
-    const real t1367 = H[20] * K[9];
-    const real t1368 = t1366 + t1367;
-    const real t1369 = H[26] * K[10];
-    const real t1370 = t1368 + t1369;
-    const real t1371 = H[32] * K[11];
-    const real t1372 = t1370 + t1371;
-    const real t1373 = W[8] + t1372;
-    D[13] = t1373;
-    const real t1374 = H[2] * K[12];
-    const real t1375 = H[8] * K[13];
-    const real t1376 = t1374 + t1375;
-    const real t1377 = H[14] * K[14];
-    const real t1378 = t1376 + t1377;
-    const real t1379 = H[20] * K[15];
-    const real t1380 = t1378 + t1379;
-    const real t1381 = H[26] * K[16];
-    const real t1382 = t1380 + t1381;
-    const real t1383 = H[32] * K[17];
-    const real t1384 = t1382 + t1383;
-    const real t1385 = W[14] + t1384;
-    D[14] = t1385;
-    const real t1386 = H[2] * K[18];
-    const real t1387 = H[8] * K[19];
-    const real t1388 = t1386 + t1387;
-    const real t1389 = H[14] * K[20];
-    const real t1390 = t1388 + t1389;
-    const real t1391 = H[20] * K[21];
-    const real t1392 = t1390 + t1391;
-    const real t1393 = H[26] * K[22];
-    const real t1394 = t1392 + t1393;
-    const real t1395 = H[32] * K[23];
-    const real t1396 = t1394 + t1395;
-    const real t1397 = W[20] + t1396;
-    D[15] = t1397;
-    const real t1398 = H[2] * K[24];
-    const real t1399 = H[8] * K[25];
-    const real t1400 = t1398 + t1399;
-    const real t1401 = H[14] * K[26];
-    const real t1402 = t1400 + t1401;
-    const real t1403 = H[20] * K[27];
-    const real t1404 = t1402 + t1403;
-    const real t1405 = H[26] * K[28];
-    const real t1406 = t1404 + t1405;
-    const real t1407 = H[32] * K[29];
-    const real t1408 = t1406 + t1407;
-    const real t1409 = W[26] + t1408;
-    D[16] = t1409;
-    const real t1410 = H[2] * K[30];
-    const real t1411 = H[8] * K[31];
-    const real t1412 = t1410 + t1411;
-    const real t1413 = H[14] * K[32];
-    const real t1414 = t1412 + t1413;
-    const real t1415 = H[20] * K[33];
-    const real t1416 = t1414 + t1415;
-    const real t1417 = H[26] * K[34];
-    const real t1418 = t1416 + t1417;
-    const real t1419 = H[32] * K[35];
-    const real t1420 = t1418 + t1419;
-    const real t1421 = W[32] + t1420;
-    D[17] = t1421;
-    const real t1422 = H[3] * K[0];
-    const real t1423 = H[9] * K[1];
-    const real t1424 = t1422 + t1423;
-    const real t1425 = H[15] * K[2];
-    const real t1426 = t1424 + t1425;
-    const real t1427 = H[21] * K[3];
-    const real t1428 = t1426 + t1427;
-    const real t1429 = H[27] * K[4];
-    const real t1430 = t1428 + t1429;
-    const real t1431 = H[33] * K[5];
-    const real t1432 = t1430 + t1431;
-    const real t1433 = W[3] + t1432;
-    D[18] = t1433;
-    const real t1434 = H[3] * K[6];
-    const real t1435 = H[9] * K[7];
-    const real t1436 = t1434 + t1435;
-    const real t1437 = H[15] * K[8];
-    const real t1438 = t1436 + t1437;
-    const real t1439 = H[21] * K[9];
-    const real t1440 = t1438 + t1439;
-    const real t1441 = H[27] * K[10];
-    const real t1442 = t1440 + t1441;
-    const real t1443 = H[33] * K[11];
-    const real t1444 = t1442 + t1443;
-    const real t1445 = W[9] + t1444;
-    D[19] = t1445;
-    const real t1446 = H[3] * K[12];
-    const real t1447 = H[9] * K[13];
-    const real t1448 = t1446 + t1447;
-    const real t1449 = H[15] * K[14];
-    const real t1450 = t1448 + t1449;
-    const real t1451 = H[21] * K[15];
-    const real t1452 = t1450 + t1451;
-    const real t1453 = H[27] * K[16];
-    const real t1454 = t1452 + t1453;
-    const real t1455 = H[33] * K[17];
-    const real t1456 = t1454 + t1455;
-    const real t1457 = W[15] + t1456;
-    D[20] = t1457;
-    const real t1458 = H[3] * K[18];
-    const real t1459 = H[9] * K[19];
-    const real t1460 = t1458 + t1459;
-    const real t1461 = H[15] * K[20];
-    const real t1462 = t1460 + t1461;
-    const real t1463 = H[21] * K[21];
-    const real t1464 = t1462 + t1463;
-    const real t1465 = H[27] * K[22];
-    const real t1466 = t1464 + t1465;
-    const real t1467 = H[33] * K[23];
-    const real t1468 = t1466 + t1467;
-    const real t1469 = W[21] + t1468;
-    D[21] = t1469;
-    const real t1470 = H[3] * K[24];
-    const real t1471 = H[9] * K[25];
-    const real t1472 = t1470 + t1471;
-    const real t1473 = H[15] * K[26];
-    const real t1474 = t1472 + t1473;
-    const real t1475 = H[21] * K[27];
-    const real t1476 = t1474 + t1475;
-    const real t1477 = H[27] * K[28];
-    const real t1478 = t1476 + t1477;
-    const real t1479 = H[33] * K[29];
-    const real t1480 = t1478 + t1479;
-    const real t1481 = W[27] + t1480;
-    D[22] = t1481;
-    const real t1482 = H[3] * K[30];
-    const real t1483 = H[9] * K[31];
-    const real t1484 = t1482 + t1483;
-    const real t1485 = H[15] * K[32];
-    const real t1486 = t1484 + t1485;
-    const real t1487 = H[21] * K[33];
-    const real t1488 = t1486 + t1487;
-    const real t1489 = H[27] * K[34];
-    const real t1490 = t1488 + t1489;
-    const real t1491 = H[33] * K[35];
-    const real t1492 = t1490 + t1491;
-    const real t1493 = W[33] + t1492;
-    D[23] = t1493;
-    const real t1494 = H[4] * K[0];
-    const real t1495 = H[10] * K[1];
-    const real t1496 = t1494 + t1495;
-    const real t1497 = H[16] * K[2];
-    const real t1498 = t1496 + t1497;
-    const real t1499 = H[22] * K[3];
-    const real t1500 = t1498 + t1499;
-    const real t1501 = H[28] * K[4];
-    const real t1502 = t1500 + t1501;
-    const real t1503 = H[34] * K[5];
-    const real t1504 = t1502 + t1503;
-    const real t1505 = W[4] + t1504;
-    D[24] = t1505;
-    const real t1506 = H[4] * K[6];
-    const real t1507 = H[10] * K[7];
-    const real t1508 = t1506 + t1507;
-    const real t1509 = H[16] * K[8];
-    const real t1510 = t1508 + t1509;
-    const real t1511 = H[22] * K[9];
-    const real t1512 = t1510 + t1511;
-    const real t1513 = H[28] * K[10];
-    const real t1514 = t1512 + t1513;
-    const real t1515 = H[34] * K[11];
-    const real t1516 = t1514 + t1515;
-    const real t1517 = W[10] + t1516;
-    D[25] = t1517;
-    const real t1518 = H[4] * K[12];
-    const real t1519 = H[10] * K[13];
-    const real t1520 = t1518 + t1519;
-    const real t1521 = H[16] * K[14];
-    const real t1522 = t1520 + t1521;
-    const real t1523 = H[22] * K[15];
-    const real t1524 = t1522 + t1523;
-    const real t1525 = H[28] * K[16];
-    const real t1526 = t1524 + t1525;
-    const real t1527 = H[34] * K[17];
-    const real t1528 = t1526 + t1527;
-    const real t1529 = W[16] + t1528;
-    D[26] = t1529;
-    const real t1530 = H[4] * K[18];
-    const real t1531 = H[10] * K[19];
-    const real t1532 = t1530 + t1531;
-    const real t1533 = H[16] * K[20];
-    const real t1534 = t1532 + t1533;
-    const real t1535 = H[22] * K[21];
-    const real t1536 = t1534 + t1535;
-    const real t1537 = H[28] * K[22];
-    const real t1538 = t1536 + t1537;
-    const real t1539 = H[34] * K[23];
-    const real t1540 = t1538 + t1539;
-    const real t1541 = W[22] + t1540;
-    D[27] = t1541;
-    const real t1542 = H[4] * K[24];
-    const real t1543 = H[10] * K[25];
-    const real t1544 = t1542 + t1543;
-    const real t1545 = H[16] * K[26];
-    const real t1546 = t1544 + t1545;
-    const real t1547 = H[22] * K[27];
-    const real t1548 = t1546 + t1547;
-    const real t1549 = H[28] * K[28];
-    const real t1550 = t1548 + t1549;
-    const real t1551 = H[34] * K[29];
-    const real t1552 = t1550 + t1551;
-    const real t1553 = W[28] + t1552;
-    D[28] = t1553;
-    const real t1554 = H[4] * K[30];
-    const real t1555 = H[10] * K[31];
-    const real t1556 = t1554 + t1555;
-    const real t1557 = H[16] * K[32];
-    const real t1558 = t1556 + t1557;
-    const real t1559 = H[22] * K[33];
-    const real t1560 = t1558 + t1559;
-    const real t1561 = H[28] * K[34];
-    const real t1562 = t1560 + t1561;
-    const real t1563 = H[34] * K[35];
-    const real t1564 = t1562 + t1563;
-    const real t1565 = W[34] + t1564;
-    D[29] = t1565;
-    const real t1566 = H[5] * K[0];
-    const real t1567 = H[11] * K[1];
-    const real t1568 = t1566 + t1567;
-    const real t1569 = H[17] * K[2];
-    const real t1570 = t1568 + t1569;
-    const real t1571 = H[23] * K[3];
-    const real t1572 = t1570 + t1571;
-    const real t1573 = H[29] * K[4];
-    const real t1574 = t1572 + t1573;
-    const real t1575 = H[35] * K[5];
-    const real t1576 = t1574 + t1575;
-    const real t1577 = W[5] + t1576;
-    D[30] = t1577;
-    const real t1578 = H[5] * K[6];
-    const real t1579 = H[11] * K[7];
-    const real t1580 = t1578 + t1579;
-    const real t1581 = H[17] * K[8];
-    const real t1582 = t1580 + t1581;
-    const real t1583 = H[23] * K[9];
-    const real t1584 = t1582 + t1583;
-    const real t1585 = H[29] * K[10];
-    const real t1586 = t1584 + t1585;
-    const real t1587 = H[35] * K[11];
-    const real t1588 = t1586 + t1587;
-    const real t1589 = W[11] + t1588;
-    D[31] = t1589;
-    const real t1590 = H[5] * K[12];
-    const real t1591 = H[11] * K[13];
-    const real t1592 = t1590 + t1591;
-    const real t1593 = H[17] * K[14];
-    const real t1594 = t1592 + t1593;
-    const real t1595 = H[23] * K[15];
-    const real t1596 = t1594 + t1595;
-    const real t1597 = H[29] * K[16];
-    const real t1598 = t1596 + t1597;
-    const real t1599 = H[35] * K[17];
-    const real t1600 = t1598 + t1599;
-    const real t1601 = W[17] + t1600;
-    D[32] = t1601;
-    const real t1602 = H[5] * K[18];
-    const real t1603 = H[11] * K[19];
-    const real t1604 = t1602 + t1603;
-    const real t1605 = H[17] * K[20];
-    const real t1606 = t1604 + t1605;
-    const real t1607 = H[23] * K[21];
-    const real t1608 = t1606 + t1607;
-    const real t1609 = H[29] * K[22];
-    const real t1610 = t1608 + t1609;
-    const real t1611 = H[35] * K[23];
-    const real t1612 = t1610 + t1611;
-    const real t1613 = W[23] + t1612;
-    D[33] = t1613;
-    const real t1614 = H[5] * K[24];
-    const real t1615 = H[11] * K[25];
-    const real t1616 = t1614 + t1615;
-    const real t1617 = H[17] * K[26];
-    const real t1618 = t1616 + t1617;
-    const real t1619 = H[23] * K[27];
-    const real t1620 = t1618 + t1619;
-    const real t1621 = H[29] * K[28];
-    const real t1622 = t1620 + t1621;
-    const real t1623 = H[35] * K[29];
-    const real t1624 = t1622 + t1623;
-    const real t1625 = W[29] + t1624;
-    D[34] = t1625;
-    const real t1626 = H[5] * K[30];
-    const real t1627 = H[11] * K[31];
-    const real t1628 = t1626 + t1627;
-    const real t1629 = H[17] * K[32];
-    const real t1630 = t1628 + t1629;
-    const real t1631 = H[23] * K[33];
-    const real t1632 = t1630 + t1631;
-    const real t1633 = H[29] * K[34];
-    const real t1634 = t1632 + t1633;
-    const real t1635 = H[35] * K[35];
-    const real t1636 = t1634 + t1635;
-    const real t1637 = W[35] + t1636;
-    D[35] = t1637;
-    one[0] = 1.0;
-    one[1] = 0.0;
-    one[2] = 0.0;
-    one[3] = 0.0;
-    one[4] = 0.0;
-    one[5] = 0.0;
-    one[6] = 0.0;
-    one[7] = 1.0;
-    one[8] = 0.0;
-    one[9] = 0.0;
-    one[10] = 0.0;
-    one[11] = 0.0;
-    one[12] = 0.0;
-    one[13] = 0.0;
-    one[14] = 1.0;
-    one[15] = 0.0;
-    one[16] = 0.0;
-    one[17] = 0.0;
-    one[18] = 0.0;
-    one[19] = 0.0;
-    one[20] = 0.0;
-    one[21] = 1.0;
-    one[22] = 0.0;
-    one[23] = 0.0;
-    one[24] = 0.0;
-    one[25] = 0.0;
-    one[26] = 0.0;
-    one[27] = 0.0;
-    one[28] = 1.0;
-    one[29] = 0.0;
-    one[30] = 0.0;
-    one[31] = 0.0;
-    one[32] = 0.0;
-    one[33] = 0.0;
-    one[34] = 0.0;
-    one[35] = 1.0;
-    return 0;
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(S + 0 + k);
+    const two_t v1 = B[0] * v0;
+    const two_t v2 = mstmm_beside(S + 6 + k);
+    const two_t v3 = B[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(S + 12 + k);
+    const two_t v6 = B[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(S + 18 + k);
+    const two_t v9 = B[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(S + 24 + k);
+    const two_t v12 = B[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(S + 30 + k);
+    const two_t v15 = B[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = mstmm_beside(S + 36 + k);
+    const two_t v18 = B[6] * v17;
+    const two_t v19 = v16 + v18;
+    const two_t v20 = mstmm_beside(S + 42 + k);
+    const two_t v21 = B[7] * v20;
+    const two_t v22 = v19 + v21;
+    const two_t v23 = mstmm_beside(S + 48 + k);
+    const two_t v24 = B[8] * v23;
+    const two_t v25 = v22 + v24;
+    const two_t v26 = B[9] * v0;
+    const two_t v27 = B[10] * v2;
+    const two_t v28 = v26 + v27;
+    const two_t v29 = B[11] * v5;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = B[12] * v8;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = B[13] * v11;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = B[14] * v14;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = B[15] * v17;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = B[16] * v20;
+    const two_t v40 = v38 + v39;
+    const two_t v41 = B[17] * v23;
+    const two_t v42 = v40 + v41;
+    const two_t v43 = B[18] * v0;
+    const two_t v44 = B[19] * v2;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = B[20] * v5;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = B[21] * v8;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = B[22] * v11;
+    const two_t v51 = v49 + v50;
+    const two_t v52 = B[23] * v14;
+    const two_t v53 = v51 + v52;
+    const two_t v54 = B[24] * v17;
+    const two_t v55 = v53 + v54;
+    const two_t v56 = B[25] * v20;
+    const two_t v57 = v55 + v56;
+    const two_t v58 = B[26] * v23;
+    const two_t v59 = v57 + v58;
+    const two_t v60 = B[27] * v0;
+    const two_t v61 = B[28] * v2;
+    const two_t v62 = v60 + v61;
+    const two_t v63 = B[29] * v5;
+    const two_t v64 = v62 + v63;
+    const two_t v65 = B[30] * v8;
+    const two_t v66 = v64 + v65;
+    const two_t v67 = B[31] * v11;
+    const two_t v68 = v66 + v67;
+    const two_t v69 = B[32] * v14;
+    const two_t v70 = v68 + v69;
+    const two_t v71 = B[33] * v17;
+    const two_t v72 = v70 + v71;
+    const two_t v73 = B[34] * v20;
+    const two_t v74 = v72 + v73;
+    const two_t v75 = B[35] * v23;
+    const two_t v76 = v74 + v75;
+    const two_t v77 = B[36] * v0;
+    const two_t v78 = B[37] * v2;
+    const two_t v79 = v77 + v78;
+    const two_t v80 = B[38] * v5;
+    const two_t v81 = v79 + v80;
+    const two_t v82 = B[39] * v8;
+    const two_t v83 = v81 + v82;
+    const two_t v84 = B[40] * v11;
+    const two_t v85 = v83 + v84;
+    const two_t v86 = B[41] * v14;
+    const two_t v87 = v85 + v86;
+    const two_t v88 = B[42] * v17;
+    const two_t v89 = v87 + v88;
+    const two_t v90 = B[43] * v20;
+    const two_t v91 = v89 + v90;
+    const two_t v92 = B[44] * v23;
+    const two_t v93 = v91 + v92;
+    const two_t v94 = B[45] * v0;
+    const two_t v95 = B[46] * v2;
+    const two_t v96 = v94 + v95;
+    const two_t v97 = B[47] * v5;
+    const two_t v98 = v96 + v97;
+    const two_t v99 = B[48] * v8;
+    const two_t v100 = v98 + v99;
+    const two_t v101 = B[49] * v11;
+    const two_t v102 = v100 + v101;
+    const two_t v103 = B[50] * v14;
+    const two_t v104 = v102 + v103;
+    const two_t v105 = B[51] * v17;
+    const two_t v106 = v104 + v105;
+    const two_t v107 = B[52] * v20;
+    const two_t v108 = v106 + v107;
+    const two_t v109 = B[53] * v23;
+    const two_t v110 = v108 + v109;
+    *(two_free_t *)(K + 0 + k) = v25;
+    *(two_free_t *)(K + 6 + k) = v42;
+    *(two_free_t *)(K + 12 + k) = v59;
+    *(two_free_t *)(K + 18 + k) = v76;
+    *(two_free_t *)(K + 24 + k) = v93;
+    *(two_free_t *)(K + 30 + k) = v110;
+  }
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_apart(S + 0 + 6 * k, 6);
+    const two_t v1 = H[0] * v0;
+    const two_t v2 = mstmm_apart(S + 1 + 6 * k, 6);
+    const two_t v3 = H[6] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_apart(S + 2 + 6 * k, 6);
+    const two_t v6 = H[12] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_apart(S + 3 + 6 * k, 6);
+    const two_t v9 = H[18] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_apart(S + 4 + 6 * k, 6);
+    const two_t v12 = H[24] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_apart(S + 5 + 6 * k, 6);
+    const two_t v15 = H[30] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = H[1] * v0;
+    const two_t v18 = H[7] * v2;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = H[13] * v5;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = H[19] * v8;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = H[25] * v11;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = H[31] * v14;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = H[2] * v0;
+    const two_t v29 = H[8] * v2;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = H[14] * v5;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = H[20] * v8;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = H[26] * v11;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = H[32] * v14;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = H[3] * v0;
+    const two_t v40 = H[9] * v2;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = H[15] * v5;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = H[21] * v8;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = H[27] * v11;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = H[33] * v14;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = H[4] * v0;
+    const two_t v51 = H[10] * v2;
+    const two_t v52 = v50 + v51;
+    const two_t v53 = H[16] * v5;
+    const two_t v54 = v52 + v53;
+    const two_t v55 = H[22] * v8;
+    const two_t v56 = v54 + v55;
+    const two_t v57 = H[28] * v11;
+    const two_t v58 = v56 + v57;
+    const two_t v59 = H[34] * v14;
+    const two_t v60 = v58 + v59;
+    const two_t v61 = H[5] * v0;
+    const two_t v62 = H[11] * v2;
+    const two_t v63 = v61 + v62;
+    const two_t v64 = H[17] * v5;
+    const two_t v65 = v63 + v64;
+    const two_t v66 = H[23] * v8;
+    const two_t v67 = v65 + v66;
+    const two_t v68 = H[29] * v11;
+    const two_t v69 = v67 + v68;
+    const two_t v70 = H[35] * v14;
+    const two_t v71 = v69 + v70;
+    *(two_free_t *)(right + 0 + k) = v16;
+    *(two_free_t *)(right + 9 + k) = v27;
+    *(two_free_t *)(right + 18 + k) = v38;
+    *(two_free_t *)(right + 27 + k) = v49;
+    *(two_free_t *)(right + 36 + k) = v60;
+    *(two_free_t *)(right + 45 + k) = v71;
+  }
+  real t1217 = W[0] + (H[0] * K[0] + H[6] * K[1] + H[12] * K[2] + H[18] * K[3] + H[24] * K[4] +
+    H[30] * K[5]);
+  D[0] = t1217;
+  real t1229 = W[6] + (H[0] * K[6] + H[6] * K[7] + H[12] * K[8] + H[18] * K[9] + H[24] * K[10] +
+    H[30] * K[11]);
+  D[1] = t1229;
+  real t1241 = W[12] + (H[0] * K[12] + H[6] * K[13] + H[12] * K[14] + H[18] * K[15] + H[24] * K[16]
+    + H[30] * K[17]);
+  D[2] = t1241;
+  real t1253 = W[18] + (H[0] * K[18] + H[6] * K[19] + H[12] * K[20] + H[18] * K[21] + H[24] * K[22]
+    + H[30] * K[23]);
+  D[3] = t1253;
+  real t1265 = W[24] + (H[0] * K[24] + H[6] * K[25] + H[12] * K[26] + H[18] * K[27] + H[24] * K[28]
+    + H[30] * K[29]);
+  D[4] = t1265;
+  real t1277 = W[30] + (H[0] * K[30] + H[6] * K[31] + H[12] * K[32] + H[18] * K[33] + H[24] * K[34]
+    + H[30] * K[35]);
+  D[5] = t1277;
+  real t1289 = W[1] + (H[1] * K[0] + H[7] * K[1] + H[13] * K[2] + H[19] * K[3] + H[25] * K[4] +
+    H[31] * K[5]);
+  D[6] = t1289;
+  real t1301 = W[7] + (H[1] * K[6] + H[7] * K[7] + H[13] * K[8] + H[19] * K[9] + H[25] * K[10] +
+    H[31] * K[11]);
+  D[7] = t1301;
+  real t1313 = W[13] + (H[1] * K[12] + H[7] * K[13] + H[13] * K[14] + H[19] * K[15] + H[25] * K[16]
+    + H[31] * K[17]);
+  D[8] = t1313;
+  real t1325 = W[19] + (H[1] * K[18] + H[7] * K[19] + H[13] * K[20] + H[19] * K[21] + H[25] * K[22]
+    + H[31] * K[23]);
+  D[9] = t1325;
+  real t1337 = W[25] + (H[1] * K[24] + H[7] * K[25] + H[13] * K[26] + H[19] * K[27] + H[25] * K[28]
+    + H[31] * K[29]);
+  D[10] = t1337;
+  real t1349 = W[31] + (H[1] * K[30] + H[7] * K[31] + H[13] * K[32] + H[19] * K[33] + H[25] * K[34]
+    + H[31] * K[35]);
+  D[11] = t1349;
+  real t1361 = W[2] + (H[2] * K[0] + H[8] * K[1] + H[14] * K[2] + H[20] * K[3] + H[26] * K[4] +
+    H[32] * K[5]);
+  D[12] = t1361;
+  real t1373 = W[8] + (H[2] * K[6] + H[8] * K[7] + H[14] * K[8] + H[20] * K[9] + H[26] * K[10] +
+    H[32] * K[11]);
+  D[13] = t1373;
+  real t1385 = W[14] + (H[2] * K[12] + H[8] * K[13] + H[14] * K[14] + H[20] * K[15] + H[26] * K[16]
+    + H[32] * K[17]);
+  D[14] = t1385;
+  real t1397 = W[20] + (H[2] * K[18] + H[8] * K[19] + H[14] * K[20] + H[20] * K[21] + H[26] * K[22]
+    + H[32] * K[23]);
+  D[15] = t1397;
+  real t1409 = W[26] + (H[2] * K[24] + H[8] * K[25] + H[14] * K[26] + H[20] * K[27] + H[26] * K[28]
+    + H[32] * K[29]);
+  D[16] = t1409;
+  real t1421 = W[32] + (H[2] * K[30] + H[8] * K[31] + H[14] * K[32] + H[20] * K[33] + H[26] * K[34]
+    + H[32] * K[35]);
+  D[17] = t1421;
+  real t1433 = W[3] + (H[3] * K[0] + H[9] * K[1] + H[15] * K[2] + H[21] * K[3] + H[27] * K[4] +
+    H[33] * K[5]);
+  D[18] = t1433;
+  real t1445 = W[9] + (H[3] * K[6] + H[9] * K[7] + H[15] * K[8] + H[21] * K[9] + H[27] * K[10] +
+    H[33] * K[11]);
+  D[19] = t1445;
+  real t1457 = W[15] + (H[3] * K[12] + H[9] * K[13] + H[15] * K[14] + H[21] * K[15] + H[27] * K[16]
+    + H[33] * K[17]);
+  D[20] = t1457;
+  real t1469 = W[21] + (H[3] * K[18] + H[9] * K[19] + H[15] * K[20] + H[21] * K[21] + H[27] * K[22]
+    + H[33] * K[23]);
+  D[21] = t1469;
+  real t1481 = W[27] + (H[3] * K[24] + H[9] * K[25] + H[15] * K[26] + H[21] * K[27] + H[27] * K[28]
+    + H[33] * K[29]);
+  D[22] = t1481;
+  real t1493 = W[33] + (H[3] * K[30] + H[9] * K[31] + H[15] * K[32] + H[21] * K[33] + H[27] * K[34]
+    + H[33] * K[35]);
+  D[23] = t1493;
+  real t1505 = W[4] + (H[4] * K[0] + H[10] * K[1] + H[16] * K[2] + H[22] * K[3] + H[28] * K[4] +
+    H[34] * K[5]);
+  D[24] = t1505;
+  real t1517 = W[10] + (H[4] * K[6] + H[10] * K[7] + H[16] * K[8] + H[22] * K[9] + H[28] * K[10] +
+    H[34] * K[11]);
+  D[25] = t1517;
+  real t1529 = W[16] + (H[4] * K[12] + H[10] * K[13] + H[16] * K[14] + H[22] * K[15] + H[28] * K[16]
+    + H[34] * K[17]);
+  D[26] = t1529;
+  real t1541 = W[22] + (H[4] * K[18] + H[10] * K[19] + H[16] * K[20] + H[22] * K[21] + H[28] * K[22]
+    + H[34] * K[23]);
+  D[27] = t1541;
+  real t1553 = W[28] + (H[4] * K[24] + H[10] * K[25] + H[16] * K[26] + H[22] * K[27] + H[28] * K[28]
+    + H[34] * K[29]);
+  D[28] = t1553;
+  real t1565 = W[34] + (H[4] * K[30] + H[10] * K[31] + H[16] * K[32] + H[22] * K[33] + H[28] * K[34]
+    + H[34] * K[35]);
+  D[29] = t1565;
+  real t1577 = W[5] + (H[5] * K[0] + H[11] * K[1] + H[17] * K[2] + H[23] * K[3] + H[29] * K[4] +
+    H[35] * K[5]);
+  D[30] = t1577;
+  real t1589 = W[11] + (H[5] * K[6] + H[11] * K[7] + H[17] * K[8] + H[23] * K[9] + H[29] * K[10] +
+    H[35] * K[11]);
+  D[31] = t1589;
+  real t1601 = W[17] + (H[5] * K[12] + H[11] * K[13] + H[17] * K[14] + H[23] * K[15] + H[29] * K[16]
+    + H[35] * K[17]);
+  D[32] = t1601;
+  real t1613 = W[23] + (H[5] * K[18] + H[11] * K[19] + H[17] * K[20] + H[23] * K[21] + H[29] * K[22]
+    + H[35] * K[23]);
+  D[33] = t1613;
+  real t1625 = W[29] + (H[5] * K[24] + H[11] * K[25] + H[17] * K[26] + H[23] * K[27] + H[29] * K[28]
+    + H[35] * K[29]);
+  D[34] = t1625;
+  real t1637 = W[35] + (H[5] * K[30] + H[11] * K[31] + H[17] * K[32] + H[23] * K[33] + H[29] * K[34]
+    + H[35] * K[35]);
+  D[35] = t1637;
+  one[0] = 1.0;
+  one[1] = 0.0;
+  one[2] = 0.0;
+  one[3] = 0.0;
+  one[4] = 0.0;
+  one[5] = 0.0;
+  one[6] = 0.0;
+  one[7] = 1.0;
+  one[8] = 0.0;
+  one[9] = 0.0;
+  one[10] = 0.0;
+  one[11] = 0.0;
+  one[12] = 0.0;
+  one[13] = 0.0;
+  one[14] = 1.0;
+  one[15] = 0.0;
+  one[16] = 0.0;
+  one[17] = 0.0;
+  one[18] = 0.0;
+  one[19] = 0.0;
+  one[20] = 0.0;
+  one[21] = 1.0;
+  one[22] = 0.0;
+  one[23] = 0.0;
+  one[24] = 0.0;
+  one[25] = 0.0;
+  one[26] = 0.0;
+  one[27] = 0.0;
+  one[28] = 1.0;
+  one[29] = 0.0;
+  one[30] = 0.0;
+  one[31] = 0.0;
+  one[32] = 0.0;
+  one[33] = 0.0;
+  one[34] = 0.0;
+  one[35] = 1.0;
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_rows_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_rows(in[0], in[1], in[2], in[3], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_rows_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"B", 54, "", 0, 0},
-    {"W", 36, "", 0, 0},
-    {"S", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_rows_outputs[] = {
-    {"K", 36, "", 0, 0},
-    {"right", 54, "", 0, 0},
-    {"D", 36, "", 0, 0},
-    {"one", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_rows, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3]))
 
 /* S without the unknowns of a hinge with 6 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -11105,253 +2972,236 @@ static const mstmm_port mstmm_sweep_generic6_tangent_rows_outputs[] = {
  * out V[6][6] K + G, one row per direction
  * out S[9][6] change of the load by that of the motion, one row per entry, added to what is there
  */
-int mstmm_sweep_generic6_tangent_reduce(const real *restrict inverse, const real *restrict right,
-    const real *restrict K, const real *restrict G, real *restrict gain, real *restrict V,
-    real *restrict S)
+int mstmm_sweep_generic6_tangent_reduce(in_t inverse, in_t right, in_t K, in_t G, out_t gain,
+    out_t V, out_t S)
 {
-    for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
-        const two_t v0 = mstmm_beside(right + 0 + k);
-        const two_t v1 = inverse[0] * v0;
-        const two_t v2 = mstmm_beside(right + 9 + k);
-        const two_t v3 = inverse[1] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(right + 18 + k);
-        const two_t v6 = inverse[2] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(right + 27 + k);
-        const two_t v9 = inverse[3] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(right + 36 + k);
-        const two_t v12 = inverse[4] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(right + 45 + k);
-        const two_t v15 = inverse[5] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v17 = inverse[6] * v0;
-        const two_t v18 = inverse[7] * v2;
-        const two_t v19 = v17 + v18;
-        const two_t v20 = inverse[8] * v5;
-        const two_t v21 = v19 + v20;
-        const two_t v22 = inverse[9] * v8;
-        const two_t v23 = v21 + v22;
-        const two_t v24 = inverse[10] * v11;
-        const two_t v25 = v23 + v24;
-        const two_t v26 = inverse[11] * v14;
-        const two_t v27 = v25 + v26;
-        const two_t v28 = inverse[12] * v0;
-        const two_t v29 = inverse[13] * v2;
-        const two_t v30 = v28 + v29;
-        const two_t v31 = inverse[14] * v5;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = inverse[15] * v8;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = inverse[16] * v11;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = inverse[17] * v14;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = inverse[18] * v0;
-        const two_t v40 = inverse[19] * v2;
-        const two_t v41 = v39 + v40;
-        const two_t v42 = inverse[20] * v5;
-        const two_t v43 = v41 + v42;
-        const two_t v44 = inverse[21] * v8;
-        const two_t v45 = v43 + v44;
-        const two_t v46 = inverse[22] * v11;
-        const two_t v47 = v45 + v46;
-        const two_t v48 = inverse[23] * v14;
-        const two_t v49 = v47 + v48;
-        const two_t v50 = inverse[24] * v0;
-        const two_t v51 = inverse[25] * v2;
-        const two_t v52 = v50 + v51;
-        const two_t v53 = inverse[26] * v5;
-        const two_t v54 = v52 + v53;
-        const two_t v55 = inverse[27] * v8;
-        const two_t v56 = v54 + v55;
-        const two_t v57 = inverse[28] * v11;
-        const two_t v58 = v56 + v57;
-        const two_t v59 = inverse[29] * v14;
-        const two_t v60 = v58 + v59;
-        const two_t v61 = inverse[30] * v0;
-        const two_t v62 = inverse[31] * v2;
-        const two_t v63 = v61 + v62;
-        const two_t v64 = inverse[32] * v5;
-        const two_t v65 = v63 + v64;
-        const two_t v66 = inverse[33] * v8;
-        const two_t v67 = v65 + v66;
-        const two_t v68 = inverse[34] * v11;
-        const two_t v69 = v67 + v68;
-        const two_t v70 = inverse[35] * v14;
-        const two_t v71 = v69 + v70;
-        *(two_free_t *)(gain + 0 + k) = v16;
-        *(two_free_t *)(gain + 9 + k) = v27;
-        *(two_free_t *)(gain + 18 + k) = v38;
-        *(two_free_t *)(gain + 27 + k) = v49;
-        *(two_free_t *)(gain + 36 + k) = v60;
-        *(two_free_t *)(gain + 45 + k) = v71;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(K + 0 + k);
-        const two_t v1 = mstmm_beside(G + 0 + k);
-        const two_t v2 = v0 + v1;
-        const two_t v3 = mstmm_beside(K + 6 + k);
-        const two_t v4 = mstmm_beside(G + 6 + k);
-        const two_t v5 = v3 + v4;
-        const two_t v6 = mstmm_beside(K + 12 + k);
-        const two_t v7 = mstmm_beside(G + 12 + k);
-        const two_t v8 = v6 + v7;
-        const two_t v9 = mstmm_beside(K + 18 + k);
-        const two_t v10 = mstmm_beside(G + 18 + k);
-        const two_t v11 = v9 + v10;
-        const two_t v12 = mstmm_beside(K + 24 + k);
-        const two_t v13 = mstmm_beside(G + 24 + k);
-        const two_t v14 = v12 + v13;
-        const two_t v15 = mstmm_beside(K + 30 + k);
-        const two_t v16 = mstmm_beside(G + 30 + k);
-        const two_t v17 = v15 + v16;
-        *(two_free_t *)(V + 0 + k) = v2;
-        *(two_free_t *)(V + 6 + k) = v5;
-        *(two_free_t *)(V + 12 + k) = v8;
-        *(two_free_t *)(V + 18 + k) = v11;
-        *(two_free_t *)(V + 24 + k) = v14;
-        *(two_free_t *)(V + 30 + k) = v17;
-    }
-    for (int k = 0; k < 6; k += 2) {
-        const two_t v0 = mstmm_beside(V + 0 + k);
-        const two_t v1 = gain[0] * v0;
-        const two_t v2 = mstmm_beside(V + 6 + k);
-        const two_t v3 = gain[9] * v2;
-        const two_t v4 = v1 + v3;
-        const two_t v5 = mstmm_beside(V + 12 + k);
-        const two_t v6 = gain[18] * v5;
-        const two_t v7 = v4 + v6;
-        const two_t v8 = mstmm_beside(V + 18 + k);
-        const two_t v9 = gain[27] * v8;
-        const two_t v10 = v7 + v9;
-        const two_t v11 = mstmm_beside(V + 24 + k);
-        const two_t v12 = gain[36] * v11;
-        const two_t v13 = v10 + v12;
-        const two_t v14 = mstmm_beside(V + 30 + k);
-        const two_t v15 = gain[45] * v14;
-        const two_t v16 = v13 + v15;
-        const two_t v18 = gain[1] * v0;
-        const two_t v19 = gain[10] * v2;
-        const two_t v20 = v18 + v19;
-        const two_t v21 = gain[19] * v5;
-        const two_t v22 = v20 + v21;
-        const two_t v23 = gain[28] * v8;
-        const two_t v24 = v22 + v23;
-        const two_t v25 = gain[37] * v11;
-        const two_t v26 = v24 + v25;
-        const two_t v27 = gain[46] * v14;
-        const two_t v28 = v26 + v27;
-        const two_t v30 = gain[2] * v0;
-        const two_t v31 = gain[11] * v2;
-        const two_t v32 = v30 + v31;
-        const two_t v33 = gain[20] * v5;
-        const two_t v34 = v32 + v33;
-        const two_t v35 = gain[29] * v8;
-        const two_t v36 = v34 + v35;
-        const two_t v37 = gain[38] * v11;
-        const two_t v38 = v36 + v37;
-        const two_t v39 = gain[47] * v14;
-        const two_t v40 = v38 + v39;
-        const two_t v42 = gain[3] * v0;
-        const two_t v43 = gain[12] * v2;
-        const two_t v44 = v42 + v43;
-        const two_t v45 = gain[21] * v5;
-        const two_t v46 = v44 + v45;
-        const two_t v47 = gain[30] * v8;
-        const two_t v48 = v46 + v47;
-        const two_t v49 = gain[39] * v11;
-        const two_t v50 = v48 + v49;
-        const two_t v51 = gain[48] * v14;
-        const two_t v52 = v50 + v51;
-        const two_t v54 = gain[4] * v0;
-        const two_t v55 = gain[13] * v2;
-        const two_t v56 = v54 + v55;
-        const two_t v57 = gain[22] * v5;
-        const two_t v58 = v56 + v57;
-        const two_t v59 = gain[31] * v8;
-        const two_t v60 = v58 + v59;
-        const two_t v61 = gain[40] * v11;
-        const two_t v62 = v60 + v61;
-        const two_t v63 = gain[49] * v14;
-        const two_t v64 = v62 + v63;
-        const two_t v66 = gain[5] * v0;
-        const two_t v67 = gain[14] * v2;
-        const two_t v68 = v66 + v67;
-        const two_t v69 = gain[23] * v5;
-        const two_t v70 = v68 + v69;
-        const two_t v71 = gain[32] * v8;
-        const two_t v72 = v70 + v71;
-        const two_t v73 = gain[41] * v11;
-        const two_t v74 = v72 + v73;
-        const two_t v75 = gain[50] * v14;
-        const two_t v76 = v74 + v75;
-        const two_t v78 = gain[6] * v0;
-        const two_t v79 = gain[15] * v2;
-        const two_t v80 = v78 + v79;
-        const two_t v81 = gain[24] * v5;
-        const two_t v82 = v80 + v81;
-        const two_t v83 = gain[33] * v8;
-        const two_t v84 = v82 + v83;
-        const two_t v85 = gain[42] * v11;
-        const two_t v86 = v84 + v85;
-        const two_t v87 = gain[51] * v14;
-        const two_t v88 = v86 + v87;
-        const two_t v90 = gain[7] * v0;
-        const two_t v91 = gain[16] * v2;
-        const two_t v92 = v90 + v91;
-        const two_t v93 = gain[25] * v5;
-        const two_t v94 = v92 + v93;
-        const two_t v95 = gain[34] * v8;
-        const two_t v96 = v94 + v95;
-        const two_t v97 = gain[43] * v11;
-        const two_t v98 = v96 + v97;
-        const two_t v99 = gain[52] * v14;
-        const two_t v100 = v98 + v99;
-        const two_t v102 = gain[8] * v0;
-        const two_t v103 = gain[17] * v2;
-        const two_t v104 = v102 + v103;
-        const two_t v105 = gain[26] * v5;
-        const two_t v106 = v104 + v105;
-        const two_t v107 = gain[35] * v8;
-        const two_t v108 = v106 + v107;
-        const two_t v109 = gain[44] * v11;
-        const two_t v110 = v108 + v109;
-        const two_t v111 = gain[53] * v14;
-        const two_t v112 = v110 + v111;
-        *(two_free_t *)(S + 0 + k) -= v16;
-        *(two_free_t *)(S + 6 + k) -= v28;
-        *(two_free_t *)(S + 12 + k) -= v40;
-        *(two_free_t *)(S + 18 + k) -= v52;
-        *(two_free_t *)(S + 24 + k) -= v64;
-        *(two_free_t *)(S + 30 + k) -= v76;
-        *(two_free_t *)(S + 36 + k) -= v88;
-        *(two_free_t *)(S + 42 + k) -= v100;
-        *(two_free_t *)(S + 48 + k) -= v112;
-    }
-    return 0;
+  for (int k = 0; k < 8; k += k < 6 ? 2 : 1) {
+    const two_t v0 = mstmm_beside(right + 0 + k);
+    const two_t v1 = inverse[0] * v0;
+    const two_t v2 = mstmm_beside(right + 9 + k);
+    const two_t v3 = inverse[1] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(right + 18 + k);
+    const two_t v6 = inverse[2] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(right + 27 + k);
+    const two_t v9 = inverse[3] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(right + 36 + k);
+    const two_t v12 = inverse[4] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(right + 45 + k);
+    const two_t v15 = inverse[5] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v17 = inverse[6] * v0;
+    const two_t v18 = inverse[7] * v2;
+    const two_t v19 = v17 + v18;
+    const two_t v20 = inverse[8] * v5;
+    const two_t v21 = v19 + v20;
+    const two_t v22 = inverse[9] * v8;
+    const two_t v23 = v21 + v22;
+    const two_t v24 = inverse[10] * v11;
+    const two_t v25 = v23 + v24;
+    const two_t v26 = inverse[11] * v14;
+    const two_t v27 = v25 + v26;
+    const two_t v28 = inverse[12] * v0;
+    const two_t v29 = inverse[13] * v2;
+    const two_t v30 = v28 + v29;
+    const two_t v31 = inverse[14] * v5;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = inverse[15] * v8;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = inverse[16] * v11;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = inverse[17] * v14;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = inverse[18] * v0;
+    const two_t v40 = inverse[19] * v2;
+    const two_t v41 = v39 + v40;
+    const two_t v42 = inverse[20] * v5;
+    const two_t v43 = v41 + v42;
+    const two_t v44 = inverse[21] * v8;
+    const two_t v45 = v43 + v44;
+    const two_t v46 = inverse[22] * v11;
+    const two_t v47 = v45 + v46;
+    const two_t v48 = inverse[23] * v14;
+    const two_t v49 = v47 + v48;
+    const two_t v50 = inverse[24] * v0;
+    const two_t v51 = inverse[25] * v2;
+    const two_t v52 = v50 + v51;
+    const two_t v53 = inverse[26] * v5;
+    const two_t v54 = v52 + v53;
+    const two_t v55 = inverse[27] * v8;
+    const two_t v56 = v54 + v55;
+    const two_t v57 = inverse[28] * v11;
+    const two_t v58 = v56 + v57;
+    const two_t v59 = inverse[29] * v14;
+    const two_t v60 = v58 + v59;
+    const two_t v61 = inverse[30] * v0;
+    const two_t v62 = inverse[31] * v2;
+    const two_t v63 = v61 + v62;
+    const two_t v64 = inverse[32] * v5;
+    const two_t v65 = v63 + v64;
+    const two_t v66 = inverse[33] * v8;
+    const two_t v67 = v65 + v66;
+    const two_t v68 = inverse[34] * v11;
+    const two_t v69 = v67 + v68;
+    const two_t v70 = inverse[35] * v14;
+    const two_t v71 = v69 + v70;
+    *(two_free_t *)(gain + 0 + k) = v16;
+    *(two_free_t *)(gain + 9 + k) = v27;
+    *(two_free_t *)(gain + 18 + k) = v38;
+    *(two_free_t *)(gain + 27 + k) = v49;
+    *(two_free_t *)(gain + 36 + k) = v60;
+    *(two_free_t *)(gain + 45 + k) = v71;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(K + 0 + k);
+    const two_t v1 = mstmm_beside(G + 0 + k);
+    const two_t v2 = v0 + v1;
+    const two_t v3 = mstmm_beside(K + 6 + k);
+    const two_t v4 = mstmm_beside(G + 6 + k);
+    const two_t v5 = v3 + v4;
+    const two_t v6 = mstmm_beside(K + 12 + k);
+    const two_t v7 = mstmm_beside(G + 12 + k);
+    const two_t v8 = v6 + v7;
+    const two_t v9 = mstmm_beside(K + 18 + k);
+    const two_t v10 = mstmm_beside(G + 18 + k);
+    const two_t v11 = v9 + v10;
+    const two_t v12 = mstmm_beside(K + 24 + k);
+    const two_t v13 = mstmm_beside(G + 24 + k);
+    const two_t v14 = v12 + v13;
+    const two_t v15 = mstmm_beside(K + 30 + k);
+    const two_t v16 = mstmm_beside(G + 30 + k);
+    const two_t v17 = v15 + v16;
+    *(two_free_t *)(V + 0 + k) = v2;
+    *(two_free_t *)(V + 6 + k) = v5;
+    *(two_free_t *)(V + 12 + k) = v8;
+    *(two_free_t *)(V + 18 + k) = v11;
+    *(two_free_t *)(V + 24 + k) = v14;
+    *(two_free_t *)(V + 30 + k) = v17;
+  }
+  for (int k = 0; k < 6; k += 2) {
+    const two_t v0 = mstmm_beside(V + 0 + k);
+    const two_t v1 = gain[0] * v0;
+    const two_t v2 = mstmm_beside(V + 6 + k);
+    const two_t v3 = gain[9] * v2;
+    const two_t v4 = v1 + v3;
+    const two_t v5 = mstmm_beside(V + 12 + k);
+    const two_t v6 = gain[18] * v5;
+    const two_t v7 = v4 + v6;
+    const two_t v8 = mstmm_beside(V + 18 + k);
+    const two_t v9 = gain[27] * v8;
+    const two_t v10 = v7 + v9;
+    const two_t v11 = mstmm_beside(V + 24 + k);
+    const two_t v12 = gain[36] * v11;
+    const two_t v13 = v10 + v12;
+    const two_t v14 = mstmm_beside(V + 30 + k);
+    const two_t v15 = gain[45] * v14;
+    const two_t v16 = v13 + v15;
+    const two_t v18 = gain[1] * v0;
+    const two_t v19 = gain[10] * v2;
+    const two_t v20 = v18 + v19;
+    const two_t v21 = gain[19] * v5;
+    const two_t v22 = v20 + v21;
+    const two_t v23 = gain[28] * v8;
+    const two_t v24 = v22 + v23;
+    const two_t v25 = gain[37] * v11;
+    const two_t v26 = v24 + v25;
+    const two_t v27 = gain[46] * v14;
+    const two_t v28 = v26 + v27;
+    const two_t v30 = gain[2] * v0;
+    const two_t v31 = gain[11] * v2;
+    const two_t v32 = v30 + v31;
+    const two_t v33 = gain[20] * v5;
+    const two_t v34 = v32 + v33;
+    const two_t v35 = gain[29] * v8;
+    const two_t v36 = v34 + v35;
+    const two_t v37 = gain[38] * v11;
+    const two_t v38 = v36 + v37;
+    const two_t v39 = gain[47] * v14;
+    const two_t v40 = v38 + v39;
+    const two_t v42 = gain[3] * v0;
+    const two_t v43 = gain[12] * v2;
+    const two_t v44 = v42 + v43;
+    const two_t v45 = gain[21] * v5;
+    const two_t v46 = v44 + v45;
+    const two_t v47 = gain[30] * v8;
+    const two_t v48 = v46 + v47;
+    const two_t v49 = gain[39] * v11;
+    const two_t v50 = v48 + v49;
+    const two_t v51 = gain[48] * v14;
+    const two_t v52 = v50 + v51;
+    const two_t v54 = gain[4] * v0;
+    const two_t v55 = gain[13] * v2;
+    const two_t v56 = v54 + v55;
+    const two_t v57 = gain[22] * v5;
+    const two_t v58 = v56 + v57;
+    const two_t v59 = gain[31] * v8;
+    const two_t v60 = v58 + v59;
+    const two_t v61 = gain[40] * v11;
+    const two_t v62 = v60 + v61;
+    const two_t v63 = gain[49] * v14;
+    const two_t v64 = v62 + v63;
+    const two_t v66 = gain[5] * v0;
+    const two_t v67 = gain[14] * v2;
+    const two_t v68 = v66 + v67;
+    const two_t v69 = gain[23] * v5;
+    const two_t v70 = v68 + v69;
+    const two_t v71 = gain[32] * v8;
+    const two_t v72 = v70 + v71;
+    const two_t v73 = gain[41] * v11;
+    const two_t v74 = v72 + v73;
+    const two_t v75 = gain[50] * v14;
+    const two_t v76 = v74 + v75;
+    const two_t v78 = gain[6] * v0;
+    const two_t v79 = gain[15] * v2;
+    const two_t v80 = v78 + v79;
+    const two_t v81 = gain[24] * v5;
+    const two_t v82 = v80 + v81;
+    const two_t v83 = gain[33] * v8;
+    const two_t v84 = v82 + v83;
+    const two_t v85 = gain[42] * v11;
+    const two_t v86 = v84 + v85;
+    const two_t v87 = gain[51] * v14;
+    const two_t v88 = v86 + v87;
+    const two_t v90 = gain[7] * v0;
+    const two_t v91 = gain[16] * v2;
+    const two_t v92 = v90 + v91;
+    const two_t v93 = gain[25] * v5;
+    const two_t v94 = v92 + v93;
+    const two_t v95 = gain[34] * v8;
+    const two_t v96 = v94 + v95;
+    const two_t v97 = gain[43] * v11;
+    const two_t v98 = v96 + v97;
+    const two_t v99 = gain[52] * v14;
+    const two_t v100 = v98 + v99;
+    const two_t v102 = gain[8] * v0;
+    const two_t v103 = gain[17] * v2;
+    const two_t v104 = v102 + v103;
+    const two_t v105 = gain[26] * v5;
+    const two_t v106 = v104 + v105;
+    const two_t v107 = gain[35] * v8;
+    const two_t v108 = v106 + v107;
+    const two_t v109 = gain[44] * v11;
+    const two_t v110 = v108 + v109;
+    const two_t v111 = gain[53] * v14;
+    const two_t v112 = v110 + v111;
+    *(two_free_t *)(S + 0 + k) -= v16;
+    *(two_free_t *)(S + 6 + k) -= v28;
+    *(two_free_t *)(S + 12 + k) -= v40;
+    *(two_free_t *)(S + 18 + k) -= v52;
+    *(two_free_t *)(S + 24 + k) -= v64;
+    *(two_free_t *)(S + 30 + k) -= v76;
+    *(two_free_t *)(S + 36 + k) -= v88;
+    *(two_free_t *)(S + 42 + k) -= v100;
+    *(two_free_t *)(S + 48 + k) -= v112;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_reduce_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_reduce(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_reduce_inputs[] = {
-    {"inverse", 36, "", 0, 0},
-    {"right", 54, "", 0, 0},
-    {"K", 36, "", 0, 0},
-    {"G", 36, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_reduce_outputs[] = {
-    {"gain", 54, "", 0, 0},
-    {"V", 36, "", 0, 0},
-    {"S", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_reduce, (in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* a right-hand side carried across a hinge with 6 free speeds
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -11366,336 +3216,65 @@ static const mstmm_port mstmm_sweep_generic6_tangent_reduce_outputs[] = {
  * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_tangent_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict V, const real *restrict inverse,
-    const real *restrict e, const real *restrict e_f, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic6_tangent_load(in_t Rc, in_t r, in_t H, in_t V, in_t inverse, in_t e,
+    in_t e_f, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[6] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[7] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[13] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[19] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[25] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[31] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[8] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[14] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[20] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[26] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[32] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = H[3] * e[0];
-    const real t42 = H[9] * e[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[15] * e[2];
-    const real t45 = t43 + t44;
-    const real t46 = H[21] * e[3];
-    const real t47 = t45 + t46;
-    const real t48 = H[27] * e[4];
-    const real t49 = t47 + t48;
-    const real t50 = H[33] * e[5];
-    const real t51 = t49 + t50;
-    const real t52 = e_f[3] + t51;
-    const real t53 = inverse[3] * t52;
-    const real t54 = t40 + t53;
-    const real t55 = H[4] * e[0];
-    const real t56 = H[10] * e[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[16] * e[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[22] * e[3];
-    const real t61 = t59 + t60;
-    const real t62 = H[28] * e[4];
-    const real t63 = t61 + t62;
-    const real t64 = H[34] * e[5];
-    const real t65 = t63 + t64;
-    const real t66 = e_f[4] + t65;
-    const real t67 = inverse[4] * t66;
-    const real t68 = t54 + t67;
-    const real t69 = H[5] * e[0];
-    const real t70 = H[11] * e[1];
-    const real t71 = t69 + t70;
-    const real t72 = H[17] * e[2];
-    const real t73 = t71 + t72;
-    const real t74 = H[23] * e[3];
-    const real t75 = t73 + t74;
-    const real t76 = H[29] * e[4];
-    const real t77 = t75 + t76;
-    const real t78 = H[35] * e[5];
-    const real t79 = t77 + t78;
-    const real t80 = e_f[5] + t79;
-    const real t81 = inverse[5] * t80;
-    const real t82 = t68 + t81;
-    const real t83 = -t82;
-    y[0] = t83;
-    const real t84 = inverse[6] * t11;
-    const real t85 = inverse[7] * t24;
-    const real t86 = t84 + t85;
-    const real t87 = inverse[8] * t38;
-    const real t88 = t86 + t87;
-    const real t89 = inverse[9] * t52;
-    const real t90 = t88 + t89;
-    const real t91 = inverse[10] * t66;
-    const real t92 = t90 + t91;
-    const real t93 = inverse[11] * t80;
-    const real t94 = t92 + t93;
-    const real t95 = -t94;
-    y[1] = t95;
-    const real t96 = inverse[12] * t11;
-    const real t97 = inverse[13] * t24;
-    const real t98 = t96 + t97;
-    const real t99 = inverse[14] * t38;
-    const real t100 = t98 + t99;
-    const real t101 = inverse[15] * t52;
-    const real t102 = t100 + t101;
-    const real t103 = inverse[16] * t66;
-    const real t104 = t102 + t103;
-    const real t105 = inverse[17] * t80;
-    const real t106 = t104 + t105;
-    const real t107 = -t106;
-    y[2] = t107;
-    const real t108 = inverse[18] * t11;
-    const real t109 = inverse[19] * t24;
-    const real t110 = t108 + t109;
-    const real t111 = inverse[20] * t38;
-    const real t112 = t110 + t111;
-    const real t113 = inverse[21] * t52;
-    const real t114 = t112 + t113;
-    const real t115 = inverse[22] * t66;
-    const real t116 = t114 + t115;
-    const real t117 = inverse[23] * t80;
-    const real t118 = t116 + t117;
-    const real t119 = -t118;
-    y[3] = t119;
-    const real t120 = inverse[24] * t11;
-    const real t121 = inverse[25] * t24;
-    const real t122 = t120 + t121;
-    const real t123 = inverse[26] * t38;
-    const real t124 = t122 + t123;
-    const real t125 = inverse[27] * t52;
-    const real t126 = t124 + t125;
-    const real t127 = inverse[28] * t66;
-    const real t128 = t126 + t127;
-    const real t129 = inverse[29] * t80;
-    const real t130 = t128 + t129;
-    const real t131 = -t130;
-    y[4] = t131;
-    const real t132 = inverse[30] * t11;
-    const real t133 = inverse[31] * t24;
-    const real t134 = t132 + t133;
-    const real t135 = inverse[32] * t38;
-    const real t136 = t134 + t135;
-    const real t137 = inverse[33] * t52;
-    const real t138 = t136 + t137;
-    const real t139 = inverse[34] * t66;
-    const real t140 = t138 + t139;
-    const real t141 = inverse[35] * t80;
-    const real t142 = t140 + t141;
-    const real t143 = -t142;
-    y[5] = t143;
-    const real t144 = V[0] * t82;
-    const real t145 = V[6] * t94;
-    const real t146 = t144 + t145;
-    const real t147 = V[12] * t106;
-    const real t148 = t146 + t147;
-    const real t149 = V[18] * t118;
-    const real t150 = t148 + t149;
-    const real t151 = V[24] * t130;
-    const real t152 = t150 + t151;
-    const real t153 = V[30] * t142;
-    const real t154 = t152 + t153;
-    const real t155 = e[0] - t154;
-    const real t156 = Rc[0] * t155;
-    const real t157 = V[1] * t82;
-    const real t158 = V[7] * t94;
-    const real t159 = t157 + t158;
-    const real t160 = V[13] * t106;
-    const real t161 = t159 + t160;
-    const real t162 = V[19] * t118;
-    const real t163 = t161 + t162;
-    const real t164 = V[25] * t130;
-    const real t165 = t163 + t164;
-    const real t166 = V[31] * t142;
-    const real t167 = t165 + t166;
-    const real t168 = e[1] - t167;
-    const real t169 = Rc[1] * t168;
-    const real t170 = t156 + t169;
-    const real t171 = V[2] * t82;
-    const real t172 = V[8] * t94;
-    const real t173 = t171 + t172;
-    const real t174 = V[14] * t106;
-    const real t175 = t173 + t174;
-    const real t176 = V[20] * t118;
-    const real t177 = t175 + t176;
-    const real t178 = V[26] * t130;
-    const real t179 = t177 + t178;
-    const real t180 = V[32] * t142;
-    const real t181 = t179 + t180;
-    const real t182 = e[2] - t181;
-    const real t183 = Rc[2] * t182;
-    const real t184 = t170 + t183;
-    e_I[0] += t184;
-    const real t185 = Rc[3] * t155;
-    const real t186 = Rc[4] * t168;
-    const real t187 = t185 + t186;
-    const real t188 = Rc[5] * t182;
-    const real t189 = t187 + t188;
-    e_I[1] += t189;
-    const real t190 = Rc[6] * t155;
-    const real t191 = Rc[7] * t168;
-    const real t192 = t190 + t191;
-    const real t193 = Rc[8] * t182;
-    const real t194 = t192 + t193;
-    e_I[2] += t194;
-    const real t195 = V[3] * t82;
-    const real t196 = V[9] * t94;
-    const real t197 = t195 + t196;
-    const real t198 = V[15] * t106;
-    const real t199 = t197 + t198;
-    const real t200 = V[21] * t118;
-    const real t201 = t199 + t200;
-    const real t202 = V[27] * t130;
-    const real t203 = t201 + t202;
-    const real t204 = V[33] * t142;
-    const real t205 = t203 + t204;
-    const real t206 = e[3] - t205;
-    const real t207 = Rc[0] * t206;
-    const real t208 = V[4] * t82;
-    const real t209 = V[10] * t94;
-    const real t210 = t208 + t209;
-    const real t211 = V[16] * t106;
-    const real t212 = t210 + t211;
-    const real t213 = V[22] * t118;
-    const real t214 = t212 + t213;
-    const real t215 = V[28] * t130;
-    const real t216 = t214 + t215;
-    const real t217 = V[34] * t142;
-    const real t218 = t216 + t217;
-    const real t219 = e[4] - t218;
-    const real t220 = Rc[1] * t219;
-    const real t221 = t207 + t220;
-    const real t222 = V[5] * t82;
-    const real t223 = V[11] * t94;
-    const real t224 = t222 + t223;
-    const real t225 = V[17] * t106;
-    const real t226 = t224 + t225;
-    const real t227 = V[23] * t118;
-    const real t228 = t226 + t227;
-    const real t229 = V[29] * t130;
-    const real t230 = t228 + t229;
-    const real t231 = V[35] * t142;
-    const real t232 = t230 + t231;
-    const real t233 = e[5] - t232;
-    const real t234 = Rc[2] * t233;
-    const real t235 = t221 + t234;
-    const real t236 = Rc[6] * r[1];
-    const real t237 = Rc[3] * r[2];
-    const real t238 = t236 - t237;
-    const real t239 = t155 * t238;
-    const real t240 = Rc[7] * r[1];
-    const real t241 = Rc[4] * r[2];
-    const real t242 = t240 - t241;
-    const real t243 = t168 * t242;
-    const real t244 = t239 + t243;
-    const real t245 = Rc[8] * r[1];
-    const real t246 = Rc[5] * r[2];
-    const real t247 = t245 - t246;
-    const real t248 = t182 * t247;
-    const real t249 = t244 + t248;
-    const real t250 = t235 + t249;
-    e_I[3] += t250;
-    const real t251 = Rc[3] * t206;
-    const real t252 = Rc[4] * t219;
-    const real t253 = t251 + t252;
-    const real t254 = Rc[5] * t233;
-    const real t255 = t253 + t254;
-    const real t256 = Rc[0] * r[2];
-    const real t257 = Rc[6] * r[0];
-    const real t258 = t256 - t257;
-    const real t259 = t155 * t258;
-    const real t260 = Rc[1] * r[2];
-    const real t261 = Rc[7] * r[0];
-    const real t262 = t260 - t261;
-    const real t263 = t168 * t262;
-    const real t264 = t259 + t263;
-    const real t265 = Rc[2] * r[2];
-    const real t266 = Rc[8] * r[0];
-    const real t267 = t265 - t266;
-    const real t268 = t182 * t267;
-    const real t269 = t264 + t268;
-    const real t270 = t255 + t269;
-    e_I[4] += t270;
-    const real t271 = Rc[6] * t206;
-    const real t272 = Rc[7] * t219;
-    const real t273 = t271 + t272;
-    const real t274 = Rc[8] * t233;
-    const real t275 = t273 + t274;
-    const real t276 = Rc[3] * r[0];
-    const real t277 = Rc[0] * r[1];
-    const real t278 = t276 - t277;
-    const real t279 = t155 * t278;
-    const real t280 = Rc[4] * r[0];
-    const real t281 = Rc[1] * r[1];
-    const real t282 = t280 - t281;
-    const real t283 = t168 * t282;
-    const real t284 = t279 + t283;
-    const real t285 = Rc[5] * r[0];
-    const real t286 = Rc[2] * r[1];
-    const real t287 = t285 - t286;
-    const real t288 = t182 * t287;
-    const real t289 = t284 + t288;
-    const real t290 = t275 + t289;
-    e_I[5] += t290;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[6] * e[1] + H[12] * e[2] + H[18] * e[3] + H[24] * e[4] +
+    H[30] * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[7] * e[1] + H[13] * e[2] + H[19] * e[3] + H[25] * e[4] +
+    H[31] * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[8] * e[1] + H[14] * e[2] + H[20] * e[3] + H[26] * e[4] +
+    H[32] * e[5]);
+  real t52 = e_f[3] + (H[3] * e[0] + H[9] * e[1] + H[15] * e[2] + H[21] * e[3] + H[27] * e[4] +
+    H[33] * e[5]);
+  real t66 = e_f[4] + (H[4] * e[0] + H[10] * e[1] + H[16] * e[2] + H[22] * e[3] + H[28] * e[4] +
+    H[34] * e[5]);
+  real t80 = e_f[5] + (H[5] * e[0] + H[11] * e[1] + H[17] * e[2] + H[23] * e[3] + H[29] * e[4] +
+    H[35] * e[5]);
+  real t82 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38 + inverse[3] * t52 + inverse[4]
+    * t66 + inverse[5] * t80;
+  y[0] = -t82;
+  real t94 = inverse[6] * t11 + inverse[7] * t24 + inverse[8] * t38 + inverse[9] * t52 + inverse[10]
+    * t66 + inverse[11] * t80;
+  y[1] = -t94;
+  real t106 = inverse[12] * t11 + inverse[13] * t24 + inverse[14] * t38 + inverse[15] * t52 +
+    inverse[16] * t66 + inverse[17] * t80;
+  y[2] = -t106;
+  real t118 = inverse[18] * t11 + inverse[19] * t24 + inverse[20] * t38 + inverse[21] * t52 +
+    inverse[22] * t66 + inverse[23] * t80;
+  y[3] = -t118;
+  real t130 = inverse[24] * t11 + inverse[25] * t24 + inverse[26] * t38 + inverse[27] * t52 +
+    inverse[28] * t66 + inverse[29] * t80;
+  y[4] = -t130;
+  real t142 = inverse[30] * t11 + inverse[31] * t24 + inverse[32] * t38 + inverse[33] * t52 +
+    inverse[34] * t66 + inverse[35] * t80;
+  y[5] = -t142;
+  real t155 = e[0] - (V[0] * t82 + V[6] * t94 + V[12] * t106 + V[18] * t118 + V[24] * t130 + V[30] *
+    t142);
+  real t168 = e[1] - (V[1] * t82 + V[7] * t94 + V[13] * t106 + V[19] * t118 + V[25] * t130 + V[31] *
+    t142);
+  real t182 = e[2] - (V[2] * t82 + V[8] * t94 + V[14] * t106 + V[20] * t118 + V[26] * t130 + V[32] *
+    t142);
+  e_I[0] += Rc[0] * t155 + Rc[1] * t168 + Rc[2] * t182;
+  e_I[1] += Rc[3] * t155 + Rc[4] * t168 + Rc[5] * t182;
+  e_I[2] += Rc[6] * t155 + Rc[7] * t168 + Rc[8] * t182;
+  real t206 = e[3] - (V[3] * t82 + V[9] * t94 + V[15] * t106 + V[21] * t118 + V[27] * t130 + V[33] *
+    t142);
+  real t219 = e[4] - (V[4] * t82 + V[10] * t94 + V[16] * t106 + V[22] * t118 + V[28] * t130 + V[34]
+    * t142);
+  real t233 = e[5] - (V[5] * t82 + V[11] * t94 + V[17] * t106 + V[23] * t118 + V[29] * t130 + V[35]
+    * t142);
+  e_I[3] += Rc[0] * t206 + Rc[1] * t219 + Rc[2] * t233 + (t155 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t168 * (Rc[7] * r[1] - Rc[4] * r[2]) + t182 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t206 + Rc[4] * t219 + Rc[5] * t233 + (t155 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t168 * (Rc[1] * r[2] - Rc[7] * r[0]) + t182 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t206 + Rc[7] * t219 + Rc[8] * t233 + (t155 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t168 * (Rc[4] * r[0] - Rc[1] * r[1]) + t182 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_load(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_load_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"V", 36, "", 0, 0},
-    {"inverse", 36, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_load_outputs[] = {
-    {"y", 6, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_load, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 /* solution of a hinge with 6 free speeds for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -11712,393 +3291,77 @@ static const mstmm_port mstmm_sweep_generic6_tangent_load_outputs[] = {
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic6_tangent_solution(const real *restrict Rc, const real *restrict r,
-    const real *restrict w_I, const real *restrict v, const real *restrict w,
-    const real *restrict z_I, const real *restrict B, const real *restrict gain,
-    const real *restrict y, real *restrict x, real *restrict z)
+int mstmm_sweep_generic6_tangent_solution(in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t z_I,
+    in_t B, in_t gain, in_t y, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = gain[0] * t4;
-    const real t6 = Rc[1] * z_I[0];
-    const real t7 = Rc[4] * z_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = Rc[7] * z_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = gain[1] * t10;
-    const real t12 = t5 + t11;
-    const real t13 = Rc[2] * z_I[0];
-    const real t14 = Rc[5] * z_I[1];
-    const real t15 = t13 + t14;
-    const real t16 = Rc[8] * z_I[2];
-    const real t17 = t15 + t16;
-    const real t18 = gain[2] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = w[2] * t10;
-    const real t21 = w[1] * t17;
-    const real t22 = t20 - t21;
-    const real t23 = Rc[0] * z_I[3];
-    const real t24 = Rc[3] * z_I[4];
-    const real t25 = t23 + t24;
-    const real t26 = Rc[6] * z_I[5];
-    const real t27 = t25 + t26;
-    const real t28 = t22 + t27;
-    const real t29 = gain[3] * t28;
-    const real t30 = t19 + t29;
-    const real t31 = w[0] * t17;
-    const real t32 = w[2] * t4;
-    const real t33 = t31 - t32;
-    const real t34 = Rc[1] * z_I[3];
-    const real t35 = Rc[4] * z_I[4];
-    const real t36 = t34 + t35;
-    const real t37 = Rc[7] * z_I[5];
-    const real t38 = t36 + t37;
-    const real t39 = t33 + t38;
-    const real t40 = gain[4] * t39;
-    const real t41 = t30 + t40;
-    const real t42 = w[1] * t4;
-    const real t43 = w[0] * t10;
-    const real t44 = t42 - t43;
-    const real t45 = Rc[2] * z_I[3];
-    const real t46 = Rc[5] * z_I[4];
-    const real t47 = t45 + t46;
-    const real t48 = Rc[8] * z_I[5];
-    const real t49 = t47 + t48;
-    const real t50 = t44 + t49;
-    const real t51 = gain[5] * t50;
-    const real t52 = t41 + t51;
-    const real t53 = v[2] * 2.0;
-    const real t54 = t10 * t53;
-    const real t55 = v[1] * 2.0;
-    const real t56 = t17 * t55;
-    const real t57 = t54 - t56;
-    const real t58 = r[2] * z_I[4];
-    const real t59 = r[1] * w_I[1];
-    const real t60 = r[2] * w_I[2];
-    const real t61 = t59 + t60;
-    const real t62 = z_I[0] * t61;
-    const real t63 = r[0] * w_I[1];
-    const real t64 = 2.0 * t63;
-    const real t65 = r[1] * w_I[0];
-    const real t66 = t64 - t65;
-    const real t67 = z_I[1] * t66;
-    const real t68 = r[0] * w_I[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = r[2] * w_I[0];
-    const real t71 = t69 - t70;
-    const real t72 = z_I[2] * t71;
-    const real t73 = t67 + t72;
-    const real t74 = t62 - t73;
-    const real t75 = r[1] * z_I[5];
-    const real t76 = t74 - t75;
-    const real t77 = t58 + t76;
-    const real t78 = z_I[6] + t77;
-    const real t79 = Rc[0] * t78;
-    const real t80 = r[0] * z_I[5];
-    const real t81 = r[0] * w_I[0];
-    const real t82 = t60 + t81;
-    const real t83 = z_I[1] * t82;
-    const real t84 = 2.0 * t65;
-    const real t85 = t84 - t63;
-    const real t86 = z_I[0] * t85;
-    const real t87 = t83 - t86;
-    const real t88 = r[1] * w_I[2];
-    const real t89 = 2.0 * t88;
-    const real t90 = r[2] * w_I[1];
-    const real t91 = t89 - t90;
-    const real t92 = z_I[2] * t91;
-    const real t93 = t87 - t92;
-    const real t94 = t80 + t93;
-    const real t95 = r[2] * z_I[3];
-    const real t96 = t94 - t95;
-    const real t97 = z_I[7] + t96;
-    const real t98 = Rc[3] * t97;
-    const real t99 = t79 + t98;
-    const real t100 = r[1] * z_I[3];
-    const real t101 = t59 + t81;
-    const real t102 = z_I[2] * t101;
-    const real t103 = 2.0 * t70;
-    const real t104 = t103 - t68;
-    const real t105 = z_I[0] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = 2.0 * t90;
-    const real t108 = t107 - t88;
-    const real t109 = z_I[1] * t108;
-    const real t110 = t106 - t109;
-    const real t111 = r[0] * z_I[4];
-    const real t112 = t110 - t111;
-    const real t113 = t100 + t112;
-    const real t114 = z_I[8] + t113;
-    const real t115 = Rc[6] * t114;
-    const real t116 = t99 + t115;
-    const real t117 = t57 + t116;
-    const real t118 = gain[6] * t117;
-    const real t119 = t52 + t118;
-    const real t120 = v[0] * 2.0;
-    const real t121 = t17 * t120;
-    const real t122 = t4 * t53;
-    const real t123 = t121 - t122;
-    const real t124 = Rc[1] * t78;
-    const real t125 = Rc[4] * t97;
-    const real t126 = t124 + t125;
-    const real t127 = Rc[7] * t114;
-    const real t128 = t126 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = gain[7] * t129;
-    const real t131 = t119 + t130;
-    const real t132 = t4 * t55;
-    const real t133 = t10 * t120;
-    const real t134 = t132 - t133;
-    const real t135 = Rc[2] * t78;
-    const real t136 = Rc[5] * t97;
-    const real t137 = t135 + t136;
-    const real t138 = Rc[8] * t114;
-    const real t139 = t137 + t138;
-    const real t140 = t134 + t139;
-    const real t141 = gain[8] * t140;
-    const real t142 = t131 + t141;
-    const real t143 = y[0] - t142;
-    x[0] = t143;
-    const real t144 = gain[9] * t4;
-    const real t145 = gain[10] * t10;
-    const real t146 = t144 + t145;
-    const real t147 = gain[11] * t17;
-    const real t148 = t146 + t147;
-    const real t149 = gain[12] * t28;
-    const real t150 = t148 + t149;
-    const real t151 = gain[13] * t39;
-    const real t152 = t150 + t151;
-    const real t153 = gain[14] * t50;
-    const real t154 = t152 + t153;
-    const real t155 = gain[15] * t117;
-    const real t156 = t154 + t155;
-    const real t157 = gain[16] * t129;
-    const real t158 = t156 + t157;
-    const real t159 = gain[17] * t140;
-    const real t160 = t158 + t159;
-    const real t161 = y[1] - t160;
-    x[1] = t161;
-    const real t162 = gain[18] * t4;
-    const real t163 = gain[19] * t10;
-    const real t164 = t162 + t163;
-    const real t165 = gain[20] * t17;
-    const real t166 = t164 + t165;
-    const real t167 = gain[21] * t28;
-    const real t168 = t166 + t167;
-    const real t169 = gain[22] * t39;
-    const real t170 = t168 + t169;
-    const real t171 = gain[23] * t50;
-    const real t172 = t170 + t171;
-    const real t173 = gain[24] * t117;
-    const real t174 = t172 + t173;
-    const real t175 = gain[25] * t129;
-    const real t176 = t174 + t175;
-    const real t177 = gain[26] * t140;
-    const real t178 = t176 + t177;
-    const real t179 = y[2] - t178;
-    x[2] = t179;
-    const real t180 = gain[27] * t4;
-    const real t181 = gain[28] * t10;
-    const real t182 = t180 + t181;
-    const real t183 = gain[29] * t17;
-    const real t184 = t182 + t183;
-    const real t185 = gain[30] * t28;
-    const real t186 = t184 + t185;
-    const real t187 = gain[31] * t39;
-    const real t188 = t186 + t187;
-    const real t189 = gain[32] * t50;
-    const real t190 = t188 + t189;
-    const real t191 = gain[33] * t117;
-    const real t192 = t190 + t191;
-    const real t193 = gain[34] * t129;
-    const real t194 = t192 + t193;
-    const real t195 = gain[35] * t140;
-    const real t196 = t194 + t195;
-    const real t197 = y[3] - t196;
-    x[3] = t197;
-    const real t198 = gain[36] * t4;
-    const real t199 = gain[37] * t10;
-    const real t200 = t198 + t199;
-    const real t201 = gain[38] * t17;
-    const real t202 = t200 + t201;
-    const real t203 = gain[39] * t28;
-    const real t204 = t202 + t203;
-    const real t205 = gain[40] * t39;
-    const real t206 = t204 + t205;
-    const real t207 = gain[41] * t50;
-    const real t208 = t206 + t207;
-    const real t209 = gain[42] * t117;
-    const real t210 = t208 + t209;
-    const real t211 = gain[43] * t129;
-    const real t212 = t210 + t211;
-    const real t213 = gain[44] * t140;
-    const real t214 = t212 + t213;
-    const real t215 = y[4] - t214;
-    x[4] = t215;
-    const real t216 = gain[45] * t4;
-    const real t217 = gain[46] * t10;
-    const real t218 = t216 + t217;
-    const real t219 = gain[47] * t17;
-    const real t220 = t218 + t219;
-    const real t221 = gain[48] * t28;
-    const real t222 = t220 + t221;
-    const real t223 = gain[49] * t39;
-    const real t224 = t222 + t223;
-    const real t225 = gain[50] * t50;
-    const real t226 = t224 + t225;
-    const real t227 = gain[51] * t117;
-    const real t228 = t226 + t227;
-    const real t229 = gain[52] * t129;
-    const real t230 = t228 + t229;
-    const real t231 = gain[53] * t140;
-    const real t232 = t230 + t231;
-    const real t233 = y[5] - t232;
-    x[5] = t233;
-    const real t234 = B[0] * t143;
-    const real t235 = B[9] * t161;
-    const real t236 = t234 + t235;
-    const real t237 = B[18] * t179;
-    const real t238 = t236 + t237;
-    const real t239 = B[27] * t197;
-    const real t240 = t238 + t239;
-    const real t241 = B[36] * t215;
-    const real t242 = t240 + t241;
-    const real t243 = B[45] * t233;
-    const real t244 = t242 + t243;
-    const real t245 = t4 + t244;
-    z[0] = t245;
-    const real t246 = B[1] * t143;
-    const real t247 = B[10] * t161;
-    const real t248 = t246 + t247;
-    const real t249 = B[19] * t179;
-    const real t250 = t248 + t249;
-    const real t251 = B[28] * t197;
-    const real t252 = t250 + t251;
-    const real t253 = B[37] * t215;
-    const real t254 = t252 + t253;
-    const real t255 = B[46] * t233;
-    const real t256 = t254 + t255;
-    const real t257 = t10 + t256;
-    z[1] = t257;
-    const real t258 = B[2] * t143;
-    const real t259 = B[11] * t161;
-    const real t260 = t258 + t259;
-    const real t261 = B[20] * t179;
-    const real t262 = t260 + t261;
-    const real t263 = B[29] * t197;
-    const real t264 = t262 + t263;
-    const real t265 = B[38] * t215;
-    const real t266 = t264 + t265;
-    const real t267 = B[47] * t233;
-    const real t268 = t266 + t267;
-    const real t269 = t17 + t268;
-    z[2] = t269;
-    const real t270 = B[3] * t143;
-    const real t271 = B[12] * t161;
-    const real t272 = t270 + t271;
-    const real t273 = B[21] * t179;
-    const real t274 = t272 + t273;
-    const real t275 = B[30] * t197;
-    const real t276 = t274 + t275;
-    const real t277 = B[39] * t215;
-    const real t278 = t276 + t277;
-    const real t279 = B[48] * t233;
-    const real t280 = t278 + t279;
-    const real t281 = t28 + t280;
-    z[3] = t281;
-    const real t282 = B[4] * t143;
-    const real t283 = B[13] * t161;
-    const real t284 = t282 + t283;
-    const real t285 = B[22] * t179;
-    const real t286 = t284 + t285;
-    const real t287 = B[31] * t197;
-    const real t288 = t286 + t287;
-    const real t289 = B[40] * t215;
-    const real t290 = t288 + t289;
-    const real t291 = B[49] * t233;
-    const real t292 = t290 + t291;
-    const real t293 = t39 + t292;
-    z[4] = t293;
-    const real t294 = B[5] * t143;
-    const real t295 = B[14] * t161;
-    const real t296 = t294 + t295;
-    const real t297 = B[23] * t179;
-    const real t298 = t296 + t297;
-    const real t299 = B[32] * t197;
-    const real t300 = t298 + t299;
-    const real t301 = B[41] * t215;
-    const real t302 = t300 + t301;
-    const real t303 = B[50] * t233;
-    const real t304 = t302 + t303;
-    const real t305 = t50 + t304;
-    z[5] = t305;
-    const real t306 = B[6] * t143;
-    const real t307 = B[15] * t161;
-    const real t308 = t306 + t307;
-    const real t309 = B[24] * t179;
-    const real t310 = t308 + t309;
-    const real t311 = B[33] * t197;
-    const real t312 = t310 + t311;
-    const real t313 = B[42] * t215;
-    const real t314 = t312 + t313;
-    const real t315 = B[51] * t233;
-    const real t316 = t314 + t315;
-    const real t317 = t117 + t316;
-    z[6] = t317;
-    const real t318 = B[7] * t143;
-    const real t319 = B[16] * t161;
-    const real t320 = t318 + t319;
-    const real t321 = B[25] * t179;
-    const real t322 = t320 + t321;
-    const real t323 = B[34] * t197;
-    const real t324 = t322 + t323;
-    const real t325 = B[43] * t215;
-    const real t326 = t324 + t325;
-    const real t327 = B[52] * t233;
-    const real t328 = t326 + t327;
-    const real t329 = t129 + t328;
-    z[7] = t329;
-    const real t330 = B[8] * t143;
-    const real t331 = B[17] * t161;
-    const real t332 = t330 + t331;
-    const real t333 = B[26] * t179;
-    const real t334 = t332 + t333;
-    const real t335 = B[35] * t197;
-    const real t336 = t334 + t335;
-    const real t337 = B[44] * t215;
-    const real t338 = t336 + t337;
-    const real t339 = B[53] * t233;
-    const real t340 = t338 + t339;
-    const real t341 = t140 + t340;
-    z[8] = t341;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t10 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t17 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t28 = w[2] * t10 - w[1] * t17 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]);
+  real t39 = w[0] * t17 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]);
+  real t50 = w[1] * t4 - w[0] * t10 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]);
+  real t53 = v[2] * 2.0;
+  real t55 = v[1] * 2.0;
+  real t59 = r[1] * w_I[1];
+  real t60 = r[2] * w_I[2];
+  real t63 = r[0] * w_I[1];
+  real t65 = r[1] * w_I[0];
+  real t68 = r[0] * w_I[2];
+  real t70 = r[2] * w_I[0];
+  real t78 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t59 + t60) - (z_I[1] * (2.0 * t63 - t65) + z_I[2]
+    * (2.0 * t68 - t70)) - r[1] * z_I[5]));
+  real t81 = r[0] * w_I[0];
+  real t88 = r[1] * w_I[2];
+  real t90 = r[2] * w_I[1];
+  real t97 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t60 + t81) - z_I[0] * (2.0 * t65 - t63) - z_I[2] *
+    (2.0 * t88 - t90)) - r[2] * z_I[3]);
+  real t114 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t59 + t81) - z_I[0] * (2.0 * t70 - t68) - z_I[1]
+    * (2.0 * t90 - t88) - r[0] * z_I[4]));
+  real t117 = t10 * t53 - t17 * t55 + (Rc[0] * t78 + Rc[3] * t97 + Rc[6] * t114);
+  real t120 = v[0] * 2.0;
+  real t129 = t17 * t120 - t4 * t53 + (Rc[1] * t78 + Rc[4] * t97 + Rc[7] * t114);
+  real t140 = t4 * t55 - t10 * t120 + (Rc[2] * t78 + Rc[5] * t97 + Rc[8] * t114);
+  real t143 = y[0] - (gain[0] * t4 + gain[1] * t10 + gain[2] * t17 + gain[3] * t28 + gain[4] * t39 +
+    gain[5] * t50 + gain[6] * t117 + gain[7] * t129 + gain[8] * t140);
+  x[0] = t143;
+  real t161 = y[1] - (gain[9] * t4 + gain[10] * t10 + gain[11] * t17 + gain[12] * t28 + gain[13] *
+    t39 + gain[14] * t50 + gain[15] * t117 + gain[16] * t129 + gain[17] * t140);
+  x[1] = t161;
+  real t179 = y[2] - (gain[18] * t4 + gain[19] * t10 + gain[20] * t17 + gain[21] * t28 + gain[22] *
+    t39 + gain[23] * t50 + gain[24] * t117 + gain[25] * t129 + gain[26] * t140);
+  x[2] = t179;
+  real t197 = y[3] - (gain[27] * t4 + gain[28] * t10 + gain[29] * t17 + gain[30] * t28 + gain[31] *
+    t39 + gain[32] * t50 + gain[33] * t117 + gain[34] * t129 + gain[35] * t140);
+  x[3] = t197;
+  real t215 = y[4] - (gain[36] * t4 + gain[37] * t10 + gain[38] * t17 + gain[39] * t28 + gain[40] *
+    t39 + gain[41] * t50 + gain[42] * t117 + gain[43] * t129 + gain[44] * t140);
+  x[4] = t215;
+  real t233 = y[5] - (gain[45] * t4 + gain[46] * t10 + gain[47] * t17 + gain[48] * t28 + gain[49] *
+    t39 + gain[50] * t50 + gain[51] * t117 + gain[52] * t129 + gain[53] * t140);
+  x[5] = t233;
+  z[0] = t4 + (B[0] * t143 + B[9] * t161 + B[18] * t179 + B[27] * t197 + B[36] * t215 + B[45] *
+    t233);
+  z[1] = t10 + (B[1] * t143 + B[10] * t161 + B[19] * t179 + B[28] * t197 + B[37] * t215 + B[46] *
+    t233);
+  z[2] = t17 + (B[2] * t143 + B[11] * t161 + B[20] * t179 + B[29] * t197 + B[38] * t215 + B[47] *
+    t233);
+  z[3] = t28 + (B[3] * t143 + B[12] * t161 + B[21] * t179 + B[30] * t197 + B[39] * t215 + B[48] *
+    t233);
+  z[4] = t39 + (B[4] * t143 + B[13] * t161 + B[22] * t179 + B[31] * t197 + B[40] * t215 + B[49] *
+    t233);
+  z[5] = t50 + (B[5] * t143 + B[14] * t161 + B[23] * t179 + B[32] * t197 + B[41] * t215 + B[50] *
+    t233);
+  z[6] = t117 + (B[6] * t143 + B[15] * t161 + B[24] * t179 + B[33] * t197 + B[42] * t215 + B[51] *
+    t233);
+  z[7] = t129 + (B[7] * t143 + B[16] * t161 + B[25] * t179 + B[34] * t197 + B[43] * t215 + B[52] *
+    t233);
+  z[8] = t140 + (B[8] * t143 + B[17] * t161 + B[26] * t179 + B[35] * t197 + B[44] * t215 + B[53] *
+    t233);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_solution_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_solution(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_solution_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 54, "", 0, 0},
-    {"gain", 54, "", 0, 0},
-    {"y", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_solution_outputs[] = {
-    {"x", 6, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_solution, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1]))
 
 /* a right-hand side carried across a hinge with 6 free speeds and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -12114,344 +3377,65 @@ static const mstmm_port mstmm_sweep_generic6_tangent_solution_outputs[] = {
  * out y[6] D^-1 times the remainder of the rows
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_generic6_tangent_load_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict H, const real *restrict V,
-    const real *restrict inverse, const real *restrict e, const real *restrict e_f,
-    const real *restrict e_b, real *restrict y, real *restrict e_I)
+int mstmm_sweep_generic6_tangent_load_with_increments(in_t Rc, in_t r, in_t H, in_t V, in_t inverse,
+    in_t e, in_t e_f, in_t e_b, out_t y, out_t e_I)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[6] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = e_f[0] + t10;
-    const real t12 = inverse[0] * t11;
-    const real t13 = H[1] * e[0];
-    const real t14 = H[7] * e[1];
-    const real t15 = t13 + t14;
-    const real t16 = H[13] * e[2];
-    const real t17 = t15 + t16;
-    const real t18 = H[19] * e[3];
-    const real t19 = t17 + t18;
-    const real t20 = H[25] * e[4];
-    const real t21 = t19 + t20;
-    const real t22 = H[31] * e[5];
-    const real t23 = t21 + t22;
-    const real t24 = e_f[1] + t23;
-    const real t25 = inverse[1] * t24;
-    const real t26 = t12 + t25;
-    const real t27 = H[2] * e[0];
-    const real t28 = H[8] * e[1];
-    const real t29 = t27 + t28;
-    const real t30 = H[14] * e[2];
-    const real t31 = t29 + t30;
-    const real t32 = H[20] * e[3];
-    const real t33 = t31 + t32;
-    const real t34 = H[26] * e[4];
-    const real t35 = t33 + t34;
-    const real t36 = H[32] * e[5];
-    const real t37 = t35 + t36;
-    const real t38 = e_f[2] + t37;
-    const real t39 = inverse[2] * t38;
-    const real t40 = t26 + t39;
-    const real t41 = H[3] * e[0];
-    const real t42 = H[9] * e[1];
-    const real t43 = t41 + t42;
-    const real t44 = H[15] * e[2];
-    const real t45 = t43 + t44;
-    const real t46 = H[21] * e[3];
-    const real t47 = t45 + t46;
-    const real t48 = H[27] * e[4];
-    const real t49 = t47 + t48;
-    const real t50 = H[33] * e[5];
-    const real t51 = t49 + t50;
-    const real t52 = e_f[3] + t51;
-    const real t53 = inverse[3] * t52;
-    const real t54 = t40 + t53;
-    const real t55 = H[4] * e[0];
-    const real t56 = H[10] * e[1];
-    const real t57 = t55 + t56;
-    const real t58 = H[16] * e[2];
-    const real t59 = t57 + t58;
-    const real t60 = H[22] * e[3];
-    const real t61 = t59 + t60;
-    const real t62 = H[28] * e[4];
-    const real t63 = t61 + t62;
-    const real t64 = H[34] * e[5];
-    const real t65 = t63 + t64;
-    const real t66 = e_f[4] + t65;
-    const real t67 = inverse[4] * t66;
-    const real t68 = t54 + t67;
-    const real t69 = H[5] * e[0];
-    const real t70 = H[11] * e[1];
-    const real t71 = t69 + t70;
-    const real t72 = H[17] * e[2];
-    const real t73 = t71 + t72;
-    const real t74 = H[23] * e[3];
-    const real t75 = t73 + t74;
-    const real t76 = H[29] * e[4];
-    const real t77 = t75 + t76;
-    const real t78 = H[35] * e[5];
-    const real t79 = t77 + t78;
-    const real t80 = e_f[5] + t79;
-    const real t81 = inverse[5] * t80;
-    const real t82 = t68 + t81;
-    const real t83 = -t82;
-    y[0] = t83;
-    const real t84 = inverse[6] * t11;
-    const real t85 = inverse[7] * t24;
-    const real t86 = t84 + t85;
-    const real t87 = inverse[8] * t38;
-    const real t88 = t86 + t87;
-    const real t89 = inverse[9] * t52;
-    const real t90 = t88 + t89;
-    const real t91 = inverse[10] * t66;
-    const real t92 = t90 + t91;
-    const real t93 = inverse[11] * t80;
-    const real t94 = t92 + t93;
-    const real t95 = -t94;
-    y[1] = t95;
-    const real t96 = inverse[12] * t11;
-    const real t97 = inverse[13] * t24;
-    const real t98 = t96 + t97;
-    const real t99 = inverse[14] * t38;
-    const real t100 = t98 + t99;
-    const real t101 = inverse[15] * t52;
-    const real t102 = t100 + t101;
-    const real t103 = inverse[16] * t66;
-    const real t104 = t102 + t103;
-    const real t105 = inverse[17] * t80;
-    const real t106 = t104 + t105;
-    const real t107 = -t106;
-    y[2] = t107;
-    const real t108 = inverse[18] * t11;
-    const real t109 = inverse[19] * t24;
-    const real t110 = t108 + t109;
-    const real t111 = inverse[20] * t38;
-    const real t112 = t110 + t111;
-    const real t113 = inverse[21] * t52;
-    const real t114 = t112 + t113;
-    const real t115 = inverse[22] * t66;
-    const real t116 = t114 + t115;
-    const real t117 = inverse[23] * t80;
-    const real t118 = t116 + t117;
-    const real t119 = -t118;
-    y[3] = t119;
-    const real t120 = inverse[24] * t11;
-    const real t121 = inverse[25] * t24;
-    const real t122 = t120 + t121;
-    const real t123 = inverse[26] * t38;
-    const real t124 = t122 + t123;
-    const real t125 = inverse[27] * t52;
-    const real t126 = t124 + t125;
-    const real t127 = inverse[28] * t66;
-    const real t128 = t126 + t127;
-    const real t129 = inverse[29] * t80;
-    const real t130 = t128 + t129;
-    const real t131 = -t130;
-    y[4] = t131;
-    const real t132 = inverse[30] * t11;
-    const real t133 = inverse[31] * t24;
-    const real t134 = t132 + t133;
-    const real t135 = inverse[32] * t38;
-    const real t136 = t134 + t135;
-    const real t137 = inverse[33] * t52;
-    const real t138 = t136 + t137;
-    const real t139 = inverse[34] * t66;
-    const real t140 = t138 + t139;
-    const real t141 = inverse[35] * t80;
-    const real t142 = t140 + t141;
-    const real t143 = -t142;
-    y[5] = t143;
-    const real t144 = V[0] * t82;
-    const real t145 = V[6] * t94;
-    const real t146 = t144 + t145;
-    const real t147 = V[12] * t106;
-    const real t148 = t146 + t147;
-    const real t149 = V[18] * t118;
-    const real t150 = t148 + t149;
-    const real t151 = V[24] * t130;
-    const real t152 = t150 + t151;
-    const real t153 = V[30] * t142;
-    const real t154 = t152 + t153;
-    const real t155 = e[0] - t154;
-    const real t156 = e_b[0] + t155;
-    const real t157 = Rc[0] * t156;
-    const real t158 = V[1] * t82;
-    const real t159 = V[7] * t94;
-    const real t160 = t158 + t159;
-    const real t161 = V[13] * t106;
-    const real t162 = t160 + t161;
-    const real t163 = V[19] * t118;
-    const real t164 = t162 + t163;
-    const real t165 = V[25] * t130;
-    const real t166 = t164 + t165;
-    const real t167 = V[31] * t142;
-    const real t168 = t166 + t167;
-    const real t169 = e[1] - t168;
-    const real t170 = e_b[1] + t169;
-    const real t171 = Rc[1] * t170;
-    const real t172 = t157 + t171;
-    const real t173 = V[2] * t82;
-    const real t174 = V[8] * t94;
-    const real t175 = t173 + t174;
-    const real t176 = V[14] * t106;
-    const real t177 = t175 + t176;
-    const real t178 = V[20] * t118;
-    const real t179 = t177 + t178;
-    const real t180 = V[26] * t130;
-    const real t181 = t179 + t180;
-    const real t182 = V[32] * t142;
-    const real t183 = t181 + t182;
-    const real t184 = e[2] - t183;
-    const real t185 = e_b[2] + t184;
-    const real t186 = Rc[2] * t185;
-    const real t187 = t172 + t186;
-    e_I[0] += t187;
-    const real t188 = Rc[3] * t156;
-    const real t189 = Rc[4] * t170;
-    const real t190 = t188 + t189;
-    const real t191 = Rc[5] * t185;
-    const real t192 = t190 + t191;
-    e_I[1] += t192;
-    const real t193 = Rc[6] * t156;
-    const real t194 = Rc[7] * t170;
-    const real t195 = t193 + t194;
-    const real t196 = Rc[8] * t185;
-    const real t197 = t195 + t196;
-    e_I[2] += t197;
-    const real t198 = V[3] * t82;
-    const real t199 = V[9] * t94;
-    const real t200 = t198 + t199;
-    const real t201 = V[15] * t106;
-    const real t202 = t200 + t201;
-    const real t203 = V[21] * t118;
-    const real t204 = t202 + t203;
-    const real t205 = V[27] * t130;
-    const real t206 = t204 + t205;
-    const real t207 = V[33] * t142;
-    const real t208 = t206 + t207;
-    const real t209 = e[3] - t208;
-    const real t210 = e_b[3] + t209;
-    const real t211 = Rc[0] * t210;
-    const real t212 = V[4] * t82;
-    const real t213 = V[10] * t94;
-    const real t214 = t212 + t213;
-    const real t215 = V[16] * t106;
-    const real t216 = t214 + t215;
-    const real t217 = V[22] * t118;
-    const real t218 = t216 + t217;
-    const real t219 = V[28] * t130;
-    const real t220 = t218 + t219;
-    const real t221 = V[34] * t142;
-    const real t222 = t220 + t221;
-    const real t223 = e[4] - t222;
-    const real t224 = e_b[4] + t223;
-    const real t225 = Rc[1] * t224;
-    const real t226 = t211 + t225;
-    const real t227 = V[5] * t82;
-    const real t228 = V[11] * t94;
-    const real t229 = t227 + t228;
-    const real t230 = V[17] * t106;
-    const real t231 = t229 + t230;
-    const real t232 = V[23] * t118;
-    const real t233 = t231 + t232;
-    const real t234 = V[29] * t130;
-    const real t235 = t233 + t234;
-    const real t236 = V[35] * t142;
-    const real t237 = t235 + t236;
-    const real t238 = e[5] - t237;
-    const real t239 = e_b[5] + t238;
-    const real t240 = Rc[2] * t239;
-    const real t241 = t226 + t240;
-    const real t242 = Rc[6] * r[1];
-    const real t243 = Rc[3] * r[2];
-    const real t244 = t242 - t243;
-    const real t245 = t156 * t244;
-    const real t246 = Rc[7] * r[1];
-    const real t247 = Rc[4] * r[2];
-    const real t248 = t246 - t247;
-    const real t249 = t170 * t248;
-    const real t250 = t245 + t249;
-    const real t251 = Rc[8] * r[1];
-    const real t252 = Rc[5] * r[2];
-    const real t253 = t251 - t252;
-    const real t254 = t185 * t253;
-    const real t255 = t250 + t254;
-    const real t256 = t241 + t255;
-    e_I[3] += t256;
-    const real t257 = Rc[3] * t210;
-    const real t258 = Rc[4] * t224;
-    const real t259 = t257 + t258;
-    const real t260 = Rc[5] * t239;
-    const real t261 = t259 + t260;
-    const real t262 = Rc[0] * r[2];
-    const real t263 = Rc[6] * r[0];
-    const real t264 = t262 - t263;
-    const real t265 = t156 * t264;
-    const real t266 = Rc[1] * r[2];
-    const real t267 = Rc[7] * r[0];
-    const real t268 = t266 - t267;
-    const real t269 = t170 * t268;
-    const real t270 = t265 + t269;
-    const real t271 = Rc[2] * r[2];
-    const real t272 = Rc[8] * r[0];
-    const real t273 = t271 - t272;
-    const real t274 = t185 * t273;
-    const real t275 = t270 + t274;
-    const real t276 = t261 + t275;
-    e_I[4] += t276;
-    const real t277 = Rc[6] * t210;
-    const real t278 = Rc[7] * t224;
-    const real t279 = t277 + t278;
-    const real t280 = Rc[8] * t239;
-    const real t281 = t279 + t280;
-    const real t282 = Rc[3] * r[0];
-    const real t283 = Rc[0] * r[1];
-    const real t284 = t282 - t283;
-    const real t285 = t156 * t284;
-    const real t286 = Rc[4] * r[0];
-    const real t287 = Rc[1] * r[1];
-    const real t288 = t286 - t287;
-    const real t289 = t170 * t288;
-    const real t290 = t285 + t289;
-    const real t291 = Rc[5] * r[0];
-    const real t292 = Rc[2] * r[1];
-    const real t293 = t291 - t292;
-    const real t294 = t185 * t293;
-    const real t295 = t290 + t294;
-    const real t296 = t281 + t295;
-    e_I[5] += t296;
-    return 0;
+  real t11 = e_f[0] + (H[0] * e[0] + H[6] * e[1] + H[12] * e[2] + H[18] * e[3] + H[24] * e[4] +
+    H[30] * e[5]);
+  real t24 = e_f[1] + (H[1] * e[0] + H[7] * e[1] + H[13] * e[2] + H[19] * e[3] + H[25] * e[4] +
+    H[31] * e[5]);
+  real t38 = e_f[2] + (H[2] * e[0] + H[8] * e[1] + H[14] * e[2] + H[20] * e[3] + H[26] * e[4] +
+    H[32] * e[5]);
+  real t52 = e_f[3] + (H[3] * e[0] + H[9] * e[1] + H[15] * e[2] + H[21] * e[3] + H[27] * e[4] +
+    H[33] * e[5]);
+  real t66 = e_f[4] + (H[4] * e[0] + H[10] * e[1] + H[16] * e[2] + H[22] * e[3] + H[28] * e[4] +
+    H[34] * e[5]);
+  real t80 = e_f[5] + (H[5] * e[0] + H[11] * e[1] + H[17] * e[2] + H[23] * e[3] + H[29] * e[4] +
+    H[35] * e[5]);
+  real t82 = inverse[0] * t11 + inverse[1] * t24 + inverse[2] * t38 + inverse[3] * t52 + inverse[4]
+    * t66 + inverse[5] * t80;
+  y[0] = -t82;
+  real t94 = inverse[6] * t11 + inverse[7] * t24 + inverse[8] * t38 + inverse[9] * t52 + inverse[10]
+    * t66 + inverse[11] * t80;
+  y[1] = -t94;
+  real t106 = inverse[12] * t11 + inverse[13] * t24 + inverse[14] * t38 + inverse[15] * t52 +
+    inverse[16] * t66 + inverse[17] * t80;
+  y[2] = -t106;
+  real t118 = inverse[18] * t11 + inverse[19] * t24 + inverse[20] * t38 + inverse[21] * t52 +
+    inverse[22] * t66 + inverse[23] * t80;
+  y[3] = -t118;
+  real t130 = inverse[24] * t11 + inverse[25] * t24 + inverse[26] * t38 + inverse[27] * t52 +
+    inverse[28] * t66 + inverse[29] * t80;
+  y[4] = -t130;
+  real t142 = inverse[30] * t11 + inverse[31] * t24 + inverse[32] * t38 + inverse[33] * t52 +
+    inverse[34] * t66 + inverse[35] * t80;
+  y[5] = -t142;
+  real t156 = e_b[0] + (e[0] - (V[0] * t82 + V[6] * t94 + V[12] * t106 + V[18] * t118 + V[24] * t130
+    + V[30] * t142));
+  real t170 = e_b[1] + (e[1] - (V[1] * t82 + V[7] * t94 + V[13] * t106 + V[19] * t118 + V[25] * t130
+    + V[31] * t142));
+  real t185 = e_b[2] + (e[2] - (V[2] * t82 + V[8] * t94 + V[14] * t106 + V[20] * t118 + V[26] * t130
+    + V[32] * t142));
+  e_I[0] += Rc[0] * t156 + Rc[1] * t170 + Rc[2] * t185;
+  e_I[1] += Rc[3] * t156 + Rc[4] * t170 + Rc[5] * t185;
+  e_I[2] += Rc[6] * t156 + Rc[7] * t170 + Rc[8] * t185;
+  real t210 = e_b[3] + (e[3] - (V[3] * t82 + V[9] * t94 + V[15] * t106 + V[21] * t118 + V[27] * t130
+    + V[33] * t142));
+  real t224 = e_b[4] + (e[4] - (V[4] * t82 + V[10] * t94 + V[16] * t106 + V[22] * t118 + V[28] *
+    t130 + V[34] * t142));
+  real t239 = e_b[5] + (e[5] - (V[5] * t82 + V[11] * t94 + V[17] * t106 + V[23] * t118 + V[29] *
+    t130 + V[35] * t142));
+  e_I[3] += Rc[0] * t210 + Rc[1] * t224 + Rc[2] * t239 + (t156 * (Rc[6] * r[1] - Rc[3] * r[2]) +
+    t170 * (Rc[7] * r[1] - Rc[4] * r[2]) + t185 * (Rc[8] * r[1] - Rc[5] * r[2]));
+  e_I[4] += Rc[3] * t210 + Rc[4] * t224 + Rc[5] * t239 + (t156 * (Rc[0] * r[2] - Rc[6] * r[0]) +
+    t170 * (Rc[1] * r[2] - Rc[7] * r[0]) + t185 * (Rc[2] * r[2] - Rc[8] * r[0]));
+  e_I[5] += Rc[6] * t210 + Rc[7] * t224 + Rc[8] * t239 + (t156 * (Rc[3] * r[0] - Rc[0] * r[1]) +
+    t170 * (Rc[4] * r[0] - Rc[1] * r[1]) + t185 * (Rc[5] * r[0] - Rc[2] * r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_load_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_load_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_load_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"V", 36, "", 0, 0},
-    {"inverse", 36, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 6, "", 0, 0},
-    {"e_b", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_load_with_increments_outputs[] = {
-    {"y", 6, "", 0, 0},
-    {"e_I", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_load_with_increments, (in[0], in[1], in[2], in[3], in[4],
+  in[5], in[6], in[7], out[0], out[1]))
 
 /* solution of a hinge with 6 free speeds for a right-hand side and known increments
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -12469,1208 +3453,256 @@ static const mstmm_port mstmm_sweep_generic6_tangent_load_with_increments_output
  * out x[6] unknowns
  * out z[9] change of the body's motion, own axes
  */
-int mstmm_sweep_generic6_tangent_solution_with_increments(const real *restrict Rc,
-    const real *restrict r, const real *restrict w_I, const real *restrict v,
-    const real *restrict w, const real *restrict z_I, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict b, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_generic6_tangent_solution_with_increments(in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t z_I, in_t B, in_t gain, in_t y, in_t b, out_t x, out_t z)
 {
-    const real t0 = Rc[0] * z_I[0];
-    const real t1 = Rc[3] * z_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[6] * z_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = b[0] + t4;
-    const real t6 = gain[0] * t5;
-    const real t7 = Rc[1] * z_I[0];
-    const real t8 = Rc[4] * z_I[1];
-    const real t9 = t7 + t8;
-    const real t10 = Rc[7] * z_I[2];
-    const real t11 = t9 + t10;
-    const real t12 = b[1] + t11;
-    const real t13 = gain[1] * t12;
-    const real t14 = t6 + t13;
-    const real t15 = Rc[2] * z_I[0];
-    const real t16 = Rc[5] * z_I[1];
-    const real t17 = t15 + t16;
-    const real t18 = Rc[8] * z_I[2];
-    const real t19 = t17 + t18;
-    const real t20 = b[2] + t19;
-    const real t21 = gain[2] * t20;
-    const real t22 = t14 + t21;
-    const real t23 = w[2] * t11;
-    const real t24 = w[1] * t19;
-    const real t25 = t23 - t24;
-    const real t26 = Rc[0] * z_I[3];
-    const real t27 = Rc[3] * z_I[4];
-    const real t28 = t26 + t27;
-    const real t29 = Rc[6] * z_I[5];
-    const real t30 = t28 + t29;
-    const real t31 = t25 + t30;
-    const real t32 = b[3] + t31;
-    const real t33 = gain[3] * t32;
-    const real t34 = t22 + t33;
-    const real t35 = w[0] * t19;
-    const real t36 = w[2] * t4;
-    const real t37 = t35 - t36;
-    const real t38 = Rc[1] * z_I[3];
-    const real t39 = Rc[4] * z_I[4];
-    const real t40 = t38 + t39;
-    const real t41 = Rc[7] * z_I[5];
-    const real t42 = t40 + t41;
-    const real t43 = t37 + t42;
-    const real t44 = b[4] + t43;
-    const real t45 = gain[4] * t44;
-    const real t46 = t34 + t45;
-    const real t47 = w[1] * t4;
-    const real t48 = w[0] * t11;
-    const real t49 = t47 - t48;
-    const real t50 = Rc[2] * z_I[3];
-    const real t51 = Rc[5] * z_I[4];
-    const real t52 = t50 + t51;
-    const real t53 = Rc[8] * z_I[5];
-    const real t54 = t52 + t53;
-    const real t55 = t49 + t54;
-    const real t56 = b[5] + t55;
-    const real t57 = gain[5] * t56;
-    const real t58 = t46 + t57;
-    const real t59 = v[2] * 2.0;
-    const real t60 = t11 * t59;
-    const real t61 = v[1] * 2.0;
-    const real t62 = t19 * t61;
-    const real t63 = t60 - t62;
-    const real t64 = r[2] * z_I[4];
-    const real t65 = r[1] * w_I[1];
-    const real t66 = r[2] * w_I[2];
-    const real t67 = t65 + t66;
-    const real t68 = z_I[0] * t67;
-    const real t69 = r[0] * w_I[1];
-    const real t70 = 2.0 * t69;
-    const real t71 = r[1] * w_I[0];
-    const real t72 = t70 - t71;
-    const real t73 = z_I[1] * t72;
-    const real t74 = r[0] * w_I[2];
-    const real t75 = 2.0 * t74;
-    const real t76 = r[2] * w_I[0];
-    const real t77 = t75 - t76;
-    const real t78 = z_I[2] * t77;
-    const real t79 = t73 + t78;
-    const real t80 = t68 - t79;
-    const real t81 = r[1] * z_I[5];
-    const real t82 = t80 - t81;
-    const real t83 = t64 + t82;
-    const real t84 = z_I[6] + t83;
-    const real t85 = Rc[0] * t84;
-    const real t86 = r[0] * z_I[5];
-    const real t87 = r[0] * w_I[0];
-    const real t88 = t66 + t87;
-    const real t89 = z_I[1] * t88;
-    const real t90 = 2.0 * t71;
-    const real t91 = t90 - t69;
-    const real t92 = z_I[0] * t91;
-    const real t93 = t89 - t92;
-    const real t94 = r[1] * w_I[2];
-    const real t95 = 2.0 * t94;
-    const real t96 = r[2] * w_I[1];
-    const real t97 = t95 - t96;
-    const real t98 = z_I[2] * t97;
-    const real t99 = t93 - t98;
-    const real t100 = t86 + t99;
-    const real t101 = r[2] * z_I[3];
-    const real t102 = t100 - t101;
-    const real t103 = z_I[7] + t102;
-    const real t104 = Rc[3] * t103;
-    const real t105 = t85 + t104;
-    const real t106 = r[1] * z_I[3];
-    const real t107 = t65 + t87;
-    const real t108 = z_I[2] * t107;
-    const real t109 = 2.0 * t76;
-    const real t110 = t109 - t74;
-    const real t111 = z_I[0] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = 2.0 * t96;
-    const real t114 = t113 - t94;
-    const real t115 = z_I[1] * t114;
-    const real t116 = t112 - t115;
-    const real t117 = r[0] * z_I[4];
-    const real t118 = t116 - t117;
-    const real t119 = t106 + t118;
-    const real t120 = z_I[8] + t119;
-    const real t121 = Rc[6] * t120;
-    const real t122 = t105 + t121;
-    const real t123 = t63 + t122;
-    const real t124 = b[6] + t123;
-    const real t125 = gain[6] * t124;
-    const real t126 = t58 + t125;
-    const real t127 = v[0] * 2.0;
-    const real t128 = t19 * t127;
-    const real t129 = t4 * t59;
-    const real t130 = t128 - t129;
-    const real t131 = Rc[1] * t84;
-    const real t132 = Rc[4] * t103;
-    const real t133 = t131 + t132;
-    const real t134 = Rc[7] * t120;
-    const real t135 = t133 + t134;
-    const real t136 = t130 + t135;
-    const real t137 = b[7] + t136;
-    const real t138 = gain[7] * t137;
-    const real t139 = t126 + t138;
-    const real t140 = t4 * t61;
-    const real t141 = t11 * t127;
-    const real t142 = t140 - t141;
-    const real t143 = Rc[2] * t84;
-    const real t144 = Rc[5] * t103;
-    const real t145 = t143 + t144;
-    const real t146 = Rc[8] * t120;
-    const real t147 = t145 + t146;
-    const real t148 = t142 + t147;
-    const real t149 = b[8] + t148;
-    const real t150 = gain[8] * t149;
-    const real t151 = t139 + t150;
-    const real t152 = y[0] - t151;
-    x[0] = t152;
-    const real t153 = gain[9] * t5;
-    const real t154 = gain[10] * t12;
-    const real t155 = t153 + t154;
-    const real t156 = gain[11] * t20;
-    const real t157 = t155 + t156;
-    const real t158 = gain[12] * t32;
-    const real t159 = t157 + t158;
-    const real t160 = gain[13] * t44;
-    const real t161 = t159 + t160;
-    const real t162 = gain[14] * t56;
-    const real t163 = t161 + t162;
-    const real t164 = gain[15] * t124;
-    const real t165 = t163 + t164;
-    const real t166 = gain[16] * t137;
-    const real t167 = t165 + t166;
-    const real t168 = gain[17] * t149;
-    const real t169 = t167 + t168;
-    const real t170 = y[1] - t169;
-    x[1] = t170;
-    const real t171 = gain[18] * t5;
-    const real t172 = gain[19] * t12;
-    const real t173 = t171 + t172;
-    const real t174 = gain[20] * t20;
-    const real t175 = t173 + t174;
-    const real t176 = gain[21] * t32;
-    const real t177 = t175 + t176;
-    const real t178 = gain[22] * t44;
-    const real t179 = t177 + t178;
-    const real t180 = gain[23] * t56;
-    const real t181 = t179 + t180;
-    const real t182 = gain[24] * t124;
-    const real t183 = t181 + t182;
-    const real t184 = gain[25] * t137;
-    const real t185 = t183 + t184;
-    const real t186 = gain[26] * t149;
-    const real t187 = t185 + t186;
-    const real t188 = y[2] - t187;
-    x[2] = t188;
-    const real t189 = gain[27] * t5;
-    const real t190 = gain[28] * t12;
-    const real t191 = t189 + t190;
-    const real t192 = gain[29] * t20;
-    const real t193 = t191 + t192;
-    const real t194 = gain[30] * t32;
-    const real t195 = t193 + t194;
-    const real t196 = gain[31] * t44;
-    const real t197 = t195 + t196;
-    const real t198 = gain[32] * t56;
-    const real t199 = t197 + t198;
-    const real t200 = gain[33] * t124;
-    const real t201 = t199 + t200;
-    const real t202 = gain[34] * t137;
-    const real t203 = t201 + t202;
-    const real t204 = gain[35] * t149;
-    const real t205 = t203 + t204;
-    const real t206 = y[3] - t205;
-    x[3] = t206;
-    const real t207 = gain[36] * t5;
-    const real t208 = gain[37] * t12;
-    const real t209 = t207 + t208;
-    const real t210 = gain[38] * t20;
-    const real t211 = t209 + t210;
-    const real t212 = gain[39] * t32;
-    const real t213 = t211 + t212;
-    const real t214 = gain[40] * t44;
-    const real t215 = t213 + t214;
-    const real t216 = gain[41] * t56;
-    const real t217 = t215 + t216;
-    const real t218 = gain[42] * t124;
-    const real t219 = t217 + t218;
-    const real t220 = gain[43] * t137;
-    const real t221 = t219 + t220;
-    const real t222 = gain[44] * t149;
-    const real t223 = t221 + t222;
-    const real t224 = y[4] - t223;
-    x[4] = t224;
-    const real t225 = gain[45] * t5;
-    const real t226 = gain[46] * t12;
-    const real t227 = t225 + t226;
-    const real t228 = gain[47] * t20;
-    const real t229 = t227 + t228;
-    const real t230 = gain[48] * t32;
-    const real t231 = t229 + t230;
-    const real t232 = gain[49] * t44;
-    const real t233 = t231 + t232;
-    const real t234 = gain[50] * t56;
-    const real t235 = t233 + t234;
-    const real t236 = gain[51] * t124;
-    const real t237 = t235 + t236;
-    const real t238 = gain[52] * t137;
-    const real t239 = t237 + t238;
-    const real t240 = gain[53] * t149;
-    const real t241 = t239 + t240;
-    const real t242 = y[5] - t241;
-    x[5] = t242;
-    const real t243 = B[0] * t152;
-    const real t244 = B[9] * t170;
-    const real t245 = t243 + t244;
-    const real t246 = B[18] * t188;
-    const real t247 = t245 + t246;
-    const real t248 = B[27] * t206;
-    const real t249 = t247 + t248;
-    const real t250 = B[36] * t224;
-    const real t251 = t249 + t250;
-    const real t252 = B[45] * t242;
-    const real t253 = t251 + t252;
-    const real t254 = t5 + t253;
-    z[0] = t254;
-    const real t255 = B[1] * t152;
-    const real t256 = B[10] * t170;
-    const real t257 = t255 + t256;
-    const real t258 = B[19] * t188;
-    const real t259 = t257 + t258;
-    const real t260 = B[28] * t206;
-    const real t261 = t259 + t260;
-    const real t262 = B[37] * t224;
-    const real t263 = t261 + t262;
-    const real t264 = B[46] * t242;
-    const real t265 = t263 + t264;
-    const real t266 = t12 + t265;
-    z[1] = t266;
-    const real t267 = B[2] * t152;
-    const real t268 = B[11] * t170;
-    const real t269 = t267 + t268;
-    const real t270 = B[20] * t188;
-    const real t271 = t269 + t270;
-    const real t272 = B[29] * t206;
-    const real t273 = t271 + t272;
-    const real t274 = B[38] * t224;
-    const real t275 = t273 + t274;
-    const real t276 = B[47] * t242;
-    const real t277 = t275 + t276;
-    const real t278 = t20 + t277;
-    z[2] = t278;
-    const real t279 = B[3] * t152;
-    const real t280 = B[12] * t170;
-    const real t281 = t279 + t280;
-    const real t282 = B[21] * t188;
-    const real t283 = t281 + t282;
-    const real t284 = B[30] * t206;
-    const real t285 = t283 + t284;
-    const real t286 = B[39] * t224;
-    const real t287 = t285 + t286;
-    const real t288 = B[48] * t242;
-    const real t289 = t287 + t288;
-    const real t290 = t32 + t289;
-    z[3] = t290;
-    const real t291 = B[4] * t152;
-    const real t292 = B[13] * t170;
-    const real t293 = t291 + t292;
-    const real t294 = B[22] * t188;
-    const real t295 = t293 + t294;
-    const real t296 = B[31] * t206;
-    const real t297 = t295 + t296;
-    const real t298 = B[40] * t224;
-    const real t299 = t297 + t298;
-    const real t300 = B[49] * t242;
-    const real t301 = t299 + t300;
-    const real t302 = t44 + t301;
-    z[4] = t302;
-    const real t303 = B[5] * t152;
-    const real t304 = B[14] * t170;
-    const real t305 = t303 + t304;
-    const real t306 = B[23] * t188;
-    const real t307 = t305 + t306;
-    const real t308 = B[32] * t206;
-    const real t309 = t307 + t308;
-    const real t310 = B[41] * t224;
-    const real t311 = t309 + t310;
-    const real t312 = B[50] * t242;
-    const real t313 = t311 + t312;
-    const real t314 = t56 + t313;
-    z[5] = t314;
-    const real t315 = B[6] * t152;
-    const real t316 = B[15] * t170;
-    const real t317 = t315 + t316;
-    const real t318 = B[24] * t188;
-    const real t319 = t317 + t318;
-    const real t320 = B[33] * t206;
-    const real t321 = t319 + t320;
-    const real t322 = B[42] * t224;
-    const real t323 = t321 + t322;
-    const real t324 = B[51] * t242;
-    const real t325 = t323 + t324;
-    const real t326 = t124 + t325;
-    z[6] = t326;
-    const real t327 = B[7] * t152;
-    const real t328 = B[16] * t170;
-    const real t329 = t327 + t328;
-    const real t330 = B[25] * t188;
-    const real t331 = t329 + t330;
-    const real t332 = B[34] * t206;
-    const real t333 = t331 + t332;
-    const real t334 = B[43] * t224;
-    const real t335 = t333 + t334;
-    const real t336 = B[52] * t242;
-    const real t337 = t335 + t336;
-    const real t338 = t137 + t337;
-    z[7] = t338;
-    const real t339 = B[8] * t152;
-    const real t340 = B[17] * t170;
-    const real t341 = t339 + t340;
-    const real t342 = B[26] * t188;
-    const real t343 = t341 + t342;
-    const real t344 = B[35] * t206;
-    const real t345 = t343 + t344;
-    const real t346 = B[44] * t224;
-    const real t347 = t345 + t346;
-    const real t348 = B[53] * t242;
-    const real t349 = t347 + t348;
-    const real t350 = t149 + t349;
-    z[8] = t350;
-    return 0;
+  real t4 = Rc[0] * z_I[0] + Rc[3] * z_I[1] + Rc[6] * z_I[2];
+  real t5 = b[0] + t4;
+  real t11 = Rc[1] * z_I[0] + Rc[4] * z_I[1] + Rc[7] * z_I[2];
+  real t12 = b[1] + t11;
+  real t19 = Rc[2] * z_I[0] + Rc[5] * z_I[1] + Rc[8] * z_I[2];
+  real t20 = b[2] + t19;
+  real t32 = b[3] + (w[2] * t11 - w[1] * t19 + (Rc[0] * z_I[3] + Rc[3] * z_I[4] + Rc[6] * z_I[5]));
+  real t44 = b[4] + (w[0] * t19 - w[2] * t4 + (Rc[1] * z_I[3] + Rc[4] * z_I[4] + Rc[7] * z_I[5]));
+  real t56 = b[5] + (w[1] * t4 - w[0] * t11 + (Rc[2] * z_I[3] + Rc[5] * z_I[4] + Rc[8] * z_I[5]));
+  real t59 = v[2] * 2.0;
+  real t61 = v[1] * 2.0;
+  real t65 = r[1] * w_I[1];
+  real t66 = r[2] * w_I[2];
+  real t69 = r[0] * w_I[1];
+  real t71 = r[1] * w_I[0];
+  real t74 = r[0] * w_I[2];
+  real t76 = r[2] * w_I[0];
+  real t84 = z_I[6] + (r[2] * z_I[4] + (z_I[0] * (t65 + t66) - (z_I[1] * (2.0 * t69 - t71) + z_I[2]
+    * (2.0 * t74 - t76)) - r[1] * z_I[5]));
+  real t87 = r[0] * w_I[0];
+  real t94 = r[1] * w_I[2];
+  real t96 = r[2] * w_I[1];
+  real t103 = z_I[7] + (r[0] * z_I[5] + (z_I[1] * (t66 + t87) - z_I[0] * (2.0 * t71 - t69) - z_I[2]
+    * (2.0 * t94 - t96)) - r[2] * z_I[3]);
+  real t120 = z_I[8] + (r[1] * z_I[3] + (z_I[2] * (t65 + t87) - z_I[0] * (2.0 * t76 - t74) - z_I[1]
+    * (2.0 * t96 - t94) - r[0] * z_I[4]));
+  real t124 = b[6] + (t11 * t59 - t19 * t61 + (Rc[0] * t84 + Rc[3] * t103 + Rc[6] * t120));
+  real t127 = v[0] * 2.0;
+  real t137 = b[7] + (t19 * t127 - t4 * t59 + (Rc[1] * t84 + Rc[4] * t103 + Rc[7] * t120));
+  real t149 = b[8] + (t4 * t61 - t11 * t127 + (Rc[2] * t84 + Rc[5] * t103 + Rc[8] * t120));
+  real t152 = y[0] - (gain[0] * t5 + gain[1] * t12 + gain[2] * t20 + gain[3] * t32 + gain[4] * t44 +
+    gain[5] * t56 + gain[6] * t124 + gain[7] * t137 + gain[8] * t149);
+  x[0] = t152;
+  real t170 = y[1] - (gain[9] * t5 + gain[10] * t12 + gain[11] * t20 + gain[12] * t32 + gain[13] *
+    t44 + gain[14] * t56 + gain[15] * t124 + gain[16] * t137 + gain[17] * t149);
+  x[1] = t170;
+  real t188 = y[2] - (gain[18] * t5 + gain[19] * t12 + gain[20] * t20 + gain[21] * t32 + gain[22] *
+    t44 + gain[23] * t56 + gain[24] * t124 + gain[25] * t137 + gain[26] * t149);
+  x[2] = t188;
+  real t206 = y[3] - (gain[27] * t5 + gain[28] * t12 + gain[29] * t20 + gain[30] * t32 + gain[31] *
+    t44 + gain[32] * t56 + gain[33] * t124 + gain[34] * t137 + gain[35] * t149);
+  x[3] = t206;
+  real t224 = y[4] - (gain[36] * t5 + gain[37] * t12 + gain[38] * t20 + gain[39] * t32 + gain[40] *
+    t44 + gain[41] * t56 + gain[42] * t124 + gain[43] * t137 + gain[44] * t149);
+  x[4] = t224;
+  real t242 = y[5] - (gain[45] * t5 + gain[46] * t12 + gain[47] * t20 + gain[48] * t32 + gain[49] *
+    t44 + gain[50] * t56 + gain[51] * t124 + gain[52] * t137 + gain[53] * t149);
+  x[5] = t242;
+  z[0] = t5 + (B[0] * t152 + B[9] * t170 + B[18] * t188 + B[27] * t206 + B[36] * t224 + B[45] *
+    t242);
+  z[1] = t12 + (B[1] * t152 + B[10] * t170 + B[19] * t188 + B[28] * t206 + B[37] * t224 + B[46] *
+    t242);
+  z[2] = t20 + (B[2] * t152 + B[11] * t170 + B[20] * t188 + B[29] * t206 + B[38] * t224 + B[47] *
+    t242);
+  z[3] = t32 + (B[3] * t152 + B[12] * t170 + B[21] * t188 + B[30] * t206 + B[39] * t224 + B[48] *
+    t242);
+  z[4] = t44 + (B[4] * t152 + B[13] * t170 + B[22] * t188 + B[31] * t206 + B[40] * t224 + B[49] *
+    t242);
+  z[5] = t56 + (B[5] * t152 + B[14] * t170 + B[23] * t188 + B[32] * t206 + B[41] * t224 + B[50] *
+    t242);
+  z[6] = t124 + (B[6] * t152 + B[15] * t170 + B[24] * t188 + B[33] * t206 + B[42] * t224 + B[51] *
+    t242);
+  z[7] = t137 + (B[7] * t152 + B[16] * t170 + B[25] * t188 + B[34] * t206 + B[43] * t224 + B[52] *
+    t242);
+  z[8] = t149 + (B[8] * t152 + B[17] * t170 + B[26] * t188 + B[35] * t206 + B[44] * t224 + B[53] *
+    t242);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_tangent_solution_with_increments_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_tangent_solution_with_increments(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_tangent_solution_with_increments_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"w_I", 3, "rad/s", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"z_I", 9, "", 0, 0},
-    {"B", 54, "", 0, 0},
-    {"gain", 54, "", 0, 0},
-    {"y", 6, "", 0, 0},
-    {"b", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_tangent_solution_with_increments_outputs[] = {
-    {"x", 6, "", 0, 0},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_tangent_solution_with_increments, (in[0], in[1], in[2], in[3],
+  in[4], in[5], in[6], in[7], in[8], in[9], out[0], out[1]))
 
 /* free and constrained directions of a hinge with 6 speeds
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
  * in  H[6][6] motion subspace
  * out W[6][6] rows: H^+, then the constrained directions
  */
-int mstmm_sweep_generic6_complement(const real *restrict H, real *restrict W)
+int mstmm_sweep_generic6_complement(in_t H, out_t W)
 {
-    const real t0 = H[30] * H[30];
-    const real t1 = H[24] * H[24];
-    const real t2 = H[18] * H[18];
-    const real t3 = H[12] * H[12];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[6] * H[6];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t12 = H[1] * H[1];
-    const real t13 = H[7] * H[7];
-    const real t14 = t12 + t13;
-    const real t15 = H[13] * H[13];
-    const real t16 = t14 + t15;
-    const real t17 = H[19] * H[19];
-    const real t18 = t16 + t17;
-    const real t19 = H[25] * H[25];
-    const real t20 = t18 + t19;
-    const real t21 = H[31] * H[31];
-    const real t22 = t20 + t21;
-    const real t23 = t22 * ((real)1 / (real)10000000000000);
-    const real t24 = H[30] * H[31];
-    const real t25 = H[24] * H[25];
-    const real t26 = H[18] * H[19];
-    const real t27 = H[12] * H[13];
-    const real t28 = H[6] * H[7];
-    const real t29 = H[0] * H[1];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t26 + t31;
-    const real t33 = t25 + t32;
-    const real t34 = t24 + t33;
-    const real t35 = 1.0 / t10;
-    const real t36 = t34 * t35;
-    const real t37 = t34 * t36;
-    const real t38 = t22 - t37;
-    const real t39 = t23 < t38;
-    if (!(t39 != 0)) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t40 = H[2] * H[2];
-    const real t41 = H[8] * H[8];
-    const real t42 = t40 + t41;
-    const real t43 = H[14] * H[14];
-    const real t44 = t42 + t43;
-    const real t45 = H[20] * H[20];
-    const real t46 = t44 + t45;
-    const real t47 = H[26] * H[26];
-    const real t48 = t46 + t47;
-    const real t49 = H[32] * H[32];
-    const real t50 = t48 + t49;
-    const real t51 = t50 * ((real)1 / (real)10000000000000);
-    const real t52 = H[30] * H[32];
-    const real t53 = H[24] * H[26];
-    const real t54 = H[18] * H[20];
-    const real t55 = H[12] * H[14];
-    const real t56 = H[6] * H[8];
-    const real t57 = H[0] * H[2];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    const real t60 = t54 + t59;
-    const real t61 = t53 + t60;
-    const real t62 = t52 + t61;
-    const real t63 = t62 * t35;
-    const real t64 = t62 * t63;
-    const real t65 = t50 - t64;
-    const real t66 = H[1] * H[2];
-    const real t67 = H[7] * H[8];
-    const real t68 = t66 + t67;
-    const real t69 = H[13] * H[14];
-    const real t70 = t68 + t69;
-    const real t71 = H[19] * H[20];
-    const real t72 = t70 + t71;
-    const real t73 = H[25] * H[26];
-    const real t74 = t72 + t73;
-    const real t75 = H[31] * H[32];
-    const real t76 = t74 + t75;
-    const real t77 = t62 * t36;
-    const real t78 = t76 - t77;
-    const real t79 = 1.0 / t38;
-    const real t80 = t79 * t78;
-    const real t81 = t78 * t80;
-    const real t82 = t65 - t81;
-    const real t83 = t51 < t82;
-    if (!(t83 != 0)) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t84 = H[3] * H[3];
-    const real t85 = H[9] * H[9];
-    const real t86 = t84 + t85;
-    const real t87 = H[15] * H[15];
-    const real t88 = t86 + t87;
-    const real t89 = H[21] * H[21];
-    const real t90 = t88 + t89;
-    const real t91 = H[27] * H[27];
-    const real t92 = t90 + t91;
-    const real t93 = H[33] * H[33];
-    const real t94 = t92 + t93;
-    const real t95 = t94 * ((real)1 / (real)10000000000000);
-    const real t96 = H[30] * H[33];
-    const real t97 = H[24] * H[27];
-    const real t98 = H[18] * H[21];
-    const real t99 = H[12] * H[15];
-    const real t100 = H[6] * H[9];
-    const real t101 = H[0] * H[3];
-    const real t102 = t100 + t101;
-    const real t103 = t99 + t102;
-    const real t104 = t98 + t103;
-    const real t105 = t97 + t104;
-    const real t106 = t96 + t105;
-    const real t107 = t106 * t35;
-    const real t108 = t106 * t107;
-    const real t109 = t94 - t108;
-    const real t110 = H[1] * H[3];
-    const real t111 = H[7] * H[9];
-    const real t112 = t110 + t111;
-    const real t113 = H[13] * H[15];
-    const real t114 = t112 + t113;
-    const real t115 = H[19] * H[21];
-    const real t116 = t114 + t115;
-    const real t117 = H[25] * H[27];
-    const real t118 = t116 + t117;
-    const real t119 = H[31] * H[33];
-    const real t120 = t118 + t119;
-    const real t121 = t106 * t36;
-    const real t122 = t120 - t121;
-    const real t123 = t79 * t122;
-    const real t124 = t122 * t123;
-    const real t125 = t109 - t124;
-    const real t126 = H[2] * H[3];
-    const real t127 = H[8] * H[9];
-    const real t128 = t126 + t127;
-    const real t129 = H[14] * H[15];
-    const real t130 = t128 + t129;
-    const real t131 = H[20] * H[21];
-    const real t132 = t130 + t131;
-    const real t133 = H[26] * H[27];
-    const real t134 = t132 + t133;
-    const real t135 = H[32] * H[33];
-    const real t136 = t134 + t135;
-    const real t137 = t106 * t63;
-    const real t138 = t136 - t137;
-    const real t139 = t80 * t122;
-    const real t140 = t138 - t139;
-    const real t141 = 1.0 / t82;
-    const real t142 = t141 * t140;
-    const real t143 = t140 * t142;
-    const real t144 = t125 - t143;
-    const real t145 = t95 < t144;
-    if (!(t145 != 0)) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t146 = H[4] * H[4];
-    const real t147 = H[10] * H[10];
-    const real t148 = t146 + t147;
-    const real t149 = H[16] * H[16];
-    const real t150 = t148 + t149;
-    const real t151 = H[22] * H[22];
-    const real t152 = t150 + t151;
-    const real t153 = H[28] * H[28];
-    const real t154 = t152 + t153;
-    const real t155 = H[34] * H[34];
-    const real t156 = t154 + t155;
-    const real t157 = t156 * ((real)1 / (real)10000000000000);
-    const real t158 = H[30] * H[34];
-    const real t159 = H[24] * H[28];
-    const real t160 = H[18] * H[22];
-    const real t161 = H[12] * H[16];
-    const real t162 = H[6] * H[10];
-    const real t163 = H[0] * H[4];
-    const real t164 = t162 + t163;
-    const real t165 = t161 + t164;
-    const real t166 = t160 + t165;
-    const real t167 = t159 + t166;
-    const real t168 = t158 + t167;
-    const real t169 = t168 * t35;
-    const real t170 = t168 * t169;
-    const real t171 = t156 - t170;
-    const real t172 = H[1] * H[4];
-    const real t173 = H[7] * H[10];
-    const real t174 = t172 + t173;
-    const real t175 = H[13] * H[16];
-    const real t176 = t174 + t175;
-    const real t177 = H[19] * H[22];
-    const real t178 = t176 + t177;
-    const real t179 = H[25] * H[28];
-    const real t180 = t178 + t179;
-    const real t181 = H[31] * H[34];
-    const real t182 = t180 + t181;
-    const real t183 = t168 * t36;
-    const real t184 = t182 - t183;
-    const real t185 = t79 * t184;
-    const real t186 = t184 * t185;
-    const real t187 = t171 - t186;
-    const real t188 = H[2] * H[4];
-    const real t189 = H[8] * H[10];
-    const real t190 = t188 + t189;
-    const real t191 = H[14] * H[16];
-    const real t192 = t190 + t191;
-    const real t193 = H[20] * H[22];
-    const real t194 = t192 + t193;
-    const real t195 = H[26] * H[28];
-    const real t196 = t194 + t195;
-    const real t197 = H[32] * H[34];
-    const real t198 = t196 + t197;
-    const real t199 = t168 * t63;
-    const real t200 = t198 - t199;
-    const real t201 = t80 * t184;
-    const real t202 = t200 - t201;
-    const real t203 = t141 * t202;
-    const real t204 = t202 * t203;
-    const real t205 = t187 - t204;
-    const real t206 = H[3] * H[4];
-    const real t207 = H[9] * H[10];
-    const real t208 = t206 + t207;
-    const real t209 = H[15] * H[16];
-    const real t210 = t208 + t209;
-    const real t211 = H[21] * H[22];
-    const real t212 = t210 + t211;
-    const real t213 = H[27] * H[28];
-    const real t214 = t212 + t213;
-    const real t215 = H[33] * H[34];
-    const real t216 = t214 + t215;
-    const real t217 = t168 * t107;
-    const real t218 = t216 - t217;
-    const real t219 = t123 * t184;
-    const real t220 = t218 - t219;
-    const real t221 = t142 * t202;
-    const real t222 = t220 - t221;
-    const real t223 = 1.0 / t144;
-    const real t224 = t223 * t222;
-    const real t225 = t222 * t224;
-    const real t226 = t205 - t225;
-    const real t227 = t157 < t226;
-    if (!(t227 != 0)) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t228 = H[5] * H[5];
-    const real t229 = H[11] * H[11];
-    const real t230 = t228 + t229;
-    const real t231 = H[17] * H[17];
-    const real t232 = t230 + t231;
-    const real t233 = H[23] * H[23];
-    const real t234 = t232 + t233;
-    const real t235 = H[29] * H[29];
-    const real t236 = t234 + t235;
-    const real t237 = H[35] * H[35];
-    const real t238 = t236 + t237;
-    const real t239 = t238 * ((real)1 / (real)10000000000000);
-    const real t240 = H[30] * H[35];
-    const real t241 = H[24] * H[29];
-    const real t242 = H[18] * H[23];
-    const real t243 = H[12] * H[17];
-    const real t244 = H[6] * H[11];
-    const real t245 = H[0] * H[5];
-    const real t246 = t244 + t245;
-    const real t247 = t243 + t246;
-    const real t248 = t242 + t247;
-    const real t249 = t241 + t248;
-    const real t250 = t240 + t249;
-    const real t251 = t250 * t35;
-    const real t252 = t250 * t251;
-    const real t253 = t238 - t252;
-    const real t254 = H[1] * H[5];
-    const real t255 = H[7] * H[11];
-    const real t256 = t254 + t255;
-    const real t257 = H[13] * H[17];
-    const real t258 = t256 + t257;
-    const real t259 = H[19] * H[23];
-    const real t260 = t258 + t259;
-    const real t261 = H[25] * H[29];
-    const real t262 = t260 + t261;
-    const real t263 = H[31] * H[35];
-    const real t264 = t262 + t263;
-    const real t265 = t250 * t36;
-    const real t266 = t264 - t265;
-    const real t267 = t79 * t266;
-    const real t268 = t266 * t267;
-    const real t269 = t253 - t268;
-    const real t270 = H[2] * H[5];
-    const real t271 = H[8] * H[11];
-    const real t272 = t270 + t271;
-    const real t273 = H[14] * H[17];
-    const real t274 = t272 + t273;
-    const real t275 = H[20] * H[23];
-    const real t276 = t274 + t275;
-    const real t277 = H[26] * H[29];
-    const real t278 = t276 + t277;
-    const real t279 = H[32] * H[35];
-    const real t280 = t278 + t279;
-    const real t281 = t250 * t63;
-    const real t282 = t280 - t281;
-    const real t283 = t80 * t266;
-    const real t284 = t282 - t283;
-    const real t285 = t141 * t284;
-    const real t286 = t284 * t285;
-    const real t287 = t269 - t286;
-    const real t288 = H[3] * H[5];
-    const real t289 = H[9] * H[11];
-    const real t290 = t288 + t289;
-    const real t291 = H[15] * H[17];
-    const real t292 = t290 + t291;
-    const real t293 = H[21] * H[23];
-    const real t294 = t292 + t293;
-    const real t295 = H[27] * H[29];
-    const real t296 = t294 + t295;
-    const real t297 = H[33] * H[35];
-    const real t298 = t296 + t297;
-    const real t299 = t250 * t107;
-    const real t300 = t298 - t299;
-    const real t301 = t123 * t266;
-    const real t302 = t300 - t301;
-    const real t303 = t142 * t284;
-    const real t304 = t302 - t303;
-    const real t305 = t223 * t304;
-    const real t306 = t304 * t305;
-    const real t307 = t287 - t306;
-    const real t308 = H[4] * H[5];
-    const real t309 = H[10] * H[11];
-    const real t310 = t308 + t309;
-    const real t311 = H[16] * H[17];
-    const real t312 = t310 + t311;
-    const real t313 = H[22] * H[23];
-    const real t314 = t312 + t313;
-    const real t315 = H[28] * H[29];
-    const real t316 = t314 + t315;
-    const real t317 = H[34] * H[35];
-    const real t318 = t316 + t317;
-    const real t319 = t250 * t169;
-    const real t320 = t318 - t319;
-    const real t321 = t185 * t266;
-    const real t322 = t320 - t321;
-    const real t323 = t203 * t284;
-    const real t324 = t322 - t323;
-    const real t325 = t224 * t304;
-    const real t326 = t324 - t325;
-    const real t327 = 1.0 / t226;
-    const real t328 = t327 * t326;
-    const real t329 = t326 * t328;
-    const real t330 = t307 - t329;
-    const real t331 = t239 < t330;
-    if (!(t331 != 0)) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
-    const real t332 = H[0] * t35;
-    const real t333 = H[0] * t36;
-    const real t334 = H[1] - t333;
-    const real t335 = t79 * t334;
-    const real t336 = H[0] * t63;
-    const real t337 = H[2] - t336;
-    const real t338 = t80 * t334;
-    const real t339 = t337 - t338;
-    const real t340 = t141 * t339;
-    const real t341 = H[0] * t107;
-    const real t342 = H[3] - t341;
-    const real t343 = t123 * t334;
-    const real t344 = t342 - t343;
-    const real t345 = t142 * t339;
-    const real t346 = t344 - t345;
-    const real t347 = t223 * t346;
-    const real t348 = H[0] * t169;
-    const real t349 = H[4] - t348;
-    const real t350 = t185 * t334;
-    const real t351 = t349 - t350;
-    const real t352 = t203 * t339;
-    const real t353 = t351 - t352;
-    const real t354 = t224 * t346;
-    const real t355 = t353 - t354;
-    const real t356 = t327 * t355;
-    const real t357 = 1.0 / t330;
-    const real t358 = H[0] * t251;
-    const real t359 = H[5] - t358;
-    const real t360 = t267 * t334;
-    const real t361 = t359 - t360;
-    const real t362 = t285 * t339;
-    const real t363 = t361 - t362;
-    const real t364 = t305 * t346;
-    const real t365 = t363 - t364;
-    const real t366 = t328 * t355;
-    const real t367 = t365 - t366;
-    const real t368 = t357 * t367;
-    const real t369 = t328 * t368;
-    const real t370 = t356 - t369;
-    const real t371 = t224 * t370;
-    const real t372 = t347 - t371;
-    const real t373 = t305 * t368;
-    const real t374 = t372 - t373;
-    const real t375 = t142 * t374;
-    const real t376 = t340 - t375;
-    const real t377 = t203 * t370;
-    const real t378 = t376 - t377;
-    const real t379 = t285 * t368;
-    const real t380 = t378 - t379;
-    const real t381 = t80 * t380;
-    const real t382 = t335 - t381;
-    const real t383 = t123 * t374;
-    const real t384 = t382 - t383;
-    const real t385 = t185 * t370;
-    const real t386 = t384 - t385;
-    const real t387 = t267 * t368;
-    const real t388 = t386 - t387;
-    const real t389 = t36 * t388;
-    const real t390 = t332 - t389;
-    const real t391 = t63 * t380;
-    const real t392 = t390 - t391;
-    const real t393 = t107 * t374;
-    const real t394 = t392 - t393;
-    const real t395 = t169 * t370;
-    const real t396 = t394 - t395;
-    const real t397 = t251 * t368;
-    const real t398 = t396 - t397;
-    W[0] = t398;
-    const real t399 = H[6] * t35;
-    const real t400 = H[6] * t36;
-    const real t401 = H[7] - t400;
-    const real t402 = t79 * t401;
-    const real t403 = H[6] * t63;
-    const real t404 = H[8] - t403;
-    const real t405 = t80 * t401;
-    const real t406 = t404 - t405;
-    const real t407 = t141 * t406;
-    const real t408 = H[6] * t107;
-    const real t409 = H[9] - t408;
-    const real t410 = t123 * t401;
-    const real t411 = t409 - t410;
-    const real t412 = t142 * t406;
-    const real t413 = t411 - t412;
-    const real t414 = t223 * t413;
-    const real t415 = H[6] * t169;
-    const real t416 = H[10] - t415;
-    const real t417 = t185 * t401;
-    const real t418 = t416 - t417;
-    const real t419 = t203 * t406;
-    const real t420 = t418 - t419;
-    const real t421 = t224 * t413;
-    const real t422 = t420 - t421;
-    const real t423 = t327 * t422;
-    const real t424 = H[6] * t251;
-    const real t425 = H[11] - t424;
-    const real t426 = t267 * t401;
-    const real t427 = t425 - t426;
-    const real t428 = t285 * t406;
-    const real t429 = t427 - t428;
-    const real t430 = t305 * t413;
-    const real t431 = t429 - t430;
-    const real t432 = t328 * t422;
-    const real t433 = t431 - t432;
-    const real t434 = t357 * t433;
-    const real t435 = t328 * t434;
-    const real t436 = t423 - t435;
-    const real t437 = t224 * t436;
-    const real t438 = t414 - t437;
-    const real t439 = t305 * t434;
-    const real t440 = t438 - t439;
-    const real t441 = t142 * t440;
-    const real t442 = t407 - t441;
-    const real t443 = t203 * t436;
-    const real t444 = t442 - t443;
-    const real t445 = t285 * t434;
-    const real t446 = t444 - t445;
-    const real t447 = t80 * t446;
-    const real t448 = t402 - t447;
-    const real t449 = t123 * t440;
-    const real t450 = t448 - t449;
-    const real t451 = t185 * t436;
-    const real t452 = t450 - t451;
-    const real t453 = t267 * t434;
-    const real t454 = t452 - t453;
-    const real t455 = t36 * t454;
-    const real t456 = t399 - t455;
-    const real t457 = t63 * t446;
-    const real t458 = t456 - t457;
-    const real t459 = t107 * t440;
-    const real t460 = t458 - t459;
-    const real t461 = t169 * t436;
-    const real t462 = t460 - t461;
-    const real t463 = t251 * t434;
-    const real t464 = t462 - t463;
-    W[1] = t464;
-    const real t465 = H[12] * t35;
-    const real t466 = H[12] * t36;
-    const real t467 = H[13] - t466;
-    const real t468 = t79 * t467;
-    const real t469 = H[12] * t63;
-    const real t470 = H[14] - t469;
-    const real t471 = t80 * t467;
-    const real t472 = t470 - t471;
-    const real t473 = t141 * t472;
-    const real t474 = H[12] * t107;
-    const real t475 = H[15] - t474;
-    const real t476 = t123 * t467;
-    const real t477 = t475 - t476;
-    const real t478 = t142 * t472;
-    const real t479 = t477 - t478;
-    const real t480 = t223 * t479;
-    const real t481 = H[12] * t169;
-    const real t482 = H[16] - t481;
-    const real t483 = t185 * t467;
-    const real t484 = t482 - t483;
-    const real t485 = t203 * t472;
-    const real t486 = t484 - t485;
-    const real t487 = t224 * t479;
-    const real t488 = t486 - t487;
-    const real t489 = t327 * t488;
-    const real t490 = H[12] * t251;
-    const real t491 = H[17] - t490;
-    const real t492 = t267 * t467;
-    const real t493 = t491 - t492;
-    const real t494 = t285 * t472;
-    const real t495 = t493 - t494;
-    const real t496 = t305 * t479;
-    const real t497 = t495 - t496;
-    const real t498 = t328 * t488;
-    const real t499 = t497 - t498;
-    const real t500 = t357 * t499;
-    const real t501 = t328 * t500;
-    const real t502 = t489 - t501;
-    const real t503 = t224 * t502;
-    const real t504 = t480 - t503;
-    const real t505 = t305 * t500;
-    const real t506 = t504 - t505;
-    const real t507 = t142 * t506;
-    const real t508 = t473 - t507;
-    const real t509 = t203 * t502;
-    const real t510 = t508 - t509;
-    const real t511 = t285 * t500;
-    const real t512 = t510 - t511;
-    const real t513 = t80 * t512;
-    const real t514 = t468 - t513;
-    const real t515 = t123 * t506;
-    const real t516 = t514 - t515;
-    const real t517 = t185 * t502;
-    const real t518 = t516 - t517;
-    const real t519 = t267 * t500;
-    const real t520 = t518 - t519;
-    const real t521 = t36 * t520;
-    const real t522 = t465 - t521;
-    const real t523 = t63 * t512;
-    const real t524 = t522 - t523;
-    const real t525 = t107 * t506;
-    const real t526 = t524 - t525;
-    const real t527 = t169 * t502;
-    const real t528 = t526 - t527;
-    const real t529 = t251 * t500;
-    const real t530 = t528 - t529;
-    W[2] = t530;
-    const real t531 = H[18] * t35;
-    const real t532 = H[18] * t36;
-    const real t533 = H[19] - t532;
-    const real t534 = t79 * t533;
-    const real t535 = H[18] * t63;
-    const real t536 = H[20] - t535;
-    const real t537 = t80 * t533;
-    const real t538 = t536 - t537;
-    const real t539 = t141 * t538;
-    const real t540 = H[18] * t107;
-    const real t541 = H[21] - t540;
-    const real t542 = t123 * t533;
-    const real t543 = t541 - t542;
-    const real t544 = t142 * t538;
-    const real t545 = t543 - t544;
-    const real t546 = t223 * t545;
-    const real t547 = H[18] * t169;
-    const real t548 = H[22] - t547;
-    const real t549 = t185 * t533;
-    const real t550 = t548 - t549;
-    const real t551 = t203 * t538;
-    const real t552 = t550 - t551;
-    const real t553 = t224 * t545;
-    const real t554 = t552 - t553;
-    const real t555 = t327 * t554;
-    const real t556 = H[18] * t251;
-    const real t557 = H[23] - t556;
-    const real t558 = t267 * t533;
-    const real t559 = t557 - t558;
-    const real t560 = t285 * t538;
-    const real t561 = t559 - t560;
-    const real t562 = t305 * t545;
-    const real t563 = t561 - t562;
-    const real t564 = t328 * t554;
-    const real t565 = t563 - t564;
-    const real t566 = t357 * t565;
-    const real t567 = t328 * t566;
-    const real t568 = t555 - t567;
-    const real t569 = t224 * t568;
-    const real t570 = t546 - t569;
-    const real t571 = t305 * t566;
-    const real t572 = t570 - t571;
-    const real t573 = t142 * t572;
-    const real t574 = t539 - t573;
-    const real t575 = t203 * t568;
-    const real t576 = t574 - t575;
-    const real t577 = t285 * t566;
-    const real t578 = t576 - t577;
-    const real t579 = t80 * t578;
-    const real t580 = t534 - t579;
-    const real t581 = t123 * t572;
-    const real t582 = t580 - t581;
-    const real t583 = t185 * t568;
-    const real t584 = t582 - t583;
-    const real t585 = t267 * t566;
-    const real t586 = t584 - t585;
-    const real t587 = t36 * t586;
-    const real t588 = t531 - t587;
-    const real t589 = t63 * t578;
-    const real t590 = t588 - t589;
-    const real t591 = t107 * t572;
-    const real t592 = t590 - t591;
-    const real t593 = t169 * t568;
-    const real t594 = t592 - t593;
-    const real t595 = t251 * t566;
-    const real t596 = t594 - t595;
-    W[3] = t596;
-    const real t597 = H[24] * t35;
-    const real t598 = H[24] * t36;
-    const real t599 = H[25] - t598;
-    const real t600 = t79 * t599;
-    const real t601 = H[24] * t63;
-    const real t602 = H[26] - t601;
-    const real t603 = t80 * t599;
-    const real t604 = t602 - t603;
-    const real t605 = t141 * t604;
-    const real t606 = H[24] * t107;
-    const real t607 = H[27] - t606;
-    const real t608 = t123 * t599;
-    const real t609 = t607 - t608;
-    const real t610 = t142 * t604;
-    const real t611 = t609 - t610;
-    const real t612 = t223 * t611;
-    const real t613 = H[24] * t169;
-    const real t614 = H[28] - t613;
-    const real t615 = t185 * t599;
-    const real t616 = t614 - t615;
-    const real t617 = t203 * t604;
-    const real t618 = t616 - t617;
-    const real t619 = t224 * t611;
-    const real t620 = t618 - t619;
-    const real t621 = t327 * t620;
-    const real t622 = H[24] * t251;
-    const real t623 = H[29] - t622;
-    const real t624 = t267 * t599;
-    const real t625 = t623 - t624;
-    const real t626 = t285 * t604;
-    const real t627 = t625 - t626;
-    const real t628 = t305 * t611;
-    const real t629 = t627 - t628;
-    const real t630 = t328 * t620;
-    const real t631 = t629 - t630;
-    const real t632 = t357 * t631;
-    const real t633 = t328 * t632;
-    const real t634 = t621 - t633;
-    const real t635 = t224 * t634;
-    const real t636 = t612 - t635;
-    const real t637 = t305 * t632;
-    const real t638 = t636 - t637;
-    const real t639 = t142 * t638;
-    const real t640 = t605 - t639;
-    const real t641 = t203 * t634;
-    const real t642 = t640 - t641;
-    const real t643 = t285 * t632;
-    const real t644 = t642 - t643;
-    const real t645 = t80 * t644;
-    const real t646 = t600 - t645;
-    const real t647 = t123 * t638;
-    const real t648 = t646 - t647;
-    const real t649 = t185 * t634;
-    const real t650 = t648 - t649;
-    const real t651 = t267 * t632;
-    const real t652 = t650 - t651;
-    const real t653 = t36 * t652;
-    const real t654 = t597 - t653;
-    const real t655 = t63 * t644;
-    const real t656 = t654 - t655;
-    const real t657 = t107 * t638;
-    const real t658 = t656 - t657;
-    const real t659 = t169 * t634;
-    const real t660 = t658 - t659;
-    const real t661 = t251 * t632;
-    const real t662 = t660 - t661;
-    W[4] = t662;
-    const real t663 = H[30] * t35;
-    const real t664 = H[30] * t36;
-    const real t665 = H[31] - t664;
-    const real t666 = t79 * t665;
-    const real t667 = H[30] * t63;
-    const real t668 = H[32] - t667;
-    const real t669 = t80 * t665;
-    const real t670 = t668 - t669;
-    const real t671 = t141 * t670;
-    const real t672 = H[30] * t107;
-    const real t673 = H[33] - t672;
-    const real t674 = t123 * t665;
-    const real t675 = t673 - t674;
-    const real t676 = t142 * t670;
-    const real t677 = t675 - t676;
-    const real t678 = t223 * t677;
-    const real t679 = H[30] * t169;
-    const real t680 = H[34] - t679;
-    const real t681 = t185 * t665;
-    const real t682 = t680 - t681;
-    const real t683 = t203 * t670;
-    const real t684 = t682 - t683;
-    const real t685 = t224 * t677;
-    const real t686 = t684 - t685;
-    const real t687 = t327 * t686;
-    const real t688 = H[30] * t251;
-    const real t689 = H[35] - t688;
-    const real t690 = t267 * t665;
-    const real t691 = t689 - t690;
-    const real t692 = t285 * t670;
-    const real t693 = t691 - t692;
-    const real t694 = t305 * t677;
-    const real t695 = t693 - t694;
-    const real t696 = t328 * t686;
-    const real t697 = t695 - t696;
-    const real t698 = t357 * t697;
-    const real t699 = t328 * t698;
-    const real t700 = t687 - t699;
-    const real t701 = t224 * t700;
-    const real t702 = t678 - t701;
-    const real t703 = t305 * t698;
-    const real t704 = t702 - t703;
-    const real t705 = t142 * t704;
-    const real t706 = t671 - t705;
-    const real t707 = t203 * t700;
-    const real t708 = t706 - t707;
-    const real t709 = t285 * t698;
-    const real t710 = t708 - t709;
-    const real t711 = t80 * t710;
-    const real t712 = t666 - t711;
-    const real t713 = t123 * t704;
-    const real t714 = t712 - t713;
-    const real t715 = t185 * t700;
-    const real t716 = t714 - t715;
-    const real t717 = t267 * t698;
-    const real t718 = t716 - t717;
-    const real t719 = t36 * t718;
-    const real t720 = t663 - t719;
-    const real t721 = t63 * t710;
-    const real t722 = t720 - t721;
-    const real t723 = t107 * t704;
-    const real t724 = t722 - t723;
-    const real t725 = t169 * t700;
-    const real t726 = t724 - t725;
-    const real t727 = t251 * t698;
-    const real t728 = t726 - t727;
-    W[5] = t728;
-    W[6] = t388;
-    W[7] = t454;
-    W[8] = t520;
-    W[9] = t586;
-    W[10] = t652;
-    W[11] = t718;
-    W[12] = t380;
-    W[13] = t446;
-    W[14] = t512;
-    W[15] = t578;
-    W[16] = t644;
-    W[17] = t710;
-    W[18] = t374;
-    W[19] = t440;
-    W[20] = t506;
-    W[21] = t572;
-    W[22] = t638;
-    W[23] = t704;
-    W[24] = t370;
-    W[25] = t436;
-    W[26] = t502;
-    W[27] = t568;
-    W[28] = t634;
-    W[29] = t700;
-    W[30] = t368;
-    W[31] = t434;
-    W[32] = t500;
-    W[33] = t566;
-    W[34] = t632;
-    W[35] = t698;
-    return 0;
+  real t10 = H[30] * H[30] + (H[24] * H[24] + (H[18] * H[18] + (H[12] * H[12] + (H[0] * H[0] + H[6]
+    * H[6]))));
+  if (!((0.0 < t10))) return 1; /* pivot 1 of 6 vanishes: a motion of the hinge is undetermined */
+  real t22 = H[1] * H[1] + H[7] * H[7] + H[13] * H[13] + H[19] * H[19] + H[25] * H[25] + H[31] *
+    H[31];
+  real t34 = H[30] * H[31] + (H[24] * H[25] + (H[18] * H[19] + (H[12] * H[13] + (H[6] * H[7] + H[0]
+    * H[1]))));
+  real t35 = 1.0 / t10;
+  real t36 = t34 * t35;
+  real t38 = t22 - t34 * t36;
+  if (!((t22 * ((real)1 / (real)10000000000000) < t38))) return 1; /* pivot 2 of 6 vanishes: a motion of the hinge is undetermined */
+  real t50 = H[2] * H[2] + H[8] * H[8] + H[14] * H[14] + H[20] * H[20] + H[26] * H[26] + H[32] *
+    H[32];
+  real t62 = H[30] * H[32] + (H[24] * H[26] + (H[18] * H[20] + (H[12] * H[14] + (H[6] * H[8] + H[0]
+    * H[2]))));
+  real t63 = t62 * t35;
+  real t78 = H[1] * H[2] + H[7] * H[8] + H[13] * H[14] + H[19] * H[20] + H[25] * H[26] + H[31] *
+    H[32] - t62 * t36;
+  real t79 = 1.0 / t38;
+  real t80 = t79 * t78;
+  real t82 = t50 - t62 * t63 - t78 * t80;
+  if (!((t50 * ((real)1 / (real)10000000000000) < t82))) return 1; /* pivot 3 of 6 vanishes: a motion of the hinge is undetermined */
+  real t94 = H[3] * H[3] + H[9] * H[9] + H[15] * H[15] + H[21] * H[21] + H[27] * H[27] + H[33] *
+    H[33];
+  real t106 = H[30] * H[33] + (H[24] * H[27] + (H[18] * H[21] + (H[12] * H[15] + (H[6] * H[9] + H[0]
+    * H[3]))));
+  real t107 = t106 * t35;
+  real t122 = H[1] * H[3] + H[7] * H[9] + H[13] * H[15] + H[19] * H[21] + H[25] * H[27] + H[31] *
+    H[33] - t106 * t36;
+  real t123 = t79 * t122;
+  real t140 = H[2] * H[3] + H[8] * H[9] + H[14] * H[15] + H[20] * H[21] + H[26] * H[27] + H[32] *
+    H[33] - t106 * t63 - t80 * t122;
+  real t141 = 1.0 / t82;
+  real t142 = t141 * t140;
+  real t144 = t94 - t106 * t107 - t122 * t123 - t140 * t142;
+  if (!((t94 * ((real)1 / (real)10000000000000) < t144))) return 1; /* pivot 4 of 6 vanishes: a motion of the hinge is undetermined */
+  real t156 = H[4] * H[4] + H[10] * H[10] + H[16] * H[16] + H[22] * H[22] + H[28] * H[28] + H[34] *
+    H[34];
+  real t168 = H[30] * H[34] + (H[24] * H[28] + (H[18] * H[22] + (H[12] * H[16] + (H[6] * H[10] +
+    H[0] * H[4]))));
+  real t169 = t168 * t35;
+  real t184 = H[1] * H[4] + H[7] * H[10] + H[13] * H[16] + H[19] * H[22] + H[25] * H[28] + H[31] *
+    H[34] - t168 * t36;
+  real t185 = t79 * t184;
+  real t202 = H[2] * H[4] + H[8] * H[10] + H[14] * H[16] + H[20] * H[22] + H[26] * H[28] + H[32] *
+    H[34] - t168 * t63 - t80 * t184;
+  real t203 = t141 * t202;
+  real t222 = H[3] * H[4] + H[9] * H[10] + H[15] * H[16] + H[21] * H[22] + H[27] * H[28] + H[33] *
+    H[34] - t168 * t107 - t123 * t184 - t142 * t202;
+  real t223 = 1.0 / t144;
+  real t224 = t223 * t222;
+  real t226 = t156 - t168 * t169 - t184 * t185 - t202 * t203 - t222 * t224;
+  if (!((t156 * ((real)1 / (real)10000000000000) < t226))) return 1; /* pivot 5 of 6 vanishes: a motion of the hinge is undetermined */
+  real t238 = H[5] * H[5] + H[11] * H[11] + H[17] * H[17] + H[23] * H[23] + H[29] * H[29] + H[35] *
+    H[35];
+  real t250 = H[30] * H[35] + (H[24] * H[29] + (H[18] * H[23] + (H[12] * H[17] + (H[6] * H[11] +
+    H[0] * H[5]))));
+  real t251 = t250 * t35;
+  real t266 = H[1] * H[5] + H[7] * H[11] + H[13] * H[17] + H[19] * H[23] + H[25] * H[29] + H[31] *
+    H[35] - t250 * t36;
+  real t267 = t79 * t266;
+  real t284 = H[2] * H[5] + H[8] * H[11] + H[14] * H[17] + H[20] * H[23] + H[26] * H[29] + H[32] *
+    H[35] - t250 * t63 - t80 * t266;
+  real t285 = t141 * t284;
+  real t304 = H[3] * H[5] + H[9] * H[11] + H[15] * H[17] + H[21] * H[23] + H[27] * H[29] + H[33] *
+    H[35] - t250 * t107 - t123 * t266 - t142 * t284;
+  real t305 = t223 * t304;
+  real t326 = H[4] * H[5] + H[10] * H[11] + H[16] * H[17] + H[22] * H[23] + H[28] * H[29] + H[34] *
+    H[35] - t250 * t169 - t185 * t266 - t203 * t284 - t224 * t304;
+  real t327 = 1.0 / t226;
+  real t328 = t327 * t326;
+  real t330 = t238 - t250 * t251 - t266 * t267 - t284 * t285 - t304 * t305 - t326 * t328;
+  if (!((t238 * ((real)1 / (real)10000000000000) < t330))) return 1; /* pivot 6 of 6 vanishes: a motion of the hinge is undetermined */
+  real t334 = H[1] - H[0] * t36;
+  real t339 = H[2] - H[0] * t63 - t80 * t334;
+  real t346 = H[3] - H[0] * t107 - t123 * t334 - t142 * t339;
+  real t355 = H[4] - H[0] * t169 - t185 * t334 - t203 * t339 - t224 * t346;
+  real t357 = 1.0 / t330;
+  real t368 = t357 * (H[5] - H[0] * t251 - t267 * t334 - t285 * t339 - t305 * t346 - t328 * t355);
+  real t370 = t327 * t355 - t328 * t368;
+  real t374 = t223 * t346 - t224 * t370 - t305 * t368;
+  real t380 = t141 * t339 - t142 * t374 - t203 * t370 - t285 * t368;
+  real t388 = t79 * t334 - t80 * t380 - t123 * t374 - t185 * t370 - t267 * t368;
+  W[0] = H[0] * t35 - t36 * t388 - t63 * t380 - t107 * t374 - t169 * t370 - t251 * t368;
+  real t401 = H[7] - H[6] * t36;
+  real t406 = H[8] - H[6] * t63 - t80 * t401;
+  real t413 = H[9] - H[6] * t107 - t123 * t401 - t142 * t406;
+  real t422 = H[10] - H[6] * t169 - t185 * t401 - t203 * t406 - t224 * t413;
+  real t434 = t357 * (H[11] - H[6] * t251 - t267 * t401 - t285 * t406 - t305 * t413 - t328 * t422);
+  real t436 = t327 * t422 - t328 * t434;
+  real t440 = t223 * t413 - t224 * t436 - t305 * t434;
+  real t446 = t141 * t406 - t142 * t440 - t203 * t436 - t285 * t434;
+  real t454 = t79 * t401 - t80 * t446 - t123 * t440 - t185 * t436 - t267 * t434;
+  W[1] = H[6] * t35 - t36 * t454 - t63 * t446 - t107 * t440 - t169 * t436 - t251 * t434;
+  real t467 = H[13] - H[12] * t36;
+  real t472 = H[14] - H[12] * t63 - t80 * t467;
+  real t479 = H[15] - H[12] * t107 - t123 * t467 - t142 * t472;
+  real t488 = H[16] - H[12] * t169 - t185 * t467 - t203 * t472 - t224 * t479;
+  real t500 = t357 * (H[17] - H[12] * t251 - t267 * t467 - t285 * t472 - t305 * t479 - t328 * t488);
+  real t502 = t327 * t488 - t328 * t500;
+  real t506 = t223 * t479 - t224 * t502 - t305 * t500;
+  real t512 = t141 * t472 - t142 * t506 - t203 * t502 - t285 * t500;
+  real t520 = t79 * t467 - t80 * t512 - t123 * t506 - t185 * t502 - t267 * t500;
+  W[2] = H[12] * t35 - t36 * t520 - t63 * t512 - t107 * t506 - t169 * t502 - t251 * t500;
+  real t533 = H[19] - H[18] * t36;
+  real t538 = H[20] - H[18] * t63 - t80 * t533;
+  real t545 = H[21] - H[18] * t107 - t123 * t533 - t142 * t538;
+  real t554 = H[22] - H[18] * t169 - t185 * t533 - t203 * t538 - t224 * t545;
+  real t566 = t357 * (H[23] - H[18] * t251 - t267 * t533 - t285 * t538 - t305 * t545 - t328 * t554);
+  real t568 = t327 * t554 - t328 * t566;
+  real t572 = t223 * t545 - t224 * t568 - t305 * t566;
+  real t578 = t141 * t538 - t142 * t572 - t203 * t568 - t285 * t566;
+  real t586 = t79 * t533 - t80 * t578 - t123 * t572 - t185 * t568 - t267 * t566;
+  W[3] = H[18] * t35 - t36 * t586 - t63 * t578 - t107 * t572 - t169 * t568 - t251 * t566;
+  real t599 = H[25] - H[24] * t36;
+  real t604 = H[26] - H[24] * t63 - t80 * t599;
+  real t611 = H[27] - H[24] * t107 - t123 * t599 - t142 * t604;
+  real t620 = H[28] - H[24] * t169 - t185 * t599 - t203 * t604 - t224 * t611;
+  real t632 = t357 * (H[29] - H[24] * t251 - t267 * t599 - t285 * t604 - t305 * t611 - t328 * t620);
+  real t634 = t327 * t620 - t328 * t632;
+  real t638 = t223 * t611 - t224 * t634 - t305 * t632;
+  real t644 = t141 * t604 - t142 * t638 - t203 * t634 - t285 * t632;
+  real t652 = t79 * t599 - t80 * t644 - t123 * t638 - t185 * t634 - t267 * t632;
+  W[4] = H[24] * t35 - t36 * t652 - t63 * t644 - t107 * t638 - t169 * t634 - t251 * t632;
+  real t665 = H[31] - H[30] * t36;
+  real t670 = H[32] - H[30] * t63 - t80 * t665;
+  real t677 = H[33] - H[30] * t107 - t123 * t665 - t142 * t670;
+  real t686 = H[34] - H[30] * t169 - t185 * t665 - t203 * t670 - t224 * t677;
+  real t698 = t357 * (H[35] - H[30] * t251 - t267 * t665 - t285 * t670 - t305 * t677 - t328 * t686);
+  real t700 = t327 * t686 - t328 * t698;
+  real t704 = t223 * t677 - t224 * t700 - t305 * t698;
+  real t710 = t141 * t670 - t142 * t704 - t203 * t700 - t285 * t698;
+  real t718 = t79 * t665 - t80 * t710 - t123 * t704 - t185 * t700 - t267 * t698;
+  W[5] = H[30] * t35 - t36 * t718 - t63 * t710 - t107 * t704 - t169 * t700 - t251 * t698;
+  W[6] = t388;
+  W[7] = t454;
+  W[8] = t520;
+  W[9] = t586;
+  W[10] = t652;
+  W[11] = t718;
+  W[12] = t380;
+  W[13] = t446;
+  W[14] = t512;
+  W[15] = t578;
+  W[16] = t644;
+  W[17] = t710;
+  W[18] = t374;
+  W[19] = t440;
+  W[20] = t506;
+  W[21] = t572;
+  W[22] = t638;
+  W[23] = t704;
+  W[24] = t370;
+  W[25] = t436;
+  W[26] = t502;
+  W[27] = t568;
+  W[28] = t634;
+  W[29] = t700;
+  W[30] = t368;
+  W[31] = t434;
+  W[32] = t500;
+  W[33] = t566;
+  W[34] = t632;
+  W[35] = t698;
+  return 0;
 }
 
-static int mstmm_sweep_generic6_complement_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_complement(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_complement_inputs[] = {
-    {"H", 36, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_complement_outputs[] = {
-    {"W", 36, "", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_generic6_complement_guards[] = {
-    {1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_generic6_complement, (in[0], out[0]))
 
 /* a column's rows divided by D, across a hinge with 6 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -13679,97 +3711,27 @@ static const mstmm_guard mstmm_sweep_generic6_complement_guards[] = {
  * in  y[6] -H^T K - C
  * out z[6] D^-1 y
  */
-int mstmm_sweep_generic6_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_generic6_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = F[6] * y[0];
-    const real t2 = y[1] - t1;
-    const real t3 = F[7] * t2;
-    const real t4 = F[12] * y[0];
-    const real t5 = y[2] - t4;
-    const real t6 = F[13] * t2;
-    const real t7 = t5 - t6;
-    const real t8 = F[14] * t7;
-    const real t9 = F[18] * y[0];
-    const real t10 = y[3] - t9;
-    const real t11 = F[19] * t2;
-    const real t12 = t10 - t11;
-    const real t13 = F[20] * t7;
-    const real t14 = t12 - t13;
-    const real t15 = F[21] * t14;
-    const real t16 = F[24] * y[0];
-    const real t17 = y[4] - t16;
-    const real t18 = F[25] * t2;
-    const real t19 = t17 - t18;
-    const real t20 = F[26] * t7;
-    const real t21 = t19 - t20;
-    const real t22 = F[27] * t14;
-    const real t23 = t21 - t22;
-    const real t24 = F[28] * t23;
-    const real t25 = F[30] * y[0];
-    const real t26 = y[5] - t25;
-    const real t27 = F[31] * t2;
-    const real t28 = t26 - t27;
-    const real t29 = F[32] * t7;
-    const real t30 = t28 - t29;
-    const real t31 = F[33] * t14;
-    const real t32 = t30 - t31;
-    const real t33 = F[34] * t23;
-    const real t34 = t32 - t33;
-    const real t35 = F[35] * t34;
-    const real t36 = F[34] * t35;
-    const real t37 = t24 - t36;
-    const real t38 = F[27] * t37;
-    const real t39 = t15 - t38;
-    const real t40 = F[33] * t35;
-    const real t41 = t39 - t40;
-    const real t42 = F[20] * t41;
-    const real t43 = t8 - t42;
-    const real t44 = F[26] * t37;
-    const real t45 = t43 - t44;
-    const real t46 = F[32] * t35;
-    const real t47 = t45 - t46;
-    const real t48 = F[13] * t47;
-    const real t49 = t3 - t48;
-    const real t50 = F[19] * t41;
-    const real t51 = t49 - t50;
-    const real t52 = F[25] * t37;
-    const real t53 = t51 - t52;
-    const real t54 = F[31] * t35;
-    const real t55 = t53 - t54;
-    const real t56 = F[6] * t55;
-    const real t57 = t0 - t56;
-    const real t58 = F[12] * t47;
-    const real t59 = t57 - t58;
-    const real t60 = F[18] * t41;
-    const real t61 = t59 - t60;
-    const real t62 = F[24] * t37;
-    const real t63 = t61 - t62;
-    const real t64 = F[30] * t35;
-    const real t65 = t63 - t64;
-    z[0] = t65;
-    z[1] = t55;
-    z[2] = t47;
-    z[3] = t41;
-    z[4] = t37;
-    z[5] = t35;
-    return 0;
+  real t2 = y[1] - F[6] * y[0];
+  real t7 = y[2] - F[12] * y[0] - F[13] * t2;
+  real t14 = y[3] - F[18] * y[0] - F[19] * t2 - F[20] * t7;
+  real t23 = y[4] - F[24] * y[0] - F[25] * t2 - F[26] * t7 - F[27] * t14;
+  real t35 = F[35] * (y[5] - F[30] * y[0] - F[31] * t2 - F[32] * t7 - F[33] * t14 - F[34] * t23);
+  real t37 = F[28] * t23 - F[34] * t35;
+  real t41 = F[21] * t14 - F[27] * t37 - F[33] * t35;
+  real t47 = F[14] * t7 - F[20] * t41 - F[26] * t37 - F[32] * t35;
+  real t55 = F[7] * t2 - F[13] * t47 - F[19] * t41 - F[25] * t37 - F[31] * t35;
+  z[0] = F[0] * y[0] - F[6] * t55 - F[12] * t47 - F[18] * t41 - F[24] * t37 - F[30] * t35;
+  z[1] = t55;
+  z[2] = t47;
+  z[3] = t41;
+  z[4] = t37;
+  z[5] = t35;
+  return 0;
 }
 
-static int mstmm_sweep_generic6_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_divide_inputs[] = {
-    {"F", 36, "", 0, 0},
-    {"y", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_divide_outputs[] = {
-    {"z", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 6 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -13778,37 +3740,13 @@ static const mstmm_port mstmm_sweep_generic6_divide_outputs[] = {
  * in  z[6] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_generic6_couple(const real *restrict y, const real *restrict z, real *restrict L_ij)
+int mstmm_sweep_generic6_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = y[3] * z[3];
-    const real t6 = t4 + t5;
-    const real t7 = y[4] * z[4];
-    const real t8 = t6 + t7;
-    const real t9 = y[5] * z[5];
-    const real t10 = t8 + t9;
-    L_ij[0] += t10;
-    return 0;
+  L_ij[0] += y[0] * z[0] + y[1] * z[1] + y[2] * z[2] + y[3] * z[3] + y[4] * z[4] + y[5] * z[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_couple_inputs[] = {
-    {"y", 6, "", 0, 0},
-    {"z", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 6 speeds to a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -13817,39 +3755,13 @@ static const mstmm_port mstmm_sweep_generic6_couple_outputs[] = {
  * in  z[6] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_generic6_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_generic6_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = y[1] * z[1];
-    const real t2 = t0 + t1;
-    const real t3 = y[2] * z[2];
-    const real t4 = t2 + t3;
-    const real t5 = y[3] * z[3];
-    const real t6 = t4 + t5;
-    const real t7 = y[4] * z[4];
-    const real t8 = t6 + t7;
-    const real t9 = y[5] * z[5];
-    const real t10 = t8 + t9;
-    const real t11 = -t10;
-    l[0] += t11;
-    return 0;
+  l[0] += -(y[0] * z[0] + y[1] * z[1] + y[2] * z[2] + y[3] * z[3] + y[4] * z[4] + y[5] * z[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_add_known_part_inputs[] = {
-    {"y", 6, "", 0, 0},
-    {"z", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 6 speeds
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -13858,38 +3770,18 @@ static const mstmm_port mstmm_sweep_generic6_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[6] tau - H^T e, added to what is there
  */
-int mstmm_sweep_generic6_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_generic6_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    const real t1 = y[1] * x[0];
-    y_0[1] += t1;
-    const real t2 = y[2] * x[0];
-    y_0[2] += t2;
-    const real t3 = y[3] * x[0];
-    y_0[3] += t3;
-    const real t4 = y[4] * x[0];
-    y_0[4] += t4;
-    const real t5 = y[5] * x[0];
-    y_0[5] += t5;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  y_0[1] += y[1] * x[0];
+  y_0[2] += y[2] * x[0];
+  y_0[3] += y[3] * x[0];
+  y_0[4] += y[4] * x[0];
+  y_0[5] += y[5] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_inputs[] = {
-    {"y", 6, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_outputs[] = {
-    {"y_0", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of the bodies accelerated by a hinge with 6 speeds
  * in  S[21] inertia of everything outboard, at P
@@ -13897,607 +3789,81 @@ static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_outputs[] = {
  * in  udot[6] accelerations of the coordinates
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_generic6_required_load(const real *restrict S, const real *restrict H,
-    const real *restrict udot, real *restrict e)
+int mstmm_sweep_generic6_required_load(in_t S, in_t H, in_t udot, out_t e)
 {
-    const real t0 = S[0] * H[0];
-    const real t1 = S[1] * H[6];
-    const real t2 = t0 + t1;
-    const real t3 = S[2] * H[12];
-    const real t4 = t2 + t3;
-    const real t5 = S[3] * H[18];
-    const real t6 = t4 + t5;
-    const real t7 = S[4] * H[24];
-    const real t8 = t6 + t7;
-    const real t9 = S[5] * H[30];
-    const real t10 = t8 + t9;
-    const real t11 = udot[0] * t10;
-    const real t12 = S[0] * H[1];
-    const real t13 = S[1] * H[7];
-    const real t14 = t12 + t13;
-    const real t15 = S[2] * H[13];
-    const real t16 = t14 + t15;
-    const real t17 = S[3] * H[19];
-    const real t18 = t16 + t17;
-    const real t19 = S[4] * H[25];
-    const real t20 = t18 + t19;
-    const real t21 = S[5] * H[31];
-    const real t22 = t20 + t21;
-    const real t23 = udot[1] * t22;
-    const real t24 = t11 + t23;
-    const real t25 = S[0] * H[2];
-    const real t26 = S[1] * H[8];
-    const real t27 = t25 + t26;
-    const real t28 = S[2] * H[14];
-    const real t29 = t27 + t28;
-    const real t30 = S[3] * H[20];
-    const real t31 = t29 + t30;
-    const real t32 = S[4] * H[26];
-    const real t33 = t31 + t32;
-    const real t34 = S[5] * H[32];
-    const real t35 = t33 + t34;
-    const real t36 = udot[2] * t35;
-    const real t37 = t24 + t36;
-    const real t38 = S[0] * H[3];
-    const real t39 = S[1] * H[9];
-    const real t40 = t38 + t39;
-    const real t41 = S[2] * H[15];
-    const real t42 = t40 + t41;
-    const real t43 = S[3] * H[21];
-    const real t44 = t42 + t43;
-    const real t45 = S[4] * H[27];
-    const real t46 = t44 + t45;
-    const real t47 = S[5] * H[33];
-    const real t48 = t46 + t47;
-    const real t49 = udot[3] * t48;
-    const real t50 = t37 + t49;
-    const real t51 = S[0] * H[4];
-    const real t52 = S[1] * H[10];
-    const real t53 = t51 + t52;
-    const real t54 = S[2] * H[16];
-    const real t55 = t53 + t54;
-    const real t56 = S[3] * H[22];
-    const real t57 = t55 + t56;
-    const real t58 = S[4] * H[28];
-    const real t59 = t57 + t58;
-    const real t60 = S[5] * H[34];
-    const real t61 = t59 + t60;
-    const real t62 = udot[4] * t61;
-    const real t63 = t50 + t62;
-    const real t64 = S[0] * H[5];
-    const real t65 = S[1] * H[11];
-    const real t66 = t64 + t65;
-    const real t67 = S[2] * H[17];
-    const real t68 = t66 + t67;
-    const real t69 = S[3] * H[23];
-    const real t70 = t68 + t69;
-    const real t71 = S[4] * H[29];
-    const real t72 = t70 + t71;
-    const real t73 = S[5] * H[35];
-    const real t74 = t72 + t73;
-    const real t75 = udot[5] * t74;
-    const real t76 = t63 + t75;
-    e[0] = t76;
-    const real t77 = S[1] * H[0];
-    const real t78 = S[6] * H[6];
-    const real t79 = t77 + t78;
-    const real t80 = S[7] * H[12];
-    const real t81 = t79 + t80;
-    const real t82 = S[8] * H[18];
-    const real t83 = t81 + t82;
-    const real t84 = S[9] * H[24];
-    const real t85 = t83 + t84;
-    const real t86 = S[10] * H[30];
-    const real t87 = t85 + t86;
-    const real t88 = udot[0] * t87;
-    const real t89 = S[1] * H[1];
-    const real t90 = S[6] * H[7];
-    const real t91 = t89 + t90;
-    const real t92 = S[7] * H[13];
-    const real t93 = t91 + t92;
-    const real t94 = S[8] * H[19];
-    const real t95 = t93 + t94;
-    const real t96 = S[9] * H[25];
-    const real t97 = t95 + t96;
-    const real t98 = S[10] * H[31];
-    const real t99 = t97 + t98;
-    const real t100 = udot[1] * t99;
-    const real t101 = t88 + t100;
-    const real t102 = S[1] * H[2];
-    const real t103 = S[6] * H[8];
-    const real t104 = t102 + t103;
-    const real t105 = S[7] * H[14];
-    const real t106 = t104 + t105;
-    const real t107 = S[8] * H[20];
-    const real t108 = t106 + t107;
-    const real t109 = S[9] * H[26];
-    const real t110 = t108 + t109;
-    const real t111 = S[10] * H[32];
-    const real t112 = t110 + t111;
-    const real t113 = udot[2] * t112;
-    const real t114 = t101 + t113;
-    const real t115 = S[1] * H[3];
-    const real t116 = S[6] * H[9];
-    const real t117 = t115 + t116;
-    const real t118 = S[7] * H[15];
-    const real t119 = t117 + t118;
-    const real t120 = S[8] * H[21];
-    const real t121 = t119 + t120;
-    const real t122 = S[9] * H[27];
-    const real t123 = t121 + t122;
-    const real t124 = S[10] * H[33];
-    const real t125 = t123 + t124;
-    const real t126 = udot[3] * t125;
-    const real t127 = t114 + t126;
-    const real t128 = S[1] * H[4];
-    const real t129 = S[6] * H[10];
-    const real t130 = t128 + t129;
-    const real t131 = S[7] * H[16];
-    const real t132 = t130 + t131;
-    const real t133 = S[8] * H[22];
-    const real t134 = t132 + t133;
-    const real t135 = S[9] * H[28];
-    const real t136 = t134 + t135;
-    const real t137 = S[10] * H[34];
-    const real t138 = t136 + t137;
-    const real t139 = udot[4] * t138;
-    const real t140 = t127 + t139;
-    const real t141 = S[1] * H[5];
-    const real t142 = S[6] * H[11];
-    const real t143 = t141 + t142;
-    const real t144 = S[7] * H[17];
-    const real t145 = t143 + t144;
-    const real t146 = S[8] * H[23];
-    const real t147 = t145 + t146;
-    const real t148 = S[9] * H[29];
-    const real t149 = t147 + t148;
-    const real t150 = S[10] * H[35];
-    const real t151 = t149 + t150;
-    const real t152 = udot[5] * t151;
-    const real t153 = t140 + t152;
-    e[1] = t153;
-    const real t154 = S[2] * H[0];
-    const real t155 = S[7] * H[6];
-    const real t156 = t154 + t155;
-    const real t157 = S[11] * H[12];
-    const real t158 = t156 + t157;
-    const real t159 = S[12] * H[18];
-    const real t160 = t158 + t159;
-    const real t161 = S[13] * H[24];
-    const real t162 = t160 + t161;
-    const real t163 = S[14] * H[30];
-    const real t164 = t162 + t163;
-    const real t165 = udot[0] * t164;
-    const real t166 = S[2] * H[1];
-    const real t167 = S[7] * H[7];
-    const real t168 = t166 + t167;
-    const real t169 = S[11] * H[13];
-    const real t170 = t168 + t169;
-    const real t171 = S[12] * H[19];
-    const real t172 = t170 + t171;
-    const real t173 = S[13] * H[25];
-    const real t174 = t172 + t173;
-    const real t175 = S[14] * H[31];
-    const real t176 = t174 + t175;
-    const real t177 = udot[1] * t176;
-    const real t178 = t165 + t177;
-    const real t179 = S[2] * H[2];
-    const real t180 = S[7] * H[8];
-    const real t181 = t179 + t180;
-    const real t182 = S[11] * H[14];
-    const real t183 = t181 + t182;
-    const real t184 = S[12] * H[20];
-    const real t185 = t183 + t184;
-    const real t186 = S[13] * H[26];
-    const real t187 = t185 + t186;
-    const real t188 = S[14] * H[32];
-    const real t189 = t187 + t188;
-    const real t190 = udot[2] * t189;
-    const real t191 = t178 + t190;
-    const real t192 = S[2] * H[3];
-    const real t193 = S[7] * H[9];
-    const real t194 = t192 + t193;
-    const real t195 = S[11] * H[15];
-    const real t196 = t194 + t195;
-    const real t197 = S[12] * H[21];
-    const real t198 = t196 + t197;
-    const real t199 = S[13] * H[27];
-    const real t200 = t198 + t199;
-    const real t201 = S[14] * H[33];
-    const real t202 = t200 + t201;
-    const real t203 = udot[3] * t202;
-    const real t204 = t191 + t203;
-    const real t205 = S[2] * H[4];
-    const real t206 = S[7] * H[10];
-    const real t207 = t205 + t206;
-    const real t208 = S[11] * H[16];
-    const real t209 = t207 + t208;
-    const real t210 = S[12] * H[22];
-    const real t211 = t209 + t210;
-    const real t212 = S[13] * H[28];
-    const real t213 = t211 + t212;
-    const real t214 = S[14] * H[34];
-    const real t215 = t213 + t214;
-    const real t216 = udot[4] * t215;
-    const real t217 = t204 + t216;
-    const real t218 = S[2] * H[5];
-    const real t219 = S[7] * H[11];
-    const real t220 = t218 + t219;
-    const real t221 = S[11] * H[17];
-    const real t222 = t220 + t221;
-    const real t223 = S[12] * H[23];
-    const real t224 = t222 + t223;
-    const real t225 = S[13] * H[29];
-    const real t226 = t224 + t225;
-    const real t227 = S[14] * H[35];
-    const real t228 = t226 + t227;
-    const real t229 = udot[5] * t228;
-    const real t230 = t217 + t229;
-    e[2] = t230;
-    const real t231 = S[3] * H[0];
-    const real t232 = S[8] * H[6];
-    const real t233 = t231 + t232;
-    const real t234 = S[12] * H[12];
-    const real t235 = t233 + t234;
-    const real t236 = S[15] * H[18];
-    const real t237 = t235 + t236;
-    const real t238 = S[16] * H[24];
-    const real t239 = t237 + t238;
-    const real t240 = S[17] * H[30];
-    const real t241 = t239 + t240;
-    const real t242 = udot[0] * t241;
-    const real t243 = S[3] * H[1];
-    const real t244 = S[8] * H[7];
-    const real t245 = t243 + t244;
-    const real t246 = S[12] * H[13];
-    const real t247 = t245 + t246;
-    const real t248 = S[15] * H[19];
-    const real t249 = t247 + t248;
-    const real t250 = S[16] * H[25];
-    const real t251 = t249 + t250;
-    const real t252 = S[17] * H[31];
-    const real t253 = t251 + t252;
-    const real t254 = udot[1] * t253;
-    const real t255 = t242 + t254;
-    const real t256 = S[3] * H[2];
-    const real t257 = S[8] * H[8];
-    const real t258 = t256 + t257;
-    const real t259 = S[12] * H[14];
-    const real t260 = t258 + t259;
-    const real t261 = S[15] * H[20];
-    const real t262 = t260 + t261;
-    const real t263 = S[16] * H[26];
-    const real t264 = t262 + t263;
-    const real t265 = S[17] * H[32];
-    const real t266 = t264 + t265;
-    const real t267 = udot[2] * t266;
-    const real t268 = t255 + t267;
-    const real t269 = S[3] * H[3];
-    const real t270 = S[8] * H[9];
-    const real t271 = t269 + t270;
-    const real t272 = S[12] * H[15];
-    const real t273 = t271 + t272;
-    const real t274 = S[15] * H[21];
-    const real t275 = t273 + t274;
-    const real t276 = S[16] * H[27];
-    const real t277 = t275 + t276;
-    const real t278 = S[17] * H[33];
-    const real t279 = t277 + t278;
-    const real t280 = udot[3] * t279;
-    const real t281 = t268 + t280;
-    const real t282 = S[3] * H[4];
-    const real t283 = S[8] * H[10];
-    const real t284 = t282 + t283;
-    const real t285 = S[12] * H[16];
-    const real t286 = t284 + t285;
-    const real t287 = S[15] * H[22];
-    const real t288 = t286 + t287;
-    const real t289 = S[16] * H[28];
-    const real t290 = t288 + t289;
-    const real t291 = S[17] * H[34];
-    const real t292 = t290 + t291;
-    const real t293 = udot[4] * t292;
-    const real t294 = t281 + t293;
-    const real t295 = S[3] * H[5];
-    const real t296 = S[8] * H[11];
-    const real t297 = t295 + t296;
-    const real t298 = S[12] * H[17];
-    const real t299 = t297 + t298;
-    const real t300 = S[15] * H[23];
-    const real t301 = t299 + t300;
-    const real t302 = S[16] * H[29];
-    const real t303 = t301 + t302;
-    const real t304 = S[17] * H[35];
-    const real t305 = t303 + t304;
-    const real t306 = udot[5] * t305;
-    const real t307 = t294 + t306;
-    e[3] = t307;
-    const real t308 = S[4] * H[0];
-    const real t309 = S[9] * H[6];
-    const real t310 = t308 + t309;
-    const real t311 = S[13] * H[12];
-    const real t312 = t310 + t311;
-    const real t313 = S[16] * H[18];
-    const real t314 = t312 + t313;
-    const real t315 = S[18] * H[24];
-    const real t316 = t314 + t315;
-    const real t317 = S[19] * H[30];
-    const real t318 = t316 + t317;
-    const real t319 = udot[0] * t318;
-    const real t320 = S[4] * H[1];
-    const real t321 = S[9] * H[7];
-    const real t322 = t320 + t321;
-    const real t323 = S[13] * H[13];
-    const real t324 = t322 + t323;
-    const real t325 = S[16] * H[19];
-    const real t326 = t324 + t325;
-    const real t327 = S[18] * H[25];
-    const real t328 = t326 + t327;
-    const real t329 = S[19] * H[31];
-    const real t330 = t328 + t329;
-    const real t331 = udot[1] * t330;
-    const real t332 = t319 + t331;
-    const real t333 = S[4] * H[2];
-    const real t334 = S[9] * H[8];
-    const real t335 = t333 + t334;
-    const real t336 = S[13] * H[14];
-    const real t337 = t335 + t336;
-    const real t338 = S[16] * H[20];
-    const real t339 = t337 + t338;
-    const real t340 = S[18] * H[26];
-    const real t341 = t339 + t340;
-    const real t342 = S[19] * H[32];
-    const real t343 = t341 + t342;
-    const real t344 = udot[2] * t343;
-    const real t345 = t332 + t344;
-    const real t346 = S[4] * H[3];
-    const real t347 = S[9] * H[9];
-    const real t348 = t346 + t347;
-    const real t349 = S[13] * H[15];
-    const real t350 = t348 + t349;
-    const real t351 = S[16] * H[21];
-    const real t352 = t350 + t351;
-    const real t353 = S[18] * H[27];
-    const real t354 = t352 + t353;
-    const real t355 = S[19] * H[33];
-    const real t356 = t354 + t355;
-    const real t357 = udot[3] * t356;
-    const real t358 = t345 + t357;
-    const real t359 = S[4] * H[4];
-    const real t360 = S[9] * H[10];
-    const real t361 = t359 + t360;
-    const real t362 = S[13] * H[16];
-    const real t363 = t361 + t362;
-    const real t364 = S[16] * H[22];
-    const real t365 = t363 + t364;
-    const real t366 = S[18] * H[28];
-    const real t367 = t365 + t366;
-    const real t368 = S[19] * H[34];
-    const real t369 = t367 + t368;
-    const real t370 = udot[4] * t369;
-    const real t371 = t358 + t370;
-    const real t372 = S[4] * H[5];
-    const real t373 = S[9] * H[11];
-    const real t374 = t372 + t373;
-    const real t375 = S[13] * H[17];
-    const real t376 = t374 + t375;
-    const real t377 = S[16] * H[23];
-    const real t378 = t376 + t377;
-    const real t379 = S[18] * H[29];
-    const real t380 = t378 + t379;
-    const real t381 = S[19] * H[35];
-    const real t382 = t380 + t381;
-    const real t383 = udot[5] * t382;
-    const real t384 = t371 + t383;
-    e[4] = t384;
-    const real t385 = S[5] * H[0];
-    const real t386 = S[10] * H[6];
-    const real t387 = t385 + t386;
-    const real t388 = S[14] * H[12];
-    const real t389 = t387 + t388;
-    const real t390 = S[17] * H[18];
-    const real t391 = t389 + t390;
-    const real t392 = S[19] * H[24];
-    const real t393 = t391 + t392;
-    const real t394 = S[20] * H[30];
-    const real t395 = t393 + t394;
-    const real t396 = udot[0] * t395;
-    const real t397 = S[5] * H[1];
-    const real t398 = S[10] * H[7];
-    const real t399 = t397 + t398;
-    const real t400 = S[14] * H[13];
-    const real t401 = t399 + t400;
-    const real t402 = S[17] * H[19];
-    const real t403 = t401 + t402;
-    const real t404 = S[19] * H[25];
-    const real t405 = t403 + t404;
-    const real t406 = S[20] * H[31];
-    const real t407 = t405 + t406;
-    const real t408 = udot[1] * t407;
-    const real t409 = t396 + t408;
-    const real t410 = S[5] * H[2];
-    const real t411 = S[10] * H[8];
-    const real t412 = t410 + t411;
-    const real t413 = S[14] * H[14];
-    const real t414 = t412 + t413;
-    const real t415 = S[17] * H[20];
-    const real t416 = t414 + t415;
-    const real t417 = S[19] * H[26];
-    const real t418 = t416 + t417;
-    const real t419 = S[20] * H[32];
-    const real t420 = t418 + t419;
-    const real t421 = udot[2] * t420;
-    const real t422 = t409 + t421;
-    const real t423 = S[5] * H[3];
-    const real t424 = S[10] * H[9];
-    const real t425 = t423 + t424;
-    const real t426 = S[14] * H[15];
-    const real t427 = t425 + t426;
-    const real t428 = S[17] * H[21];
-    const real t429 = t427 + t428;
-    const real t430 = S[19] * H[27];
-    const real t431 = t429 + t430;
-    const real t432 = S[20] * H[33];
-    const real t433 = t431 + t432;
-    const real t434 = udot[3] * t433;
-    const real t435 = t422 + t434;
-    const real t436 = S[5] * H[4];
-    const real t437 = S[10] * H[10];
-    const real t438 = t436 + t437;
-    const real t439 = S[14] * H[16];
-    const real t440 = t438 + t439;
-    const real t441 = S[17] * H[22];
-    const real t442 = t440 + t441;
-    const real t443 = S[19] * H[28];
-    const real t444 = t442 + t443;
-    const real t445 = S[20] * H[34];
-    const real t446 = t444 + t445;
-    const real t447 = udot[4] * t446;
-    const real t448 = t435 + t447;
-    const real t449 = S[5] * H[5];
-    const real t450 = S[10] * H[11];
-    const real t451 = t449 + t450;
-    const real t452 = S[14] * H[17];
-    const real t453 = t451 + t452;
-    const real t454 = S[17] * H[23];
-    const real t455 = t453 + t454;
-    const real t456 = S[19] * H[29];
-    const real t457 = t455 + t456;
-    const real t458 = S[20] * H[35];
-    const real t459 = t457 + t458;
-    const real t460 = udot[5] * t459;
-    const real t461 = t448 + t460;
-    e[5] = t461;
-    return 0;
+  e[0] = udot[0] * (S[0] * H[0] + S[1] * H[6] + S[2] * H[12] + S[3] * H[18] + S[4] * H[24] + S[5] *
+    H[30]) + udot[1] * (S[0] * H[1] + S[1] * H[7] + S[2] * H[13] + S[3] * H[19] + S[4] * H[25] +
+    S[5] * H[31]) + udot[2] * (S[0] * H[2] + S[1] * H[8] + S[2] * H[14] + S[3] * H[20] + S[4] *
+    H[26] + S[5] * H[32]) + udot[3] * (S[0] * H[3] + S[1] * H[9] + S[2] * H[15] + S[3] * H[21] +
+    S[4] * H[27] + S[5] * H[33]) + udot[4] * (S[0] * H[4] + S[1] * H[10] + S[2] * H[16] + S[3] *
+    H[22] + S[4] * H[28] + S[5] * H[34]) + udot[5] * (S[0] * H[5] + S[1] * H[11] + S[2] * H[17] +
+    S[3] * H[23] + S[4] * H[29] + S[5] * H[35]);
+  e[1] = udot[0] * (S[1] * H[0] + S[6] * H[6] + S[7] * H[12] + S[8] * H[18] + S[9] * H[24] + S[10] *
+    H[30]) + udot[1] * (S[1] * H[1] + S[6] * H[7] + S[7] * H[13] + S[8] * H[19] + S[9] * H[25] +
+    S[10] * H[31]) + udot[2] * (S[1] * H[2] + S[6] * H[8] + S[7] * H[14] + S[8] * H[20] + S[9] *
+    H[26] + S[10] * H[32]) + udot[3] * (S[1] * H[3] + S[6] * H[9] + S[7] * H[15] + S[8] * H[21] +
+    S[9] * H[27] + S[10] * H[33]) + udot[4] * (S[1] * H[4] + S[6] * H[10] + S[7] * H[16] + S[8] *
+    H[22] + S[9] * H[28] + S[10] * H[34]) + udot[5] * (S[1] * H[5] + S[6] * H[11] + S[7] * H[17] +
+    S[8] * H[23] + S[9] * H[29] + S[10] * H[35]);
+  e[2] = udot[0] * (S[2] * H[0] + S[7] * H[6] + S[11] * H[12] + S[12] * H[18] + S[13] * H[24] +
+    S[14] * H[30]) + udot[1] * (S[2] * H[1] + S[7] * H[7] + S[11] * H[13] + S[12] * H[19] + S[13] *
+    H[25] + S[14] * H[31]) + udot[2] * (S[2] * H[2] + S[7] * H[8] + S[11] * H[14] + S[12] * H[20] +
+    S[13] * H[26] + S[14] * H[32]) + udot[3] * (S[2] * H[3] + S[7] * H[9] + S[11] * H[15] + S[12] *
+    H[21] + S[13] * H[27] + S[14] * H[33]) + udot[4] * (S[2] * H[4] + S[7] * H[10] + S[11] * H[16] +
+    S[12] * H[22] + S[13] * H[28] + S[14] * H[34]) + udot[5] * (S[2] * H[5] + S[7] * H[11] + S[11] *
+    H[17] + S[12] * H[23] + S[13] * H[29] + S[14] * H[35]);
+  e[3] = udot[0] * (S[3] * H[0] + S[8] * H[6] + S[12] * H[12] + S[15] * H[18] + S[16] * H[24] +
+    S[17] * H[30]) + udot[1] * (S[3] * H[1] + S[8] * H[7] + S[12] * H[13] + S[15] * H[19] + S[16] *
+    H[25] + S[17] * H[31]) + udot[2] * (S[3] * H[2] + S[8] * H[8] + S[12] * H[14] + S[15] * H[20] +
+    S[16] * H[26] + S[17] * H[32]) + udot[3] * (S[3] * H[3] + S[8] * H[9] + S[12] * H[15] + S[15] *
+    H[21] + S[16] * H[27] + S[17] * H[33]) + udot[4] * (S[3] * H[4] + S[8] * H[10] + S[12] * H[16] +
+    S[15] * H[22] + S[16] * H[28] + S[17] * H[34]) + udot[5] * (S[3] * H[5] + S[8] * H[11] + S[12] *
+    H[17] + S[15] * H[23] + S[16] * H[29] + S[17] * H[35]);
+  e[4] = udot[0] * (S[4] * H[0] + S[9] * H[6] + S[13] * H[12] + S[16] * H[18] + S[18] * H[24] +
+    S[19] * H[30]) + udot[1] * (S[4] * H[1] + S[9] * H[7] + S[13] * H[13] + S[16] * H[19] + S[18] *
+    H[25] + S[19] * H[31]) + udot[2] * (S[4] * H[2] + S[9] * H[8] + S[13] * H[14] + S[16] * H[20] +
+    S[18] * H[26] + S[19] * H[32]) + udot[3] * (S[4] * H[3] + S[9] * H[9] + S[13] * H[15] + S[16] *
+    H[21] + S[18] * H[27] + S[19] * H[33]) + udot[4] * (S[4] * H[4] + S[9] * H[10] + S[13] * H[16] +
+    S[16] * H[22] + S[18] * H[28] + S[19] * H[34]) + udot[5] * (S[4] * H[5] + S[9] * H[11] + S[13] *
+    H[17] + S[16] * H[23] + S[18] * H[29] + S[19] * H[35]);
+  e[5] = udot[0] * (S[5] * H[0] + S[10] * H[6] + S[14] * H[12] + S[17] * H[18] + S[19] * H[24] +
+    S[20] * H[30]) + udot[1] * (S[5] * H[1] + S[10] * H[7] + S[14] * H[13] + S[17] * H[19] + S[19] *
+    H[25] + S[20] * H[31]) + udot[2] * (S[5] * H[2] + S[10] * H[8] + S[14] * H[14] + S[17] * H[20] +
+    S[19] * H[26] + S[20] * H[32]) + udot[3] * (S[5] * H[3] + S[10] * H[9] + S[14] * H[15] + S[17] *
+    H[21] + S[19] * H[27] + S[20] * H[33]) + udot[4] * (S[5] * H[4] + S[10] * H[10] + S[14] * H[16]
+    + S[17] * H[22] + S[19] * H[28] + S[20] * H[34]) + udot[5] * (S[5] * H[5] + S[10] * H[11] +
+    S[14] * H[17] + S[17] * H[23] + S[19] * H[29] + S[20] * H[35]);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_required_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_required_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_required_load_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"udot", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_required_load_outputs[] = {
-    {"e", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_required_load, (in[0], in[1], in[2], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 6 free speeds
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  H[6][6] motion subspace of the free coordinates
  * in  e[6] (N, N*m) force part of f = S a + e, at P
  * in  tau[6] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[6] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_generic6_ground_column_load(const real *restrict H, const real *restrict e,
-    const real *restrict tau, real *restrict y)
+int mstmm_sweep_generic6_ground_column_load(in_t H, in_t e, in_t tau, out_t y)
 {
-    const real t0 = H[0] * e[0];
-    const real t1 = H[6] * e[1];
-    const real t2 = t0 + t1;
-    const real t3 = H[12] * e[2];
-    const real t4 = t2 + t3;
-    const real t5 = H[18] * e[3];
-    const real t6 = t4 + t5;
-    const real t7 = H[24] * e[4];
-    const real t8 = t6 + t7;
-    const real t9 = H[30] * e[5];
-    const real t10 = t8 + t9;
-    const real t11 = tau[0] - t10;
-    y[0] = t11;
-    const real t12 = H[1] * e[0];
-    const real t13 = H[7] * e[1];
-    const real t14 = t12 + t13;
-    const real t15 = H[13] * e[2];
-    const real t16 = t14 + t15;
-    const real t17 = H[19] * e[3];
-    const real t18 = t16 + t17;
-    const real t19 = H[25] * e[4];
-    const real t20 = t18 + t19;
-    const real t21 = H[31] * e[5];
-    const real t22 = t20 + t21;
-    const real t23 = tau[1] - t22;
-    y[1] = t23;
-    const real t24 = H[2] * e[0];
-    const real t25 = H[8] * e[1];
-    const real t26 = t24 + t25;
-    const real t27 = H[14] * e[2];
-    const real t28 = t26 + t27;
-    const real t29 = H[20] * e[3];
-    const real t30 = t28 + t29;
-    const real t31 = H[26] * e[4];
-    const real t32 = t30 + t31;
-    const real t33 = H[32] * e[5];
-    const real t34 = t32 + t33;
-    const real t35 = tau[2] - t34;
-    y[2] = t35;
-    const real t36 = H[3] * e[0];
-    const real t37 = H[9] * e[1];
-    const real t38 = t36 + t37;
-    const real t39 = H[15] * e[2];
-    const real t40 = t38 + t39;
-    const real t41 = H[21] * e[3];
-    const real t42 = t40 + t41;
-    const real t43 = H[27] * e[4];
-    const real t44 = t42 + t43;
-    const real t45 = H[33] * e[5];
-    const real t46 = t44 + t45;
-    const real t47 = tau[3] - t46;
-    y[3] = t47;
-    const real t48 = H[4] * e[0];
-    const real t49 = H[10] * e[1];
-    const real t50 = t48 + t49;
-    const real t51 = H[16] * e[2];
-    const real t52 = t50 + t51;
-    const real t53 = H[22] * e[3];
-    const real t54 = t52 + t53;
-    const real t55 = H[28] * e[4];
-    const real t56 = t54 + t55;
-    const real t57 = H[34] * e[5];
-    const real t58 = t56 + t57;
-    const real t59 = tau[4] - t58;
-    y[4] = t59;
-    const real t60 = H[5] * e[0];
-    const real t61 = H[11] * e[1];
-    const real t62 = t60 + t61;
-    const real t63 = H[17] * e[2];
-    const real t64 = t62 + t63;
-    const real t65 = H[23] * e[3];
-    const real t66 = t64 + t65;
-    const real t67 = H[29] * e[4];
-    const real t68 = t66 + t67;
-    const real t69 = H[35] * e[5];
-    const real t70 = t68 + t69;
-    const real t71 = tau[5] - t70;
-    y[5] = t71;
-    return 0;
+  y[0] = tau[0] - (H[0] * e[0] + H[6] * e[1] + H[12] * e[2] + H[18] * e[3] + H[24] * e[4] + H[30] *
+    e[5]);
+  y[1] = tau[1] - (H[1] * e[0] + H[7] * e[1] + H[13] * e[2] + H[19] * e[3] + H[25] * e[4] + H[31] *
+    e[5]);
+  y[2] = tau[2] - (H[2] * e[0] + H[8] * e[1] + H[14] * e[2] + H[20] * e[3] + H[26] * e[4] + H[32] *
+    e[5]);
+  y[3] = tau[3] - (H[3] * e[0] + H[9] * e[1] + H[15] * e[2] + H[21] * e[3] + H[27] * e[4] + H[33] *
+    e[5]);
+  y[4] = tau[4] - (H[4] * e[0] + H[10] * e[1] + H[16] * e[2] + H[22] * e[3] + H[28] * e[4] + H[34] *
+    e[5]);
+  y[5] = tau[5] - (H[5] * e[0] + H[11] * e[1] + H[17] * e[2] + H[23] * e[3] + H[29] * e[4] + H[35] *
+    e[5]);
+  return 0;
 }
 
-static int mstmm_sweep_generic6_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_ground_column_load(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_ground_column_load_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"tau", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_ground_column_load_outputs[] = {
-    {"y", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_ground_column_load, (in[0], in[1], in[2], out[0]))
 
 /* forward and its derivative along a direction
- * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
- * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes
  * in  ro[3] (m) inboard point Q in the parent, parent axes
  * in  R[3][3]
@@ -14520,608 +3886,128 @@ static const mstmm_port mstmm_sweep_generic6_ground_column_load_outputs[] = {
  * out d_r[3] (m) derivative of r
  * out d_motion[9] derivative of motion
  */
-int mstmm_sweep_generic6_forward_slope(const real *restrict Rt, const real *restrict ro,
-    const real *restrict R, const real *restrict d, const real *restrict H, const real *restrict v,
-    const real *restrict w, const real *restrict c, const real *restrict s,
-    const real *restrict motion_I, const real *restrict d_R, const real *restrict d_d,
-    const real *restrict d_H, const real *restrict d_v, const real *restrict d_w,
-    const real *restrict d_c, const real *restrict d_s, const real *restrict d_motion_I,
-    real *restrict d_Rc, real *restrict d_r, real *restrict d_motion)
+int mstmm_sweep_generic6_forward_slope(in_t Rt, in_t ro, in_t R, in_t d, in_t H, in_t v, in_t w,
+    in_t c, in_t s, in_t motion_I, in_t d_R, in_t d_d, in_t d_H, in_t d_v, in_t d_w, in_t d_c,
+    in_t d_s, in_t d_motion_I, out_t d_Rc, out_t d_r, out_t d_motion)
 {
-    (void)c;
-    const real t0 = Rt[2] * d_R[6];
-    const real t1 = Rt[1] * d_R[3];
-    const real t2 = Rt[0] * d_R[0];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    d_Rc[0] = t4;
-    const real t5 = Rt[2] * d_R[7];
-    const real t6 = Rt[1] * d_R[4];
-    const real t7 = Rt[0] * d_R[1];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    d_Rc[1] = t9;
-    const real t10 = Rt[2] * d_R[8];
-    const real t11 = Rt[1] * d_R[5];
-    const real t12 = Rt[0] * d_R[2];
-    const real t13 = t11 + t12;
-    const real t14 = t10 + t13;
-    d_Rc[2] = t14;
-    const real t15 = Rt[5] * d_R[6];
-    const real t16 = Rt[4] * d_R[3];
-    const real t17 = Rt[3] * d_R[0];
-    const real t18 = t16 + t17;
-    const real t19 = t15 + t18;
-    d_Rc[3] = t19;
-    const real t20 = Rt[5] * d_R[7];
-    const real t21 = Rt[4] * d_R[4];
-    const real t22 = Rt[3] * d_R[1];
-    const real t23 = t21 + t22;
-    const real t24 = t20 + t23;
-    d_Rc[4] = t24;
-    const real t25 = Rt[5] * d_R[8];
-    const real t26 = Rt[4] * d_R[5];
-    const real t27 = Rt[3] * d_R[2];
-    const real t28 = t26 + t27;
-    const real t29 = t25 + t28;
-    d_Rc[5] = t29;
-    const real t30 = Rt[8] * d_R[6];
-    const real t31 = Rt[7] * d_R[3];
-    const real t32 = Rt[6] * d_R[0];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    d_Rc[6] = t34;
-    const real t35 = Rt[8] * d_R[7];
-    const real t36 = Rt[7] * d_R[4];
-    const real t37 = Rt[6] * d_R[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    d_Rc[7] = t39;
-    const real t40 = Rt[8] * d_R[8];
-    const real t41 = Rt[7] * d_R[5];
-    const real t42 = Rt[6] * d_R[2];
-    const real t43 = t41 + t42;
-    const real t44 = t40 + t43;
-    d_Rc[8] = t44;
-    const real t45 = Rt[2] * d_d[2];
-    const real t46 = Rt[1] * d_d[1];
-    const real t47 = Rt[0] * d_d[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    d_r[0] = t49;
-    const real t50 = Rt[5] * d_d[2];
-    const real t51 = Rt[4] * d_d[1];
-    const real t52 = Rt[3] * d_d[0];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    d_r[1] = t54;
-    const real t55 = Rt[8] * d_d[2];
-    const real t56 = Rt[7] * d_d[1];
-    const real t57 = Rt[6] * d_d[0];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    d_r[2] = t59;
-    const real t60 = motion_I[2] * t34;
-    const real t61 = R[0] * Rt[6];
-    const real t62 = R[3] * Rt[7];
-    const real t63 = t61 + t62;
-    const real t64 = R[6] * Rt[8];
-    const real t65 = t63 + t64;
-    const real t66 = t65 * d_motion_I[2];
-    const real t67 = t60 + t66;
-    const real t68 = motion_I[1] * t19;
-    const real t69 = R[0] * Rt[3];
-    const real t70 = R[3] * Rt[4];
-    const real t71 = t69 + t70;
-    const real t72 = R[6] * Rt[5];
-    const real t73 = t71 + t72;
-    const real t74 = t73 * d_motion_I[1];
-    const real t75 = t68 + t74;
-    const real t76 = motion_I[0] * t4;
-    const real t77 = Rt[0] * R[0];
-    const real t78 = Rt[1] * R[3];
-    const real t79 = t77 + t78;
-    const real t80 = Rt[2] * R[6];
-    const real t81 = t79 + t80;
-    const real t82 = t81 * d_motion_I[0];
-    const real t83 = t76 + t82;
-    const real t84 = t75 + t83;
-    const real t85 = t67 + t84;
-    const real t86 = d_w[0] + t85;
-    d_motion[0] = t86;
-    const real t87 = motion_I[2] * t39;
-    const real t88 = R[1] * Rt[6];
-    const real t89 = R[4] * Rt[7];
-    const real t90 = t88 + t89;
-    const real t91 = R[7] * Rt[8];
-    const real t92 = t90 + t91;
-    const real t93 = t92 * d_motion_I[2];
-    const real t94 = t87 + t93;
-    const real t95 = motion_I[1] * t24;
-    const real t96 = R[1] * Rt[3];
-    const real t97 = R[4] * Rt[4];
-    const real t98 = t96 + t97;
-    const real t99 = R[7] * Rt[5];
-    const real t100 = t98 + t99;
-    const real t101 = t100 * d_motion_I[1];
-    const real t102 = t95 + t101;
-    const real t103 = motion_I[0] * t9;
-    const real t104 = Rt[0] * R[1];
-    const real t105 = Rt[1] * R[4];
-    const real t106 = t104 + t105;
-    const real t107 = Rt[2] * R[7];
-    const real t108 = t106 + t107;
-    const real t109 = t108 * d_motion_I[0];
-    const real t110 = t103 + t109;
-    const real t111 = t102 + t110;
-    const real t112 = t94 + t111;
-    const real t113 = d_w[1] + t112;
-    d_motion[1] = t113;
-    const real t114 = motion_I[2] * t44;
-    const real t115 = R[2] * Rt[6];
-    const real t116 = R[5] * Rt[7];
-    const real t117 = t115 + t116;
-    const real t118 = R[8] * Rt[8];
-    const real t119 = t117 + t118;
-    const real t120 = t119 * d_motion_I[2];
-    const real t121 = t114 + t120;
-    const real t122 = motion_I[1] * t29;
-    const real t123 = R[2] * Rt[3];
-    const real t124 = R[5] * Rt[4];
-    const real t125 = t123 + t124;
-    const real t126 = R[8] * Rt[5];
-    const real t127 = t125 + t126;
-    const real t128 = t127 * d_motion_I[1];
-    const real t129 = t122 + t128;
-    const real t130 = motion_I[0] * t14;
-    const real t131 = Rt[0] * R[2];
-    const real t132 = Rt[1] * R[5];
-    const real t133 = t131 + t132;
-    const real t134 = Rt[2] * R[8];
-    const real t135 = t133 + t134;
-    const real t136 = t135 * d_motion_I[0];
-    const real t137 = t130 + t136;
-    const real t138 = t129 + t137;
-    const real t139 = t121 + t138;
-    const real t140 = d_w[2] + t139;
-    d_motion[2] = t140;
-    const real t141 = w[2] * t112;
-    const real t142 = t108 * motion_I[0];
-    const real t143 = t100 * motion_I[1];
-    const real t144 = t142 + t143;
-    const real t145 = t92 * motion_I[2];
-    const real t146 = t144 + t145;
-    const real t147 = t146 * d_w[2];
-    const real t148 = t141 + t147;
-    const real t149 = t135 * motion_I[0];
-    const real t150 = t127 * motion_I[1];
-    const real t151 = t149 + t150;
-    const real t152 = t119 * motion_I[2];
-    const real t153 = t151 + t152;
-    const real t154 = t153 * d_w[1];
-    const real t155 = w[1] * t139;
-    const real t156 = t154 + t155;
-    const real t157 = t148 - t156;
-    const real t158 = s[5] * d_H[23];
-    const real t159 = H[23] * d_s[5];
-    const real t160 = t158 + t159;
-    const real t161 = s[4] * d_H[22];
-    const real t162 = H[22] * d_s[4];
-    const real t163 = t161 + t162;
-    const real t164 = s[3] * d_H[21];
-    const real t165 = H[21] * d_s[3];
-    const real t166 = t164 + t165;
-    const real t167 = s[2] * d_H[20];
-    const real t168 = H[20] * d_s[2];
-    const real t169 = t167 + t168;
-    const real t170 = s[1] * d_H[19];
-    const real t171 = H[19] * d_s[1];
-    const real t172 = t170 + t171;
-    const real t173 = s[0] * d_H[18];
-    const real t174 = H[18] * d_s[0];
-    const real t175 = t173 + t174;
-    const real t176 = t172 + t175;
-    const real t177 = t169 + t176;
-    const real t178 = t166 + t177;
-    const real t179 = t163 + t178;
-    const real t180 = t160 + t179;
-    const real t181 = d_c[3] + t180;
-    const real t182 = t157 + t181;
-    const real t183 = motion_I[5] * t34;
-    const real t184 = t65 * d_motion_I[5];
-    const real t185 = t183 + t184;
-    const real t186 = motion_I[4] * t19;
-    const real t187 = t73 * d_motion_I[4];
-    const real t188 = t186 + t187;
-    const real t189 = motion_I[3] * t4;
-    const real t190 = t81 * d_motion_I[3];
-    const real t191 = t189 + t190;
-    const real t192 = t188 + t191;
-    const real t193 = t185 + t192;
-    const real t194 = t182 + t193;
-    d_motion[3] = t194;
-    const real t195 = t153 * d_w[0];
-    const real t196 = w[0] * t139;
-    const real t197 = t195 + t196;
-    const real t198 = w[2] * t85;
-    const real t199 = t81 * motion_I[0];
-    const real t200 = t73 * motion_I[1];
-    const real t201 = t199 + t200;
-    const real t202 = t65 * motion_I[2];
-    const real t203 = t201 + t202;
-    const real t204 = t203 * d_w[2];
-    const real t205 = t198 + t204;
-    const real t206 = t197 - t205;
-    const real t207 = H[29] * d_s[5];
-    const real t208 = s[5] * d_H[29];
-    const real t209 = t207 + t208;
-    const real t210 = H[28] * d_s[4];
-    const real t211 = s[4] * d_H[28];
-    const real t212 = t210 + t211;
-    const real t213 = H[27] * d_s[3];
-    const real t214 = s[3] * d_H[27];
-    const real t215 = t213 + t214;
-    const real t216 = H[26] * d_s[2];
-    const real t217 = s[2] * d_H[26];
-    const real t218 = t216 + t217;
-    const real t219 = H[25] * d_s[1];
-    const real t220 = s[1] * d_H[25];
-    const real t221 = t219 + t220;
-    const real t222 = H[24] * d_s[0];
-    const real t223 = s[0] * d_H[24];
-    const real t224 = t222 + t223;
-    const real t225 = t221 + t224;
-    const real t226 = t218 + t225;
-    const real t227 = t215 + t226;
-    const real t228 = t212 + t227;
-    const real t229 = t209 + t228;
-    const real t230 = d_c[4] + t229;
-    const real t231 = t206 + t230;
-    const real t232 = motion_I[5] * t39;
-    const real t233 = t92 * d_motion_I[5];
-    const real t234 = t232 + t233;
-    const real t235 = motion_I[4] * t24;
-    const real t236 = t100 * d_motion_I[4];
-    const real t237 = t235 + t236;
-    const real t238 = motion_I[3] * t9;
-    const real t239 = t108 * d_motion_I[3];
-    const real t240 = t238 + t239;
-    const real t241 = t237 + t240;
-    const real t242 = t234 + t241;
-    const real t243 = t231 + t242;
-    d_motion[4] = t243;
-    const real t244 = w[1] * t85;
-    const real t245 = t203 * d_w[1];
-    const real t246 = t244 + t245;
-    const real t247 = t146 * d_w[0];
-    const real t248 = w[0] * t112;
-    const real t249 = t247 + t248;
-    const real t250 = t246 - t249;
-    const real t251 = H[35] * d_s[5];
-    const real t252 = s[5] * d_H[35];
-    const real t253 = t251 + t252;
-    const real t254 = H[34] * d_s[4];
-    const real t255 = s[4] * d_H[34];
-    const real t256 = t254 + t255;
-    const real t257 = H[33] * d_s[3];
-    const real t258 = s[3] * d_H[33];
-    const real t259 = t257 + t258;
-    const real t260 = H[32] * d_s[2];
-    const real t261 = s[2] * d_H[32];
-    const real t262 = t260 + t261;
-    const real t263 = H[31] * d_s[1];
-    const real t264 = s[1] * d_H[31];
-    const real t265 = t263 + t264;
-    const real t266 = H[30] * d_s[0];
-    const real t267 = s[0] * d_H[30];
-    const real t268 = t266 + t267;
-    const real t269 = t265 + t268;
-    const real t270 = t262 + t269;
-    const real t271 = t259 + t270;
-    const real t272 = t256 + t271;
-    const real t273 = t253 + t272;
-    const real t274 = d_c[5] + t273;
-    const real t275 = t250 + t274;
-    const real t276 = motion_I[5] * t44;
-    const real t277 = t119 * d_motion_I[5];
-    const real t278 = t276 + t277;
-    const real t279 = motion_I[4] * t29;
-    const real t280 = t127 * d_motion_I[4];
-    const real t281 = t279 + t280;
-    const real t282 = motion_I[3] * t14;
-    const real t283 = t135 * d_motion_I[3];
-    const real t284 = t282 + t283;
-    const real t285 = t281 + t284;
-    const real t286 = t278 + t285;
-    const real t287 = t275 + t286;
-    d_motion[5] = t287;
-    const real t288 = v[2] * t112;
-    const real t289 = t146 * d_v[2];
-    const real t290 = t288 + t289;
-    const real t291 = 2.0 * t290;
-    const real t292 = v[1] * t139;
-    const real t293 = t153 * d_v[1];
-    const real t294 = t292 + t293;
-    const real t295 = 2.0 * t294;
-    const real t296 = t291 - t295;
-    const real t297 = H[5] * d_s[5];
-    const real t298 = s[5] * d_H[5];
-    const real t299 = t297 + t298;
-    const real t300 = H[4] * d_s[4];
-    const real t301 = s[4] * d_H[4];
-    const real t302 = t300 + t301;
-    const real t303 = H[3] * d_s[3];
-    const real t304 = s[3] * d_H[3];
-    const real t305 = t303 + t304;
-    const real t306 = H[2] * d_s[2];
-    const real t307 = s[2] * d_H[2];
-    const real t308 = t306 + t307;
-    const real t309 = H[1] * d_s[1];
-    const real t310 = s[1] * d_H[1];
-    const real t311 = t309 + t310;
-    const real t312 = H[0] * d_s[0];
-    const real t313 = s[0] * d_H[0];
-    const real t314 = t312 + t313;
-    const real t315 = t311 + t314;
-    const real t316 = t308 + t315;
-    const real t317 = t305 + t316;
-    const real t318 = t302 + t317;
-    const real t319 = t299 + t318;
-    const real t320 = d_c[0] + t319;
-    const real t321 = t296 + t320;
-    const real t322 = Rt[0] * d[0];
-    const real t323 = Rt[1] * d[1];
-    const real t324 = t322 + t323;
-    const real t325 = Rt[2] * d[2];
-    const real t326 = t324 + t325;
-    const real t327 = t326 + ro[0];
-    const real t328 = motion_I[0] * motion_I[2];
-    const real t329 = t328 - motion_I[4];
-    const real t330 = t327 * t329;
-    const real t331 = Rt[3] * d[0];
-    const real t332 = Rt[4] * d[1];
-    const real t333 = t331 + t332;
-    const real t334 = Rt[5] * d[2];
-    const real t335 = t333 + t334;
-    const real t336 = t335 + ro[1];
-    const real t337 = motion_I[1] * motion_I[2];
-    const real t338 = motion_I[3] + t337;
-    const real t339 = t336 * t338;
-    const real t340 = t330 + t339;
-    const real t341 = Rt[6] * d[0];
-    const real t342 = Rt[7] * d[1];
-    const real t343 = t341 + t342;
-    const real t344 = Rt[8] * d[2];
-    const real t345 = t343 + t344;
-    const real t346 = t345 + ro[2];
-    const real t347 = motion_I[1] * motion_I[1];
-    const real t348 = motion_I[0] * motion_I[0];
-    const real t349 = t347 + t348;
-    const real t350 = t346 * t349;
-    const real t351 = t340 - t350;
-    const real t352 = t351 + motion_I[8];
-    const real t353 = t352 * t34;
-    const real t354 = t338 * t54;
-    const real t355 = motion_I[2] * d_motion_I[1];
-    const real t356 = motion_I[1] * d_motion_I[2];
-    const real t357 = t355 + t356;
-    const real t358 = d_motion_I[3] + t357;
-    const real t359 = t336 * t358;
-    const real t360 = t354 + t359;
-    const real t361 = t329 * t49;
-    const real t362 = motion_I[2] * d_motion_I[0];
-    const real t363 = motion_I[0] * d_motion_I[2];
-    const real t364 = t362 + t363;
-    const real t365 = t364 - d_motion_I[4];
-    const real t366 = t327 * t365;
-    const real t367 = t361 + t366;
-    const real t368 = t360 + t367;
-    const real t369 = t349 * t59;
-    const real t370 = motion_I[0] * d_motion_I[0];
-    const real t371 = t370 + t370;
-    const real t372 = motion_I[1] * d_motion_I[1];
-    const real t373 = t372 + t372;
-    const real t374 = t371 + t373;
-    const real t375 = t346 * t374;
-    const real t376 = t369 + t375;
-    const real t377 = t368 - t376;
-    const real t378 = d_motion_I[8] + t377;
-    const real t379 = t65 * t378;
-    const real t380 = t353 + t379;
-    const real t381 = motion_I[0] * motion_I[1];
-    const real t382 = motion_I[5] + t381;
-    const real t383 = t327 * t382;
-    const real t384 = motion_I[2] * motion_I[2];
-    const real t385 = t384 + t348;
-    const real t386 = t336 * t385;
-    const real t387 = t383 - t386;
-    const real t388 = t337 - motion_I[3];
-    const real t389 = t346 * t388;
-    const real t390 = t387 + t389;
-    const real t391 = t390 + motion_I[7];
-    const real t392 = t391 * t19;
-    const real t393 = t388 * t59;
-    const real t394 = t357 - d_motion_I[3];
-    const real t395 = t346 * t394;
-    const real t396 = t393 + t395;
-    const real t397 = t382 * t49;
-    const real t398 = motion_I[1] * d_motion_I[0];
-    const real t399 = motion_I[0] * d_motion_I[1];
-    const real t400 = t398 + t399;
-    const real t401 = d_motion_I[5] + t400;
-    const real t402 = t327 * t401;
-    const real t403 = t397 + t402;
-    const real t404 = t385 * t54;
-    const real t405 = motion_I[2] * d_motion_I[2];
-    const real t406 = t405 + t405;
-    const real t407 = t371 + t406;
-    const real t408 = t336 * t407;
-    const real t409 = t404 + t408;
-    const real t410 = t403 - t409;
-    const real t411 = t396 + t410;
-    const real t412 = d_motion_I[7] + t411;
-    const real t413 = t73 * t412;
-    const real t414 = t392 + t413;
-    const real t415 = t381 - motion_I[5];
-    const real t416 = t336 * t415;
-    const real t417 = t347 + t384;
-    const real t418 = t327 * t417;
-    const real t419 = t416 - t418;
-    const real t420 = motion_I[4] + t328;
-    const real t421 = t346 * t420;
-    const real t422 = t419 + t421;
-    const real t423 = t422 + motion_I[6];
-    const real t424 = t423 * t4;
-    const real t425 = t420 * t59;
-    const real t426 = d_motion_I[4] + t364;
-    const real t427 = t346 * t426;
-    const real t428 = t425 + t427;
-    const real t429 = t415 * t54;
-    const real t430 = t400 - d_motion_I[5];
-    const real t431 = t336 * t430;
-    const real t432 = t429 + t431;
-    const real t433 = t417 * t49;
-    const real t434 = t373 + t406;
-    const real t435 = t327 * t434;
-    const real t436 = t433 + t435;
-    const real t437 = t432 - t436;
-    const real t438 = t428 + t437;
-    const real t439 = d_motion_I[6] + t438;
-    const real t440 = t81 * t439;
-    const real t441 = t424 + t440;
-    const real t442 = t414 + t441;
-    const real t443 = t380 + t442;
-    const real t444 = t321 + t443;
-    d_motion[6] = t444;
-    const real t445 = v[0] * t139;
-    const real t446 = t153 * d_v[0];
-    const real t447 = t445 + t446;
-    const real t448 = 2.0 * t447;
-    const real t449 = v[2] * t85;
-    const real t450 = t203 * d_v[2];
-    const real t451 = t449 + t450;
-    const real t452 = 2.0 * t451;
-    const real t453 = t448 - t452;
-    const real t454 = H[11] * d_s[5];
-    const real t455 = s[5] * d_H[11];
-    const real t456 = t454 + t455;
-    const real t457 = H[10] * d_s[4];
-    const real t458 = s[4] * d_H[10];
-    const real t459 = t457 + t458;
-    const real t460 = H[9] * d_s[3];
-    const real t461 = s[3] * d_H[9];
-    const real t462 = t460 + t461;
-    const real t463 = H[8] * d_s[2];
-    const real t464 = s[2] * d_H[8];
-    const real t465 = t463 + t464;
-    const real t466 = H[7] * d_s[1];
-    const real t467 = s[1] * d_H[7];
-    const real t468 = t466 + t467;
-    const real t469 = H[6] * d_s[0];
-    const real t470 = s[0] * d_H[6];
-    const real t471 = t469 + t470;
-    const real t472 = t468 + t471;
-    const real t473 = t465 + t472;
-    const real t474 = t462 + t473;
-    const real t475 = t459 + t474;
-    const real t476 = t456 + t475;
-    const real t477 = d_c[1] + t476;
-    const real t478 = t453 + t477;
-    const real t479 = t352 * t39;
-    const real t480 = t92 * t378;
-    const real t481 = t479 + t480;
-    const real t482 = t391 * t24;
-    const real t483 = t100 * t412;
-    const real t484 = t482 + t483;
-    const real t485 = t423 * t9;
-    const real t486 = t108 * t439;
-    const real t487 = t485 + t486;
-    const real t488 = t484 + t487;
-    const real t489 = t481 + t488;
-    const real t490 = t478 + t489;
-    d_motion[7] = t490;
-    const real t491 = v[1] * t85;
-    const real t492 = t203 * d_v[1];
-    const real t493 = t491 + t492;
-    const real t494 = 2.0 * t493;
-    const real t495 = v[0] * t112;
-    const real t496 = t146 * d_v[0];
-    const real t497 = t495 + t496;
-    const real t498 = 2.0 * t497;
-    const real t499 = t494 - t498;
-    const real t500 = H[17] * d_s[5];
-    const real t501 = s[5] * d_H[17];
-    const real t502 = t500 + t501;
-    const real t503 = H[16] * d_s[4];
-    const real t504 = s[4] * d_H[16];
-    const real t505 = t503 + t504;
-    const real t506 = H[15] * d_s[3];
-    const real t507 = s[3] * d_H[15];
-    const real t508 = t506 + t507;
-    const real t509 = H[14] * d_s[2];
-    const real t510 = s[2] * d_H[14];
-    const real t511 = t509 + t510;
-    const real t512 = H[13] * d_s[1];
-    const real t513 = s[1] * d_H[13];
-    const real t514 = t512 + t513;
-    const real t515 = H[12] * d_s[0];
-    const real t516 = s[0] * d_H[12];
-    const real t517 = t515 + t516;
-    const real t518 = t514 + t517;
-    const real t519 = t511 + t518;
-    const real t520 = t508 + t519;
-    const real t521 = t505 + t520;
-    const real t522 = t502 + t521;
-    const real t523 = d_c[2] + t522;
-    const real t524 = t499 + t523;
-    const real t525 = t352 * t44;
-    const real t526 = t119 * t378;
-    const real t527 = t525 + t526;
-    const real t528 = t391 * t29;
-    const real t529 = t127 * t412;
-    const real t530 = t528 + t529;
-    const real t531 = t423 * t14;
-    const real t532 = t135 * t439;
-    const real t533 = t531 + t532;
-    const real t534 = t530 + t533;
-    const real t535 = t527 + t534;
-    const real t536 = t524 + t535;
-    d_motion[8] = t536;
-    return 0;
+  (void)c;
+  real t4 = Rt[2] * d_R[6] + (Rt[1] * d_R[3] + Rt[0] * d_R[0]);
+  d_Rc[0] = t4;
+  real t9 = Rt[2] * d_R[7] + (Rt[1] * d_R[4] + Rt[0] * d_R[1]);
+  d_Rc[1] = t9;
+  real t14 = Rt[2] * d_R[8] + (Rt[1] * d_R[5] + Rt[0] * d_R[2]);
+  d_Rc[2] = t14;
+  real t19 = Rt[5] * d_R[6] + (Rt[4] * d_R[3] + Rt[3] * d_R[0]);
+  d_Rc[3] = t19;
+  real t24 = Rt[5] * d_R[7] + (Rt[4] * d_R[4] + Rt[3] * d_R[1]);
+  d_Rc[4] = t24;
+  real t29 = Rt[5] * d_R[8] + (Rt[4] * d_R[5] + Rt[3] * d_R[2]);
+  d_Rc[5] = t29;
+  real t34 = Rt[8] * d_R[6] + (Rt[7] * d_R[3] + Rt[6] * d_R[0]);
+  d_Rc[6] = t34;
+  real t39 = Rt[8] * d_R[7] + (Rt[7] * d_R[4] + Rt[6] * d_R[1]);
+  d_Rc[7] = t39;
+  real t44 = Rt[8] * d_R[8] + (Rt[7] * d_R[5] + Rt[6] * d_R[2]);
+  d_Rc[8] = t44;
+  real t49 = Rt[2] * d_d[2] + (Rt[1] * d_d[1] + Rt[0] * d_d[0]);
+  d_r[0] = t49;
+  real t54 = Rt[5] * d_d[2] + (Rt[4] * d_d[1] + Rt[3] * d_d[0]);
+  d_r[1] = t54;
+  real t59 = Rt[8] * d_d[2] + (Rt[7] * d_d[1] + Rt[6] * d_d[0]);
+  d_r[2] = t59;
+  real t65 = R[0] * Rt[6] + R[3] * Rt[7] + R[6] * Rt[8];
+  real t73 = R[0] * Rt[3] + R[3] * Rt[4] + R[6] * Rt[5];
+  real t81 = Rt[0] * R[0] + Rt[1] * R[3] + Rt[2] * R[6];
+  real t85 = motion_I[2] * t34 + t65 * d_motion_I[2] + (motion_I[1] * t19 + t73 * d_motion_I[1] +
+    (motion_I[0] * t4 + t81 * d_motion_I[0]));
+  d_motion[0] = d_w[0] + t85;
+  real t92 = R[1] * Rt[6] + R[4] * Rt[7] + R[7] * Rt[8];
+  real t100 = R[1] * Rt[3] + R[4] * Rt[4] + R[7] * Rt[5];
+  real t108 = Rt[0] * R[1] + Rt[1] * R[4] + Rt[2] * R[7];
+  real t112 = motion_I[2] * t39 + t92 * d_motion_I[2] + (motion_I[1] * t24 + t100 * d_motion_I[1] +
+    (motion_I[0] * t9 + t108 * d_motion_I[0]));
+  d_motion[1] = d_w[1] + t112;
+  real t119 = R[2] * Rt[6] + R[5] * Rt[7] + R[8] * Rt[8];
+  real t127 = R[2] * Rt[3] + R[5] * Rt[4] + R[8] * Rt[5];
+  real t135 = Rt[0] * R[2] + Rt[1] * R[5] + Rt[2] * R[8];
+  real t139 = motion_I[2] * t44 + t119 * d_motion_I[2] + (motion_I[1] * t29 + t127 * d_motion_I[1] +
+    (motion_I[0] * t14 + t135 * d_motion_I[0]));
+  d_motion[2] = d_w[2] + t139;
+  real t146 = t108 * motion_I[0] + t100 * motion_I[1] + t92 * motion_I[2];
+  real t153 = t135 * motion_I[0] + t127 * motion_I[1] + t119 * motion_I[2];
+  d_motion[3] = w[2] * t112 + t146 * d_w[2] - (t153 * d_w[1] + w[1] * t139) + (d_c[3] + (s[5] *
+    d_H[23] + H[23] * d_s[5] + (s[4] * d_H[22] + H[22] * d_s[4] + (s[3] * d_H[21] + H[21] * d_s[3] +
+    (s[2] * d_H[20] + H[20] * d_s[2] + (s[1] * d_H[19] + H[19] * d_s[1] + (s[0] * d_H[18] + H[18] *
+    d_s[0]))))))) + (motion_I[5] * t34 + t65 * d_motion_I[5] + (motion_I[4] * t19 + t73 *
+    d_motion_I[4] + (motion_I[3] * t4 + t81 * d_motion_I[3])));
+  real t203 = t81 * motion_I[0] + t73 * motion_I[1] + t65 * motion_I[2];
+  d_motion[4] = t153 * d_w[0] + w[0] * t139 - (w[2] * t85 + t203 * d_w[2]) + (d_c[4] + (H[29] *
+    d_s[5] + s[5] * d_H[29] + (H[28] * d_s[4] + s[4] * d_H[28] + (H[27] * d_s[3] + s[3] * d_H[27] +
+    (H[26] * d_s[2] + s[2] * d_H[26] + (H[25] * d_s[1] + s[1] * d_H[25] + (H[24] * d_s[0] + s[0] *
+    d_H[24]))))))) + (motion_I[5] * t39 + t92 * d_motion_I[5] + (motion_I[4] * t24 + t100 *
+    d_motion_I[4] + (motion_I[3] * t9 + t108 * d_motion_I[3])));
+  d_motion[5] = w[1] * t85 + t203 * d_w[1] - (t146 * d_w[0] + w[0] * t112) + (d_c[5] + (H[35] *
+    d_s[5] + s[5] * d_H[35] + (H[34] * d_s[4] + s[4] * d_H[34] + (H[33] * d_s[3] + s[3] * d_H[33] +
+    (H[32] * d_s[2] + s[2] * d_H[32] + (H[31] * d_s[1] + s[1] * d_H[31] + (H[30] * d_s[0] + s[0] *
+    d_H[30]))))))) + (motion_I[5] * t44 + t119 * d_motion_I[5] + (motion_I[4] * t29 + t127 *
+    d_motion_I[4] + (motion_I[3] * t14 + t135 * d_motion_I[3])));
+  real t327 = Rt[0] * d[0] + Rt[1] * d[1] + Rt[2] * d[2] + ro[0];
+  real t328 = motion_I[0] * motion_I[2];
+  real t329 = t328 - motion_I[4];
+  real t336 = Rt[3] * d[0] + Rt[4] * d[1] + Rt[5] * d[2] + ro[1];
+  real t337 = motion_I[1] * motion_I[2];
+  real t338 = motion_I[3] + t337;
+  real t346 = Rt[6] * d[0] + Rt[7] * d[1] + Rt[8] * d[2] + ro[2];
+  real t347 = motion_I[1] * motion_I[1];
+  real t348 = motion_I[0] * motion_I[0];
+  real t349 = t347 + t348;
+  real t352 = t327 * t329 + t336 * t338 - t346 * t349 + motion_I[8];
+  real t357 = motion_I[2] * d_motion_I[1] + motion_I[1] * d_motion_I[2];
+  real t364 = motion_I[2] * d_motion_I[0] + motion_I[0] * d_motion_I[2];
+  real t370 = motion_I[0] * d_motion_I[0];
+  real t371 = t370 + t370;
+  real t372 = motion_I[1] * d_motion_I[1];
+  real t373 = t372 + t372;
+  real t378 = d_motion_I[8] + (t338 * t54 + t336 * (d_motion_I[3] + t357) + (t329 * t49 + t327 *
+    (t364 - d_motion_I[4])) - (t349 * t59 + t346 * (t371 + t373)));
+  real t381 = motion_I[0] * motion_I[1];
+  real t382 = motion_I[5] + t381;
+  real t384 = motion_I[2] * motion_I[2];
+  real t385 = t384 + t348;
+  real t388 = t337 - motion_I[3];
+  real t391 = t327 * t382 - t336 * t385 + t346 * t388 + motion_I[7];
+  real t400 = motion_I[1] * d_motion_I[0] + motion_I[0] * d_motion_I[1];
+  real t405 = motion_I[2] * d_motion_I[2];
+  real t406 = t405 + t405;
+  real t412 = d_motion_I[7] + (t388 * t59 + t346 * (t357 - d_motion_I[3]) + (t382 * t49 + t327 *
+    (d_motion_I[5] + t400) - (t385 * t54 + t336 * (t371 + t406))));
+  real t415 = t381 - motion_I[5];
+  real t417 = t347 + t384;
+  real t420 = motion_I[4] + t328;
+  real t423 = t336 * t415 - t327 * t417 + t346 * t420 + motion_I[6];
+  real t439 = d_motion_I[6] + (t420 * t59 + t346 * (d_motion_I[4] + t364) + (t415 * t54 + t336 *
+    (t400 - d_motion_I[5]) - (t417 * t49 + t327 * (t373 + t406))));
+  d_motion[6] = 2.0 * (v[2] * t112 + t146 * d_v[2]) - 2.0 * (v[1] * t139 + t153 * d_v[1]) + (d_c[0]
+    + (H[5] * d_s[5] + s[5] * d_H[5] + (H[4] * d_s[4] + s[4] * d_H[4] + (H[3] * d_s[3] + s[3] *
+    d_H[3] + (H[2] * d_s[2] + s[2] * d_H[2] + (H[1] * d_s[1] + s[1] * d_H[1] + (H[0] * d_s[0] + s[0]
+    * d_H[0]))))))) + (t352 * t34 + t65 * t378 + (t391 * t19 + t73 * t412 + (t423 * t4 + t81 *
+    t439)));
+  d_motion[7] = 2.0 * (v[0] * t139 + t153 * d_v[0]) - 2.0 * (v[2] * t85 + t203 * d_v[2]) + (d_c[1] +
+    (H[11] * d_s[5] + s[5] * d_H[11] + (H[10] * d_s[4] + s[4] * d_H[10] + (H[9] * d_s[3] + s[3] *
+    d_H[9] + (H[8] * d_s[2] + s[2] * d_H[8] + (H[7] * d_s[1] + s[1] * d_H[7] + (H[6] * d_s[0] + s[0]
+    * d_H[6]))))))) + (t352 * t39 + t92 * t378 + (t391 * t24 + t100 * t412 + (t423 * t9 + t108 *
+    t439)));
+  d_motion[8] = 2.0 * (v[1] * t85 + t203 * d_v[1]) - 2.0 * (v[0] * t112 + t146 * d_v[0]) + (d_c[2] +
+    (H[17] * d_s[5] + s[5] * d_H[17] + (H[16] * d_s[4] + s[4] * d_H[16] + (H[15] * d_s[3] + s[3] *
+    d_H[15] + (H[14] * d_s[2] + s[2] * d_H[14] + (H[13] * d_s[1] + s[1] * d_H[13] + (H[12] * d_s[0]
+    + s[0] * d_H[12]))))))) + (t352 * t44 + t119 * t378 + (t391 * t29 + t127 * t412 + (t423 * t14 +
+    t135 * t439)));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_forward_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_forward_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_forward_slope_inputs[] = {
-    {"Rt", 9, "", 0, 0},
-    {"ro", 3, "m", 0, 0},
-    {"R", 9, "", 0, 0},
-    {"d", 3, "", 0, 0},
-    {"H", 36, "", 0, 0},
-    {"v", 3, "", 0, 0},
-    {"w", 3, "", 0, 0},
-    {"c", 6, "", 0, 0},
-    {"s", 6, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "", 0, 0},
-    {"d_H", 36, "", 0, 0},
-    {"d_v", 3, "", 0, 0},
-    {"d_w", 3, "", 0, 0},
-    {"d_c", 6, "", 0, 0},
-    {"d_s", 6, "", 0, 0},
-    {"d_motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_forward_slope_outputs[] = {
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-    {"d_motion", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_forward_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], out[0],
+  out[1], out[2]))
 
 /* effort and its derivative along a direction
  * in  H[6][6] motion subspace
@@ -15130,172 +4016,30 @@ static const mstmm_port mstmm_sweep_generic6_forward_slope_outputs[] = {
  * in  d_f[6] (N, N*m) derivative of f
  * out d_tau[6] (N, N*m) derivative of tau
  */
-int mstmm_sweep_generic6_effort_slope(const real *restrict H, const real *restrict f,
-    const real *restrict d_H, const real *restrict d_f, real *restrict d_tau)
+int mstmm_sweep_generic6_effort_slope(in_t H, in_t f, in_t d_H, in_t d_f, out_t d_tau)
 {
-    const real t0 = f[5] * d_H[30];
-    const real t1 = H[30] * d_f[5];
-    const real t2 = t0 + t1;
-    const real t3 = f[4] * d_H[24];
-    const real t4 = H[24] * d_f[4];
-    const real t5 = t3 + t4;
-    const real t6 = f[3] * d_H[18];
-    const real t7 = H[18] * d_f[3];
-    const real t8 = t6 + t7;
-    const real t9 = f[2] * d_H[12];
-    const real t10 = H[12] * d_f[2];
-    const real t11 = t9 + t10;
-    const real t12 = f[1] * d_H[6];
-    const real t13 = H[6] * d_f[1];
-    const real t14 = t12 + t13;
-    const real t15 = f[0] * d_H[0];
-    const real t16 = H[0] * d_f[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_tau[0] = t22;
-    const real t23 = H[31] * d_f[5];
-    const real t24 = f[5] * d_H[31];
-    const real t25 = t23 + t24;
-    const real t26 = H[25] * d_f[4];
-    const real t27 = f[4] * d_H[25];
-    const real t28 = t26 + t27;
-    const real t29 = H[19] * d_f[3];
-    const real t30 = f[3] * d_H[19];
-    const real t31 = t29 + t30;
-    const real t32 = H[13] * d_f[2];
-    const real t33 = f[2] * d_H[13];
-    const real t34 = t32 + t33;
-    const real t35 = H[7] * d_f[1];
-    const real t36 = f[1] * d_H[7];
-    const real t37 = t35 + t36;
-    const real t38 = H[1] * d_f[0];
-    const real t39 = f[0] * d_H[1];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t31 + t42;
-    const real t44 = t28 + t43;
-    const real t45 = t25 + t44;
-    d_tau[1] = t45;
-    const real t46 = H[32] * d_f[5];
-    const real t47 = f[5] * d_H[32];
-    const real t48 = t46 + t47;
-    const real t49 = H[26] * d_f[4];
-    const real t50 = f[4] * d_H[26];
-    const real t51 = t49 + t50;
-    const real t52 = H[20] * d_f[3];
-    const real t53 = f[3] * d_H[20];
-    const real t54 = t52 + t53;
-    const real t55 = H[14] * d_f[2];
-    const real t56 = f[2] * d_H[14];
-    const real t57 = t55 + t56;
-    const real t58 = H[8] * d_f[1];
-    const real t59 = f[1] * d_H[8];
-    const real t60 = t58 + t59;
-    const real t61 = H[2] * d_f[0];
-    const real t62 = f[0] * d_H[2];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    const real t66 = t54 + t65;
-    const real t67 = t51 + t66;
-    const real t68 = t48 + t67;
-    d_tau[2] = t68;
-    const real t69 = H[33] * d_f[5];
-    const real t70 = f[5] * d_H[33];
-    const real t71 = t69 + t70;
-    const real t72 = H[27] * d_f[4];
-    const real t73 = f[4] * d_H[27];
-    const real t74 = t72 + t73;
-    const real t75 = H[21] * d_f[3];
-    const real t76 = f[3] * d_H[21];
-    const real t77 = t75 + t76;
-    const real t78 = H[15] * d_f[2];
-    const real t79 = f[2] * d_H[15];
-    const real t80 = t78 + t79;
-    const real t81 = H[9] * d_f[1];
-    const real t82 = f[1] * d_H[9];
-    const real t83 = t81 + t82;
-    const real t84 = H[3] * d_f[0];
-    const real t85 = f[0] * d_H[3];
-    const real t86 = t84 + t85;
-    const real t87 = t83 + t86;
-    const real t88 = t80 + t87;
-    const real t89 = t77 + t88;
-    const real t90 = t74 + t89;
-    const real t91 = t71 + t90;
-    d_tau[3] = t91;
-    const real t92 = H[34] * d_f[5];
-    const real t93 = f[5] * d_H[34];
-    const real t94 = t92 + t93;
-    const real t95 = H[28] * d_f[4];
-    const real t96 = f[4] * d_H[28];
-    const real t97 = t95 + t96;
-    const real t98 = H[22] * d_f[3];
-    const real t99 = f[3] * d_H[22];
-    const real t100 = t98 + t99;
-    const real t101 = H[16] * d_f[2];
-    const real t102 = f[2] * d_H[16];
-    const real t103 = t101 + t102;
-    const real t104 = H[10] * d_f[1];
-    const real t105 = f[1] * d_H[10];
-    const real t106 = t104 + t105;
-    const real t107 = H[4] * d_f[0];
-    const real t108 = f[0] * d_H[4];
-    const real t109 = t107 + t108;
-    const real t110 = t106 + t109;
-    const real t111 = t103 + t110;
-    const real t112 = t100 + t111;
-    const real t113 = t97 + t112;
-    const real t114 = t94 + t113;
-    d_tau[4] = t114;
-    const real t115 = H[35] * d_f[5];
-    const real t116 = f[5] * d_H[35];
-    const real t117 = t115 + t116;
-    const real t118 = H[29] * d_f[4];
-    const real t119 = f[4] * d_H[29];
-    const real t120 = t118 + t119;
-    const real t121 = H[23] * d_f[3];
-    const real t122 = f[3] * d_H[23];
-    const real t123 = t121 + t122;
-    const real t124 = H[17] * d_f[2];
-    const real t125 = f[2] * d_H[17];
-    const real t126 = t124 + t125;
-    const real t127 = H[11] * d_f[1];
-    const real t128 = f[1] * d_H[11];
-    const real t129 = t127 + t128;
-    const real t130 = H[5] * d_f[0];
-    const real t131 = f[0] * d_H[5];
-    const real t132 = t130 + t131;
-    const real t133 = t129 + t132;
-    const real t134 = t126 + t133;
-    const real t135 = t123 + t134;
-    const real t136 = t120 + t135;
-    const real t137 = t117 + t136;
-    d_tau[5] = t137;
-    return 0;
+  d_tau[0] = f[5] * d_H[30] + H[30] * d_f[5] + (f[4] * d_H[24] + H[24] * d_f[4] + (f[3] * d_H[18] +
+    H[18] * d_f[3] + (f[2] * d_H[12] + H[12] * d_f[2] + (f[1] * d_H[6] + H[6] * d_f[1] + (f[0] *
+    d_H[0] + H[0] * d_f[0])))));
+  d_tau[1] = H[31] * d_f[5] + f[5] * d_H[31] + (H[25] * d_f[4] + f[4] * d_H[25] + (H[19] * d_f[3] +
+    f[3] * d_H[19] + (H[13] * d_f[2] + f[2] * d_H[13] + (H[7] * d_f[1] + f[1] * d_H[7] + (H[1] *
+    d_f[0] + f[0] * d_H[1])))));
+  d_tau[2] = H[32] * d_f[5] + f[5] * d_H[32] + (H[26] * d_f[4] + f[4] * d_H[26] + (H[20] * d_f[3] +
+    f[3] * d_H[20] + (H[14] * d_f[2] + f[2] * d_H[14] + (H[8] * d_f[1] + f[1] * d_H[8] + (H[2] *
+    d_f[0] + f[0] * d_H[2])))));
+  d_tau[3] = H[33] * d_f[5] + f[5] * d_H[33] + (H[27] * d_f[4] + f[4] * d_H[27] + (H[21] * d_f[3] +
+    f[3] * d_H[21] + (H[15] * d_f[2] + f[2] * d_H[15] + (H[9] * d_f[1] + f[1] * d_H[9] + (H[3] *
+    d_f[0] + f[0] * d_H[3])))));
+  d_tau[4] = H[34] * d_f[5] + f[5] * d_H[34] + (H[28] * d_f[4] + f[4] * d_H[28] + (H[22] * d_f[3] +
+    f[3] * d_H[22] + (H[16] * d_f[2] + f[2] * d_H[16] + (H[10] * d_f[1] + f[1] * d_H[10] + (H[4] *
+    d_f[0] + f[0] * d_H[4])))));
+  d_tau[5] = H[35] * d_f[5] + f[5] * d_H[35] + (H[29] * d_f[4] + f[4] * d_H[29] + (H[23] * d_f[3] +
+    f[3] * d_H[23] + (H[17] * d_f[2] + f[2] * d_H[17] + (H[11] * d_f[1] + f[1] * d_H[11] + (H[5] *
+    d_f[0] + f[0] * d_H[5])))));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_effort_slope_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"f", 6, "N, N*m", 0, 0},
-    {"d_H", 36, "", 0, 0},
-    {"d_f", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_effort_slope_outputs[] = {
-    {"d_tau", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* complement and its derivative along a direction
  * source: Householder, J. ACM 5 (1958) 339-342 (reflections)
@@ -15303,2186 +4047,390 @@ static const mstmm_port mstmm_sweep_generic6_effort_slope_outputs[] = {
  * in  d_H[6][6] derivative of H
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_generic6_complement_slope(const real *restrict H, const real *restrict d_H,
-    real *restrict d_W)
+int mstmm_sweep_generic6_complement_slope(in_t H, in_t d_H, out_t d_W)
 {
-    const real t0 = H[30] * H[30];
-    const real t1 = H[24] * H[24];
-    const real t2 = H[18] * H[18];
-    const real t3 = H[12] * H[12];
-    const real t4 = H[0] * H[0];
-    const real t5 = H[6] * H[6];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = t1 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = 1.0 / t10;
-    const real t12 = t11 * d_H[0];
-    const real t13 = H[6] * d_H[6];
-    const real t14 = t13 + t13;
-    const real t15 = H[0] * d_H[0];
-    const real t16 = t15 + t15;
-    const real t17 = t14 + t16;
-    const real t18 = H[12] * d_H[12];
-    const real t19 = t18 + t18;
-    const real t20 = t17 + t19;
-    const real t21 = H[18] * d_H[18];
-    const real t22 = t21 + t21;
-    const real t23 = t20 + t22;
-    const real t24 = H[24] * d_H[24];
-    const real t25 = t24 + t24;
-    const real t26 = t23 + t25;
-    const real t27 = H[30] * d_H[30];
-    const real t28 = t27 + t27;
-    const real t29 = t26 + t28;
-    const real t30 = t11 * t29;
-    const real t31 = t30 / t10;
-    const real t32 = H[0] * t31;
-    const real t33 = t12 - t32;
-    const real t34 = H[1] * H[1];
-    const real t35 = H[7] * H[7];
-    const real t36 = t34 + t35;
-    const real t37 = H[13] * H[13];
-    const real t38 = t36 + t37;
-    const real t39 = H[19] * H[19];
-    const real t40 = t38 + t39;
-    const real t41 = H[25] * H[25];
-    const real t42 = t40 + t41;
-    const real t43 = H[31] * H[31];
-    const real t44 = t42 + t43;
-    const real t45 = H[30] * H[31];
-    const real t46 = H[24] * H[25];
-    const real t47 = H[18] * H[19];
-    const real t48 = H[12] * H[13];
-    const real t49 = H[6] * H[7];
-    const real t50 = H[0] * H[1];
-    const real t51 = t49 + t50;
-    const real t52 = t48 + t51;
-    const real t53 = t47 + t52;
-    const real t54 = t46 + t53;
-    const real t55 = t45 + t54;
-    const real t56 = t55 * t11;
-    const real t57 = t55 * t56;
-    const real t58 = t44 - t57;
-    const real t59 = 1.0 / t58;
-    const real t60 = H[0] * t56;
-    const real t61 = H[1] - t60;
-    const real t62 = t59 * t61;
-    const real t63 = H[1] * H[2];
-    const real t64 = H[7] * H[8];
-    const real t65 = t63 + t64;
-    const real t66 = H[13] * H[14];
-    const real t67 = t65 + t66;
-    const real t68 = H[19] * H[20];
-    const real t69 = t67 + t68;
-    const real t70 = H[25] * H[26];
-    const real t71 = t69 + t70;
-    const real t72 = H[31] * H[32];
-    const real t73 = t71 + t72;
-    const real t74 = H[30] * H[32];
-    const real t75 = H[24] * H[26];
-    const real t76 = H[18] * H[20];
-    const real t77 = H[12] * H[14];
-    const real t78 = H[6] * H[8];
-    const real t79 = H[0] * H[2];
-    const real t80 = t78 + t79;
-    const real t81 = t77 + t80;
-    const real t82 = t76 + t81;
-    const real t83 = t75 + t82;
-    const real t84 = t74 + t83;
-    const real t85 = t56 * t84;
-    const real t86 = t73 - t85;
-    const real t87 = t86 * t59;
-    const real t88 = H[2] * H[2];
-    const real t89 = H[8] * H[8];
-    const real t90 = t88 + t89;
-    const real t91 = H[14] * H[14];
-    const real t92 = t90 + t91;
-    const real t93 = H[20] * H[20];
-    const real t94 = t92 + t93;
-    const real t95 = H[26] * H[26];
-    const real t96 = t94 + t95;
-    const real t97 = H[32] * H[32];
-    const real t98 = t96 + t97;
-    const real t99 = t11 * t84;
-    const real t100 = t84 * t99;
-    const real t101 = t98 - t100;
-    const real t102 = t86 * t87;
-    const real t103 = t101 - t102;
-    const real t104 = 1.0 / t103;
-    const real t105 = H[0] * t99;
-    const real t106 = H[2] - t105;
-    const real t107 = t87 * t61;
-    const real t108 = t106 - t107;
-    const real t109 = t104 * t108;
-    const real t110 = H[2] * H[3];
-    const real t111 = H[8] * H[9];
-    const real t112 = t110 + t111;
-    const real t113 = H[14] * H[15];
-    const real t114 = t112 + t113;
-    const real t115 = H[20] * H[21];
-    const real t116 = t114 + t115;
-    const real t117 = H[26] * H[27];
-    const real t118 = t116 + t117;
-    const real t119 = H[32] * H[33];
-    const real t120 = t118 + t119;
-    const real t121 = H[30] * H[33];
-    const real t122 = H[24] * H[27];
-    const real t123 = H[18] * H[21];
-    const real t124 = H[12] * H[15];
-    const real t125 = H[6] * H[9];
-    const real t126 = H[0] * H[3];
-    const real t127 = t125 + t126;
-    const real t128 = t124 + t127;
-    const real t129 = t123 + t128;
-    const real t130 = t122 + t129;
-    const real t131 = t121 + t130;
-    const real t132 = t99 * t131;
-    const real t133 = t120 - t132;
-    const real t134 = H[1] * H[3];
-    const real t135 = H[7] * H[9];
-    const real t136 = t134 + t135;
-    const real t137 = H[13] * H[15];
-    const real t138 = t136 + t137;
-    const real t139 = H[19] * H[21];
-    const real t140 = t138 + t139;
-    const real t141 = H[25] * H[27];
-    const real t142 = t140 + t141;
-    const real t143 = H[31] * H[33];
-    const real t144 = t142 + t143;
-    const real t145 = t56 * t131;
-    const real t146 = t144 - t145;
-    const real t147 = t87 * t146;
-    const real t148 = t133 - t147;
-    const real t149 = t148 * t104;
-    const real t150 = H[3] * H[3];
-    const real t151 = H[9] * H[9];
-    const real t152 = t150 + t151;
-    const real t153 = H[15] * H[15];
-    const real t154 = t152 + t153;
-    const real t155 = H[21] * H[21];
-    const real t156 = t154 + t155;
-    const real t157 = H[27] * H[27];
-    const real t158 = t156 + t157;
-    const real t159 = H[33] * H[33];
-    const real t160 = t158 + t159;
-    const real t161 = t11 * t131;
-    const real t162 = t131 * t161;
-    const real t163 = t160 - t162;
-    const real t164 = t59 * t146;
-    const real t165 = t146 * t164;
-    const real t166 = t163 - t165;
-    const real t167 = t148 * t149;
-    const real t168 = t166 - t167;
-    const real t169 = 1.0 / t168;
-    const real t170 = H[0] * t161;
-    const real t171 = H[3] - t170;
-    const real t172 = t164 * t61;
-    const real t173 = t171 - t172;
-    const real t174 = t149 * t108;
-    const real t175 = t173 - t174;
-    const real t176 = t169 * t175;
-    const real t177 = H[3] * H[4];
-    const real t178 = H[9] * H[10];
-    const real t179 = t177 + t178;
-    const real t180 = H[15] * H[16];
-    const real t181 = t179 + t180;
-    const real t182 = H[21] * H[22];
-    const real t183 = t181 + t182;
-    const real t184 = H[27] * H[28];
-    const real t185 = t183 + t184;
-    const real t186 = H[33] * H[34];
-    const real t187 = t185 + t186;
-    const real t188 = H[30] * H[34];
-    const real t189 = H[24] * H[28];
-    const real t190 = H[18] * H[22];
-    const real t191 = H[12] * H[16];
-    const real t192 = H[6] * H[10];
-    const real t193 = H[0] * H[4];
-    const real t194 = t192 + t193;
-    const real t195 = t191 + t194;
-    const real t196 = t190 + t195;
-    const real t197 = t189 + t196;
-    const real t198 = t188 + t197;
-    const real t199 = t161 * t198;
-    const real t200 = t187 - t199;
-    const real t201 = H[1] * H[4];
-    const real t202 = H[7] * H[10];
-    const real t203 = t201 + t202;
-    const real t204 = H[13] * H[16];
-    const real t205 = t203 + t204;
-    const real t206 = H[19] * H[22];
-    const real t207 = t205 + t206;
-    const real t208 = H[25] * H[28];
-    const real t209 = t207 + t208;
-    const real t210 = H[31] * H[34];
-    const real t211 = t209 + t210;
-    const real t212 = t56 * t198;
-    const real t213 = t211 - t212;
-    const real t214 = t164 * t213;
-    const real t215 = t200 - t214;
-    const real t216 = H[2] * H[4];
-    const real t217 = H[8] * H[10];
-    const real t218 = t216 + t217;
-    const real t219 = H[14] * H[16];
-    const real t220 = t218 + t219;
-    const real t221 = H[20] * H[22];
-    const real t222 = t220 + t221;
-    const real t223 = H[26] * H[28];
-    const real t224 = t222 + t223;
-    const real t225 = H[32] * H[34];
-    const real t226 = t224 + t225;
-    const real t227 = t99 * t198;
-    const real t228 = t226 - t227;
-    const real t229 = t87 * t213;
-    const real t230 = t228 - t229;
-    const real t231 = t149 * t230;
-    const real t232 = t215 - t231;
-    const real t233 = t232 * t169;
-    const real t234 = H[4] * H[4];
-    const real t235 = H[10] * H[10];
-    const real t236 = t234 + t235;
-    const real t237 = H[16] * H[16];
-    const real t238 = t236 + t237;
-    const real t239 = H[22] * H[22];
-    const real t240 = t238 + t239;
-    const real t241 = H[28] * H[28];
-    const real t242 = t240 + t241;
-    const real t243 = H[34] * H[34];
-    const real t244 = t242 + t243;
-    const real t245 = t11 * t198;
-    const real t246 = t198 * t245;
-    const real t247 = t244 - t246;
-    const real t248 = t59 * t213;
-    const real t249 = t213 * t248;
-    const real t250 = t247 - t249;
-    const real t251 = t104 * t230;
-    const real t252 = t230 * t251;
-    const real t253 = t250 - t252;
-    const real t254 = t232 * t233;
-    const real t255 = t253 - t254;
-    const real t256 = 1.0 / t255;
-    const real t257 = H[0] * t245;
-    const real t258 = H[4] - t257;
-    const real t259 = t248 * t61;
-    const real t260 = t258 - t259;
-    const real t261 = t251 * t108;
-    const real t262 = t260 - t261;
-    const real t263 = t233 * t175;
-    const real t264 = t262 - t263;
-    const real t265 = t256 * t264;
-    const real t266 = H[4] * H[5];
-    const real t267 = H[10] * H[11];
-    const real t268 = t266 + t267;
-    const real t269 = H[16] * H[17];
-    const real t270 = t268 + t269;
-    const real t271 = H[22] * H[23];
-    const real t272 = t270 + t271;
-    const real t273 = H[28] * H[29];
-    const real t274 = t272 + t273;
-    const real t275 = H[34] * H[35];
-    const real t276 = t274 + t275;
-    const real t277 = H[30] * H[35];
-    const real t278 = H[24] * H[29];
-    const real t279 = H[18] * H[23];
-    const real t280 = H[12] * H[17];
-    const real t281 = H[6] * H[11];
-    const real t282 = H[0] * H[5];
-    const real t283 = t281 + t282;
-    const real t284 = t280 + t283;
-    const real t285 = t279 + t284;
-    const real t286 = t278 + t285;
-    const real t287 = t277 + t286;
-    const real t288 = t245 * t287;
-    const real t289 = t276 - t288;
-    const real t290 = H[1] * H[5];
-    const real t291 = H[7] * H[11];
-    const real t292 = t290 + t291;
-    const real t293 = H[13] * H[17];
-    const real t294 = t292 + t293;
-    const real t295 = H[19] * H[23];
-    const real t296 = t294 + t295;
-    const real t297 = H[25] * H[29];
-    const real t298 = t296 + t297;
-    const real t299 = H[31] * H[35];
-    const real t300 = t298 + t299;
-    const real t301 = t56 * t287;
-    const real t302 = t300 - t301;
-    const real t303 = t248 * t302;
-    const real t304 = t289 - t303;
-    const real t305 = H[2] * H[5];
-    const real t306 = H[8] * H[11];
-    const real t307 = t305 + t306;
-    const real t308 = H[14] * H[17];
-    const real t309 = t307 + t308;
-    const real t310 = H[20] * H[23];
-    const real t311 = t309 + t310;
-    const real t312 = H[26] * H[29];
-    const real t313 = t311 + t312;
-    const real t314 = H[32] * H[35];
-    const real t315 = t313 + t314;
-    const real t316 = t99 * t287;
-    const real t317 = t315 - t316;
-    const real t318 = t87 * t302;
-    const real t319 = t317 - t318;
-    const real t320 = t251 * t319;
-    const real t321 = t304 - t320;
-    const real t322 = H[3] * H[5];
-    const real t323 = H[9] * H[11];
-    const real t324 = t322 + t323;
-    const real t325 = H[15] * H[17];
-    const real t326 = t324 + t325;
-    const real t327 = H[21] * H[23];
-    const real t328 = t326 + t327;
-    const real t329 = H[27] * H[29];
-    const real t330 = t328 + t329;
-    const real t331 = H[33] * H[35];
-    const real t332 = t330 + t331;
-    const real t333 = t161 * t287;
-    const real t334 = t332 - t333;
-    const real t335 = t164 * t302;
-    const real t336 = t334 - t335;
-    const real t337 = t149 * t319;
-    const real t338 = t336 - t337;
-    const real t339 = t233 * t338;
-    const real t340 = t321 - t339;
-    const real t341 = t340 * t256;
-    const real t342 = H[5] * H[5];
-    const real t343 = H[11] * H[11];
-    const real t344 = t342 + t343;
-    const real t345 = H[17] * H[17];
-    const real t346 = t344 + t345;
-    const real t347 = H[23] * H[23];
-    const real t348 = t346 + t347;
-    const real t349 = H[29] * H[29];
-    const real t350 = t348 + t349;
-    const real t351 = H[35] * H[35];
-    const real t352 = t350 + t351;
-    const real t353 = t11 * t287;
-    const real t354 = t287 * t353;
-    const real t355 = t352 - t354;
-    const real t356 = t59 * t302;
-    const real t357 = t302 * t356;
-    const real t358 = t355 - t357;
-    const real t359 = t104 * t319;
-    const real t360 = t319 * t359;
-    const real t361 = t358 - t360;
-    const real t362 = t169 * t338;
-    const real t363 = t338 * t362;
-    const real t364 = t361 - t363;
-    const real t365 = t340 * t341;
-    const real t366 = t364 - t365;
-    const real t367 = 1.0 / t366;
-    const real t368 = H[0] * t353;
-    const real t369 = H[5] - t368;
-    const real t370 = t356 * t61;
-    const real t371 = t369 - t370;
-    const real t372 = t359 * t108;
-    const real t373 = t371 - t372;
-    const real t374 = t362 * t175;
-    const real t375 = t373 - t374;
-    const real t376 = t341 * t264;
-    const real t377 = t375 - t376;
-    const real t378 = t367 * t377;
-    const real t379 = t341 * t378;
-    const real t380 = t265 - t379;
-    const real t381 = t233 * t380;
-    const real t382 = t176 - t381;
-    const real t383 = t362 * t378;
-    const real t384 = t382 - t383;
-    const real t385 = t149 * t384;
-    const real t386 = t109 - t385;
-    const real t387 = t251 * t380;
-    const real t388 = t386 - t387;
-    const real t389 = t359 * t378;
-    const real t390 = t388 - t389;
-    const real t391 = t87 * t390;
-    const real t392 = t62 - t391;
-    const real t393 = t164 * t384;
-    const real t394 = t392 - t393;
-    const real t395 = t248 * t380;
-    const real t396 = t394 - t395;
-    const real t397 = t356 * t378;
-    const real t398 = t396 - t397;
-    const real t399 = H[1] * d_H[0];
-    const real t400 = H[0] * d_H[1];
-    const real t401 = t399 + t400;
-    const real t402 = H[7] * d_H[6];
-    const real t403 = H[6] * d_H[7];
-    const real t404 = t402 + t403;
-    const real t405 = t401 + t404;
-    const real t406 = H[13] * d_H[12];
-    const real t407 = H[12] * d_H[13];
-    const real t408 = t406 + t407;
-    const real t409 = t405 + t408;
-    const real t410 = H[19] * d_H[18];
-    const real t411 = H[18] * d_H[19];
-    const real t412 = t410 + t411;
-    const real t413 = t409 + t412;
-    const real t414 = H[25] * d_H[24];
-    const real t415 = H[24] * d_H[25];
-    const real t416 = t414 + t415;
-    const real t417 = t413 + t416;
-    const real t418 = H[31] * d_H[30];
-    const real t419 = H[30] * d_H[31];
-    const real t420 = t418 + t419;
-    const real t421 = t417 + t420;
-    const real t422 = t11 * t421;
-    const real t423 = t55 * t31;
-    const real t424 = t422 - t423;
-    const real t425 = t398 * t424;
-    const real t426 = t56 * d_H[0];
-    const real t427 = H[0] * t424;
-    const real t428 = t426 + t427;
-    const real t429 = d_H[1] - t428;
-    const real t430 = t59 * t429;
-    const real t431 = H[31] * d_H[31];
-    const real t432 = t431 + t431;
-    const real t433 = H[25] * d_H[25];
-    const real t434 = t433 + t433;
-    const real t435 = H[19] * d_H[19];
-    const real t436 = t435 + t435;
-    const real t437 = H[13] * d_H[13];
-    const real t438 = t437 + t437;
-    const real t439 = H[7] * d_H[7];
-    const real t440 = t439 + t439;
-    const real t441 = H[1] * d_H[1];
-    const real t442 = t441 + t441;
-    const real t443 = t440 + t442;
-    const real t444 = t438 + t443;
-    const real t445 = t436 + t444;
-    const real t446 = t434 + t445;
-    const real t447 = t432 + t446;
-    const real t448 = t56 * t421;
-    const real t449 = t55 * t424;
-    const real t450 = t448 + t449;
-    const real t451 = t447 - t450;
-    const real t452 = t59 * t451;
-    const real t453 = t452 / t58;
-    const real t454 = t61 * t453;
-    const real t455 = t430 - t454;
-    const real t456 = H[32] * d_H[31];
-    const real t457 = H[31] * d_H[32];
-    const real t458 = t456 + t457;
-    const real t459 = H[26] * d_H[25];
-    const real t460 = H[25] * d_H[26];
-    const real t461 = t459 + t460;
-    const real t462 = H[20] * d_H[19];
-    const real t463 = H[19] * d_H[20];
-    const real t464 = t462 + t463;
-    const real t465 = H[14] * d_H[13];
-    const real t466 = H[13] * d_H[14];
-    const real t467 = t465 + t466;
-    const real t468 = H[8] * d_H[7];
-    const real t469 = H[7] * d_H[8];
-    const real t470 = t468 + t469;
-    const real t471 = H[2] * d_H[1];
-    const real t472 = H[1] * d_H[2];
-    const real t473 = t471 + t472;
-    const real t474 = t470 + t473;
-    const real t475 = t467 + t474;
-    const real t476 = t464 + t475;
-    const real t477 = t461 + t476;
-    const real t478 = t458 + t477;
-    const real t479 = t84 * t424;
-    const real t480 = H[2] * d_H[0];
-    const real t481 = H[0] * d_H[2];
-    const real t482 = t480 + t481;
-    const real t483 = H[8] * d_H[6];
-    const real t484 = H[6] * d_H[8];
-    const real t485 = t483 + t484;
-    const real t486 = t482 + t485;
-    const real t487 = H[14] * d_H[12];
-    const real t488 = H[12] * d_H[14];
-    const real t489 = t487 + t488;
-    const real t490 = t486 + t489;
-    const real t491 = H[20] * d_H[18];
-    const real t492 = H[18] * d_H[20];
-    const real t493 = t491 + t492;
-    const real t494 = t490 + t493;
-    const real t495 = H[26] * d_H[24];
-    const real t496 = H[24] * d_H[26];
-    const real t497 = t495 + t496;
-    const real t498 = t494 + t497;
-    const real t499 = H[32] * d_H[30];
-    const real t500 = H[30] * d_H[32];
-    const real t501 = t499 + t500;
-    const real t502 = t498 + t501;
-    const real t503 = t56 * t502;
-    const real t504 = t479 + t503;
-    const real t505 = t478 - t504;
-    const real t506 = t59 * t505;
-    const real t507 = t86 * t453;
-    const real t508 = t506 - t507;
-    const real t509 = t390 * t508;
-    const real t510 = t99 * d_H[0];
-    const real t511 = t11 * t502;
-    const real t512 = t84 * t31;
-    const real t513 = t511 - t512;
-    const real t514 = H[0] * t513;
-    const real t515 = t510 + t514;
-    const real t516 = d_H[2] - t515;
-    const real t517 = t61 * t508;
-    const real t518 = t87 * t429;
-    const real t519 = t517 + t518;
-    const real t520 = t516 - t519;
-    const real t521 = t104 * t520;
-    const real t522 = H[32] * d_H[32];
-    const real t523 = t522 + t522;
-    const real t524 = H[26] * d_H[26];
-    const real t525 = t524 + t524;
-    const real t526 = H[20] * d_H[20];
-    const real t527 = t526 + t526;
-    const real t528 = H[14] * d_H[14];
-    const real t529 = t528 + t528;
-    const real t530 = H[8] * d_H[8];
-    const real t531 = t530 + t530;
-    const real t532 = H[2] * d_H[2];
-    const real t533 = t532 + t532;
-    const real t534 = t531 + t533;
-    const real t535 = t529 + t534;
-    const real t536 = t527 + t535;
-    const real t537 = t525 + t536;
-    const real t538 = t523 + t537;
-    const real t539 = t99 * t502;
-    const real t540 = t84 * t513;
-    const real t541 = t539 + t540;
-    const real t542 = t538 - t541;
-    const real t543 = t87 * t505;
-    const real t544 = t86 * t508;
-    const real t545 = t543 + t544;
-    const real t546 = t542 - t545;
-    const real t547 = t104 * t546;
-    const real t548 = t547 / t103;
-    const real t549 = t108 * t548;
-    const real t550 = t521 - t549;
-    const real t551 = H[33] * d_H[32];
-    const real t552 = H[32] * d_H[33];
-    const real t553 = t551 + t552;
-    const real t554 = H[27] * d_H[26];
-    const real t555 = H[26] * d_H[27];
-    const real t556 = t554 + t555;
-    const real t557 = H[21] * d_H[20];
-    const real t558 = H[20] * d_H[21];
-    const real t559 = t557 + t558;
-    const real t560 = H[15] * d_H[14];
-    const real t561 = H[14] * d_H[15];
-    const real t562 = t560 + t561;
-    const real t563 = H[9] * d_H[8];
-    const real t564 = H[8] * d_H[9];
-    const real t565 = t563 + t564;
-    const real t566 = H[3] * d_H[2];
-    const real t567 = H[2] * d_H[3];
-    const real t568 = t566 + t567;
-    const real t569 = t565 + t568;
-    const real t570 = t562 + t569;
-    const real t571 = t559 + t570;
-    const real t572 = t556 + t571;
-    const real t573 = t553 + t572;
-    const real t574 = t131 * t513;
-    const real t575 = H[3] * d_H[0];
-    const real t576 = H[0] * d_H[3];
-    const real t577 = t575 + t576;
-    const real t578 = H[9] * d_H[6];
-    const real t579 = H[6] * d_H[9];
-    const real t580 = t578 + t579;
-    const real t581 = t577 + t580;
-    const real t582 = H[15] * d_H[12];
-    const real t583 = H[12] * d_H[15];
-    const real t584 = t582 + t583;
-    const real t585 = t581 + t584;
-    const real t586 = H[21] * d_H[18];
-    const real t587 = H[18] * d_H[21];
-    const real t588 = t586 + t587;
-    const real t589 = t585 + t588;
-    const real t590 = H[27] * d_H[24];
-    const real t591 = H[24] * d_H[27];
-    const real t592 = t590 + t591;
-    const real t593 = t589 + t592;
-    const real t594 = H[33] * d_H[30];
-    const real t595 = H[30] * d_H[33];
-    const real t596 = t594 + t595;
-    const real t597 = t593 + t596;
-    const real t598 = t99 * t597;
-    const real t599 = t574 + t598;
-    const real t600 = t573 - t599;
-    const real t601 = t146 * t508;
-    const real t602 = H[33] * d_H[31];
-    const real t603 = H[31] * d_H[33];
-    const real t604 = t602 + t603;
-    const real t605 = H[27] * d_H[25];
-    const real t606 = H[25] * d_H[27];
-    const real t607 = t605 + t606;
-    const real t608 = H[21] * d_H[19];
-    const real t609 = H[19] * d_H[21];
-    const real t610 = t608 + t609;
-    const real t611 = H[15] * d_H[13];
-    const real t612 = H[13] * d_H[15];
-    const real t613 = t611 + t612;
-    const real t614 = H[9] * d_H[7];
-    const real t615 = H[7] * d_H[9];
-    const real t616 = t614 + t615;
-    const real t617 = H[3] * d_H[1];
-    const real t618 = H[1] * d_H[3];
-    const real t619 = t617 + t618;
-    const real t620 = t616 + t619;
-    const real t621 = t613 + t620;
-    const real t622 = t610 + t621;
-    const real t623 = t607 + t622;
-    const real t624 = t604 + t623;
-    const real t625 = t131 * t424;
-    const real t626 = t56 * t597;
-    const real t627 = t625 + t626;
-    const real t628 = t624 - t627;
-    const real t629 = t87 * t628;
-    const real t630 = t601 + t629;
-    const real t631 = t600 - t630;
-    const real t632 = t104 * t631;
-    const real t633 = t148 * t548;
-    const real t634 = t632 - t633;
-    const real t635 = t384 * t634;
-    const real t636 = t161 * d_H[0];
-    const real t637 = t11 * t597;
-    const real t638 = t131 * t31;
-    const real t639 = t637 - t638;
-    const real t640 = H[0] * t639;
-    const real t641 = t636 + t640;
-    const real t642 = d_H[3] - t641;
-    const real t643 = t59 * t628;
-    const real t644 = t146 * t453;
-    const real t645 = t643 - t644;
-    const real t646 = t61 * t645;
-    const real t647 = t164 * t429;
-    const real t648 = t646 + t647;
-    const real t649 = t642 - t648;
-    const real t650 = t108 * t634;
-    const real t651 = t149 * t520;
-    const real t652 = t650 + t651;
-    const real t653 = t649 - t652;
-    const real t654 = t169 * t653;
-    const real t655 = H[33] * d_H[33];
-    const real t656 = t655 + t655;
-    const real t657 = H[27] * d_H[27];
-    const real t658 = t657 + t657;
-    const real t659 = H[21] * d_H[21];
-    const real t660 = t659 + t659;
-    const real t661 = H[15] * d_H[15];
-    const real t662 = t661 + t661;
-    const real t663 = H[9] * d_H[9];
-    const real t664 = t663 + t663;
-    const real t665 = H[3] * d_H[3];
-    const real t666 = t665 + t665;
-    const real t667 = t664 + t666;
-    const real t668 = t662 + t667;
-    const real t669 = t660 + t668;
-    const real t670 = t658 + t669;
-    const real t671 = t656 + t670;
-    const real t672 = t161 * t597;
-    const real t673 = t131 * t639;
-    const real t674 = t672 + t673;
-    const real t675 = t671 - t674;
-    const real t676 = t164 * t628;
-    const real t677 = t146 * t645;
-    const real t678 = t676 + t677;
-    const real t679 = t675 - t678;
-    const real t680 = t149 * t631;
-    const real t681 = t148 * t634;
-    const real t682 = t680 + t681;
-    const real t683 = t679 - t682;
-    const real t684 = t169 * t683;
-    const real t685 = t684 / t168;
-    const real t686 = t175 * t685;
-    const real t687 = t654 - t686;
-    const real t688 = H[34] * d_H[33];
-    const real t689 = H[33] * d_H[34];
-    const real t690 = t688 + t689;
-    const real t691 = H[28] * d_H[27];
-    const real t692 = H[27] * d_H[28];
-    const real t693 = t691 + t692;
-    const real t694 = H[22] * d_H[21];
-    const real t695 = H[21] * d_H[22];
-    const real t696 = t694 + t695;
-    const real t697 = H[16] * d_H[15];
-    const real t698 = H[15] * d_H[16];
-    const real t699 = t697 + t698;
-    const real t700 = H[10] * d_H[9];
-    const real t701 = H[9] * d_H[10];
-    const real t702 = t700 + t701;
-    const real t703 = H[4] * d_H[3];
-    const real t704 = H[3] * d_H[4];
-    const real t705 = t703 + t704;
-    const real t706 = t702 + t705;
-    const real t707 = t699 + t706;
-    const real t708 = t696 + t707;
-    const real t709 = t693 + t708;
-    const real t710 = t690 + t709;
-    const real t711 = t198 * t639;
-    const real t712 = H[4] * d_H[0];
-    const real t713 = H[0] * d_H[4];
-    const real t714 = t712 + t713;
-    const real t715 = H[10] * d_H[6];
-    const real t716 = H[6] * d_H[10];
-    const real t717 = t715 + t716;
-    const real t718 = t714 + t717;
-    const real t719 = H[16] * d_H[12];
-    const real t720 = H[12] * d_H[16];
-    const real t721 = t719 + t720;
-    const real t722 = t718 + t721;
-    const real t723 = H[22] * d_H[18];
-    const real t724 = H[18] * d_H[22];
-    const real t725 = t723 + t724;
-    const real t726 = t722 + t725;
-    const real t727 = H[28] * d_H[24];
-    const real t728 = H[24] * d_H[28];
-    const real t729 = t727 + t728;
-    const real t730 = t726 + t729;
-    const real t731 = H[34] * d_H[30];
-    const real t732 = H[30] * d_H[34];
-    const real t733 = t731 + t732;
-    const real t734 = t730 + t733;
-    const real t735 = t161 * t734;
-    const real t736 = t711 + t735;
-    const real t737 = t710 - t736;
-    const real t738 = t213 * t645;
-    const real t739 = H[34] * d_H[31];
-    const real t740 = H[31] * d_H[34];
-    const real t741 = t739 + t740;
-    const real t742 = H[28] * d_H[25];
-    const real t743 = H[25] * d_H[28];
-    const real t744 = t742 + t743;
-    const real t745 = H[22] * d_H[19];
-    const real t746 = H[19] * d_H[22];
-    const real t747 = t745 + t746;
-    const real t748 = H[16] * d_H[13];
-    const real t749 = H[13] * d_H[16];
-    const real t750 = t748 + t749;
-    const real t751 = H[10] * d_H[7];
-    const real t752 = H[7] * d_H[10];
-    const real t753 = t751 + t752;
-    const real t754 = H[4] * d_H[1];
-    const real t755 = H[1] * d_H[4];
-    const real t756 = t754 + t755;
-    const real t757 = t753 + t756;
-    const real t758 = t750 + t757;
-    const real t759 = t747 + t758;
-    const real t760 = t744 + t759;
-    const real t761 = t741 + t760;
-    const real t762 = t198 * t424;
-    const real t763 = t56 * t734;
-    const real t764 = t762 + t763;
-    const real t765 = t761 - t764;
-    const real t766 = t164 * t765;
-    const real t767 = t738 + t766;
-    const real t768 = t737 - t767;
-    const real t769 = t230 * t634;
-    const real t770 = H[34] * d_H[32];
-    const real t771 = H[32] * d_H[34];
-    const real t772 = t770 + t771;
-    const real t773 = H[28] * d_H[26];
-    const real t774 = H[26] * d_H[28];
-    const real t775 = t773 + t774;
-    const real t776 = H[22] * d_H[20];
-    const real t777 = H[20] * d_H[22];
-    const real t778 = t776 + t777;
-    const real t779 = H[16] * d_H[14];
-    const real t780 = H[14] * d_H[16];
-    const real t781 = t779 + t780;
-    const real t782 = H[10] * d_H[8];
-    const real t783 = H[8] * d_H[10];
-    const real t784 = t782 + t783;
-    const real t785 = H[4] * d_H[2];
-    const real t786 = H[2] * d_H[4];
-    const real t787 = t785 + t786;
-    const real t788 = t784 + t787;
-    const real t789 = t781 + t788;
-    const real t790 = t778 + t789;
-    const real t791 = t775 + t790;
-    const real t792 = t772 + t791;
-    const real t793 = t198 * t513;
-    const real t794 = t99 * t734;
-    const real t795 = t793 + t794;
-    const real t796 = t792 - t795;
-    const real t797 = t213 * t508;
-    const real t798 = t87 * t765;
-    const real t799 = t797 + t798;
-    const real t800 = t796 - t799;
-    const real t801 = t149 * t800;
-    const real t802 = t769 + t801;
-    const real t803 = t768 - t802;
-    const real t804 = t169 * t803;
-    const real t805 = t232 * t685;
-    const real t806 = t804 - t805;
-    const real t807 = t380 * t806;
-    const real t808 = t245 * d_H[0];
-    const real t809 = t11 * t734;
-    const real t810 = t198 * t31;
-    const real t811 = t809 - t810;
-    const real t812 = H[0] * t811;
-    const real t813 = t808 + t812;
-    const real t814 = d_H[4] - t813;
-    const real t815 = t59 * t765;
-    const real t816 = t213 * t453;
-    const real t817 = t815 - t816;
-    const real t818 = t61 * t817;
-    const real t819 = t248 * t429;
-    const real t820 = t818 + t819;
-    const real t821 = t814 - t820;
-    const real t822 = t104 * t800;
-    const real t823 = t230 * t548;
-    const real t824 = t822 - t823;
-    const real t825 = t108 * t824;
-    const real t826 = t251 * t520;
-    const real t827 = t825 + t826;
-    const real t828 = t821 - t827;
-    const real t829 = t175 * t806;
-    const real t830 = t233 * t653;
-    const real t831 = t829 + t830;
-    const real t832 = t828 - t831;
-    const real t833 = t256 * t832;
-    const real t834 = H[34] * d_H[34];
-    const real t835 = t834 + t834;
-    const real t836 = H[28] * d_H[28];
-    const real t837 = t836 + t836;
-    const real t838 = H[22] * d_H[22];
-    const real t839 = t838 + t838;
-    const real t840 = H[16] * d_H[16];
-    const real t841 = t840 + t840;
-    const real t842 = H[10] * d_H[10];
-    const real t843 = t842 + t842;
-    const real t844 = H[4] * d_H[4];
-    const real t845 = t844 + t844;
-    const real t846 = t843 + t845;
-    const real t847 = t841 + t846;
-    const real t848 = t839 + t847;
-    const real t849 = t837 + t848;
-    const real t850 = t835 + t849;
-    const real t851 = t245 * t734;
-    const real t852 = t198 * t811;
-    const real t853 = t851 + t852;
-    const real t854 = t850 - t853;
-    const real t855 = t248 * t765;
-    const real t856 = t213 * t817;
-    const real t857 = t855 + t856;
-    const real t858 = t854 - t857;
-    const real t859 = t251 * t800;
-    const real t860 = t230 * t824;
-    const real t861 = t859 + t860;
-    const real t862 = t858 - t861;
-    const real t863 = t233 * t803;
-    const real t864 = t232 * t806;
-    const real t865 = t863 + t864;
-    const real t866 = t862 - t865;
-    const real t867 = t256 * t866;
-    const real t868 = t867 / t255;
-    const real t869 = t264 * t868;
-    const real t870 = t833 - t869;
-    const real t871 = H[35] * d_H[34];
-    const real t872 = H[34] * d_H[35];
-    const real t873 = t871 + t872;
-    const real t874 = H[29] * d_H[28];
-    const real t875 = H[28] * d_H[29];
-    const real t876 = t874 + t875;
-    const real t877 = H[23] * d_H[22];
-    const real t878 = H[22] * d_H[23];
-    const real t879 = t877 + t878;
-    const real t880 = H[17] * d_H[16];
-    const real t881 = H[16] * d_H[17];
-    const real t882 = t880 + t881;
-    const real t883 = H[11] * d_H[10];
-    const real t884 = H[10] * d_H[11];
-    const real t885 = t883 + t884;
-    const real t886 = H[5] * d_H[4];
-    const real t887 = H[4] * d_H[5];
-    const real t888 = t886 + t887;
-    const real t889 = t885 + t888;
-    const real t890 = t882 + t889;
-    const real t891 = t879 + t890;
-    const real t892 = t876 + t891;
-    const real t893 = t873 + t892;
-    const real t894 = t287 * t811;
-    const real t895 = H[5] * d_H[0];
-    const real t896 = H[0] * d_H[5];
-    const real t897 = t895 + t896;
-    const real t898 = H[11] * d_H[6];
-    const real t899 = H[6] * d_H[11];
-    const real t900 = t898 + t899;
-    const real t901 = t897 + t900;
-    const real t902 = H[17] * d_H[12];
-    const real t903 = H[12] * d_H[17];
-    const real t904 = t902 + t903;
-    const real t905 = t901 + t904;
-    const real t906 = H[23] * d_H[18];
-    const real t907 = H[18] * d_H[23];
-    const real t908 = t906 + t907;
-    const real t909 = t905 + t908;
-    const real t910 = H[29] * d_H[24];
-    const real t911 = H[24] * d_H[29];
-    const real t912 = t910 + t911;
-    const real t913 = t909 + t912;
-    const real t914 = H[35] * d_H[30];
-    const real t915 = H[30] * d_H[35];
-    const real t916 = t914 + t915;
-    const real t917 = t913 + t916;
-    const real t918 = t245 * t917;
-    const real t919 = t894 + t918;
-    const real t920 = t893 - t919;
-    const real t921 = t302 * t817;
-    const real t922 = H[35] * d_H[31];
-    const real t923 = H[31] * d_H[35];
-    const real t924 = t922 + t923;
-    const real t925 = H[29] * d_H[25];
-    const real t926 = H[25] * d_H[29];
-    const real t927 = t925 + t926;
-    const real t928 = H[23] * d_H[19];
-    const real t929 = H[19] * d_H[23];
-    const real t930 = t928 + t929;
-    const real t931 = H[17] * d_H[13];
-    const real t932 = H[13] * d_H[17];
-    const real t933 = t931 + t932;
-    const real t934 = H[11] * d_H[7];
-    const real t935 = H[7] * d_H[11];
-    const real t936 = t934 + t935;
-    const real t937 = H[5] * d_H[1];
-    const real t938 = H[1] * d_H[5];
-    const real t939 = t937 + t938;
-    const real t940 = t936 + t939;
-    const real t941 = t933 + t940;
-    const real t942 = t930 + t941;
-    const real t943 = t927 + t942;
-    const real t944 = t924 + t943;
-    const real t945 = t287 * t424;
-    const real t946 = t56 * t917;
-    const real t947 = t945 + t946;
-    const real t948 = t944 - t947;
-    const real t949 = t248 * t948;
-    const real t950 = t921 + t949;
-    const real t951 = t920 - t950;
-    const real t952 = t319 * t824;
-    const real t953 = H[35] * d_H[32];
-    const real t954 = H[32] * d_H[35];
-    const real t955 = t953 + t954;
-    const real t956 = H[29] * d_H[26];
-    const real t957 = H[26] * d_H[29];
-    const real t958 = t956 + t957;
-    const real t959 = H[23] * d_H[20];
-    const real t960 = H[20] * d_H[23];
-    const real t961 = t959 + t960;
-    const real t962 = H[17] * d_H[14];
-    const real t963 = H[14] * d_H[17];
-    const real t964 = t962 + t963;
-    const real t965 = H[11] * d_H[8];
-    const real t966 = H[8] * d_H[11];
-    const real t967 = t965 + t966;
-    const real t968 = H[5] * d_H[2];
-    const real t969 = H[2] * d_H[5];
-    const real t970 = t968 + t969;
-    const real t971 = t967 + t970;
-    const real t972 = t964 + t971;
-    const real t973 = t961 + t972;
-    const real t974 = t958 + t973;
-    const real t975 = t955 + t974;
-    const real t976 = t287 * t513;
-    const real t977 = t99 * t917;
-    const real t978 = t976 + t977;
-    const real t979 = t975 - t978;
-    const real t980 = t302 * t508;
-    const real t981 = t87 * t948;
-    const real t982 = t980 + t981;
-    const real t983 = t979 - t982;
-    const real t984 = t251 * t983;
-    const real t985 = t952 + t984;
-    const real t986 = t951 - t985;
-    const real t987 = t338 * t806;
-    const real t988 = H[35] * d_H[33];
-    const real t989 = H[33] * d_H[35];
-    const real t990 = t988 + t989;
-    const real t991 = H[29] * d_H[27];
-    const real t992 = H[27] * d_H[29];
-    const real t993 = t991 + t992;
-    const real t994 = H[23] * d_H[21];
-    const real t995 = H[21] * d_H[23];
-    const real t996 = t994 + t995;
-    const real t997 = H[17] * d_H[15];
-    const real t998 = H[15] * d_H[17];
-    const real t999 = t997 + t998;
-    const real t1000 = H[11] * d_H[9];
-    const real t1001 = H[9] * d_H[11];
-    const real t1002 = t1000 + t1001;
-    const real t1003 = H[5] * d_H[3];
-    const real t1004 = H[3] * d_H[5];
-    const real t1005 = t1003 + t1004;
-    const real t1006 = t1002 + t1005;
-    const real t1007 = t999 + t1006;
-    const real t1008 = t996 + t1007;
-    const real t1009 = t993 + t1008;
-    const real t1010 = t990 + t1009;
-    const real t1011 = t287 * t639;
-    const real t1012 = t161 * t917;
-    const real t1013 = t1011 + t1012;
-    const real t1014 = t1010 - t1013;
-    const real t1015 = t302 * t645;
-    const real t1016 = t164 * t948;
-    const real t1017 = t1015 + t1016;
-    const real t1018 = t1014 - t1017;
-    const real t1019 = t319 * t634;
-    const real t1020 = t149 * t983;
-    const real t1021 = t1019 + t1020;
-    const real t1022 = t1018 - t1021;
-    const real t1023 = t233 * t1022;
-    const real t1024 = t987 + t1023;
-    const real t1025 = t986 - t1024;
-    const real t1026 = t256 * t1025;
-    const real t1027 = t340 * t868;
-    const real t1028 = t1026 - t1027;
-    const real t1029 = t378 * t1028;
-    const real t1030 = t353 * d_H[0];
-    const real t1031 = t11 * t917;
-    const real t1032 = t287 * t31;
-    const real t1033 = t1031 - t1032;
-    const real t1034 = H[0] * t1033;
-    const real t1035 = t1030 + t1034;
-    const real t1036 = d_H[5] - t1035;
-    const real t1037 = t59 * t948;
-    const real t1038 = t302 * t453;
-    const real t1039 = t1037 - t1038;
-    const real t1040 = t61 * t1039;
-    const real t1041 = t356 * t429;
-    const real t1042 = t1040 + t1041;
-    const real t1043 = t1036 - t1042;
-    const real t1044 = t104 * t983;
-    const real t1045 = t319 * t548;
-    const real t1046 = t1044 - t1045;
-    const real t1047 = t108 * t1046;
-    const real t1048 = t359 * t520;
-    const real t1049 = t1047 + t1048;
-    const real t1050 = t1043 - t1049;
-    const real t1051 = t169 * t1022;
-    const real t1052 = t338 * t685;
-    const real t1053 = t1051 - t1052;
-    const real t1054 = t175 * t1053;
-    const real t1055 = t362 * t653;
-    const real t1056 = t1054 + t1055;
-    const real t1057 = t1050 - t1056;
-    const real t1058 = t264 * t1028;
-    const real t1059 = t341 * t832;
-    const real t1060 = t1058 + t1059;
-    const real t1061 = t1057 - t1060;
-    const real t1062 = t367 * t1061;
-    const real t1063 = H[35] * d_H[35];
-    const real t1064 = t1063 + t1063;
-    const real t1065 = H[29] * d_H[29];
-    const real t1066 = t1065 + t1065;
-    const real t1067 = H[23] * d_H[23];
-    const real t1068 = t1067 + t1067;
-    const real t1069 = H[17] * d_H[17];
-    const real t1070 = t1069 + t1069;
-    const real t1071 = H[11] * d_H[11];
-    const real t1072 = t1071 + t1071;
-    const real t1073 = H[5] * d_H[5];
-    const real t1074 = t1073 + t1073;
-    const real t1075 = t1072 + t1074;
-    const real t1076 = t1070 + t1075;
-    const real t1077 = t1068 + t1076;
-    const real t1078 = t1066 + t1077;
-    const real t1079 = t1064 + t1078;
-    const real t1080 = t353 * t917;
-    const real t1081 = t287 * t1033;
-    const real t1082 = t1080 + t1081;
-    const real t1083 = t1079 - t1082;
-    const real t1084 = t356 * t948;
-    const real t1085 = t302 * t1039;
-    const real t1086 = t1084 + t1085;
-    const real t1087 = t1083 - t1086;
-    const real t1088 = t359 * t983;
-    const real t1089 = t319 * t1046;
-    const real t1090 = t1088 + t1089;
-    const real t1091 = t1087 - t1090;
-    const real t1092 = t362 * t1022;
-    const real t1093 = t338 * t1053;
-    const real t1094 = t1092 + t1093;
-    const real t1095 = t1091 - t1094;
-    const real t1096 = t341 * t1025;
-    const real t1097 = t340 * t1028;
-    const real t1098 = t1096 + t1097;
-    const real t1099 = t1095 - t1098;
-    const real t1100 = t367 * t1099;
-    const real t1101 = t1100 / t366;
-    const real t1102 = t377 * t1101;
-    const real t1103 = t1062 - t1102;
-    const real t1104 = t341 * t1103;
-    const real t1105 = t1029 + t1104;
-    const real t1106 = t870 - t1105;
-    const real t1107 = t233 * t1106;
-    const real t1108 = t807 + t1107;
-    const real t1109 = t687 - t1108;
-    const real t1110 = t378 * t1053;
-    const real t1111 = t362 * t1103;
-    const real t1112 = t1110 + t1111;
-    const real t1113 = t1109 - t1112;
-    const real t1114 = t149 * t1113;
-    const real t1115 = t635 + t1114;
-    const real t1116 = t550 - t1115;
-    const real t1117 = t380 * t824;
-    const real t1118 = t251 * t1106;
-    const real t1119 = t1117 + t1118;
-    const real t1120 = t1116 - t1119;
-    const real t1121 = t378 * t1046;
-    const real t1122 = t359 * t1103;
-    const real t1123 = t1121 + t1122;
-    const real t1124 = t1120 - t1123;
-    const real t1125 = t87 * t1124;
-    const real t1126 = t509 + t1125;
-    const real t1127 = t455 - t1126;
-    const real t1128 = t384 * t645;
-    const real t1129 = t164 * t1113;
-    const real t1130 = t1128 + t1129;
-    const real t1131 = t1127 - t1130;
-    const real t1132 = t380 * t817;
-    const real t1133 = t248 * t1106;
-    const real t1134 = t1132 + t1133;
-    const real t1135 = t1131 - t1134;
-    const real t1136 = t378 * t1039;
-    const real t1137 = t356 * t1103;
-    const real t1138 = t1136 + t1137;
-    const real t1139 = t1135 - t1138;
-    const real t1140 = t56 * t1139;
-    const real t1141 = t425 + t1140;
-    const real t1142 = t33 - t1141;
-    const real t1143 = t390 * t513;
-    const real t1144 = t99 * t1124;
-    const real t1145 = t1143 + t1144;
-    const real t1146 = t1142 - t1145;
-    const real t1147 = t384 * t639;
-    const real t1148 = t161 * t1113;
-    const real t1149 = t1147 + t1148;
-    const real t1150 = t1146 - t1149;
-    const real t1151 = t380 * t811;
-    const real t1152 = t245 * t1106;
-    const real t1153 = t1151 + t1152;
-    const real t1154 = t1150 - t1153;
-    const real t1155 = t378 * t1033;
-    const real t1156 = t353 * t1103;
-    const real t1157 = t1155 + t1156;
-    const real t1158 = t1154 - t1157;
-    d_W[0] = t1158;
-    const real t1159 = t11 * d_H[6];
-    const real t1160 = H[6] * t31;
-    const real t1161 = t1159 - t1160;
-    const real t1162 = H[6] * t56;
-    const real t1163 = H[7] - t1162;
-    const real t1164 = t59 * t1163;
-    const real t1165 = H[6] * t99;
-    const real t1166 = H[8] - t1165;
-    const real t1167 = t87 * t1163;
-    const real t1168 = t1166 - t1167;
-    const real t1169 = t104 * t1168;
-    const real t1170 = H[6] * t161;
-    const real t1171 = H[9] - t1170;
-    const real t1172 = t164 * t1163;
-    const real t1173 = t1171 - t1172;
-    const real t1174 = t149 * t1168;
-    const real t1175 = t1173 - t1174;
-    const real t1176 = t169 * t1175;
-    const real t1177 = H[6] * t245;
-    const real t1178 = H[10] - t1177;
-    const real t1179 = t248 * t1163;
-    const real t1180 = t1178 - t1179;
-    const real t1181 = t251 * t1168;
-    const real t1182 = t1180 - t1181;
-    const real t1183 = t233 * t1175;
-    const real t1184 = t1182 - t1183;
-    const real t1185 = t256 * t1184;
-    const real t1186 = H[6] * t353;
-    const real t1187 = H[11] - t1186;
-    const real t1188 = t356 * t1163;
-    const real t1189 = t1187 - t1188;
-    const real t1190 = t359 * t1168;
-    const real t1191 = t1189 - t1190;
-    const real t1192 = t362 * t1175;
-    const real t1193 = t1191 - t1192;
-    const real t1194 = t341 * t1184;
-    const real t1195 = t1193 - t1194;
-    const real t1196 = t367 * t1195;
-    const real t1197 = t341 * t1196;
-    const real t1198 = t1185 - t1197;
-    const real t1199 = t233 * t1198;
-    const real t1200 = t1176 - t1199;
-    const real t1201 = t362 * t1196;
-    const real t1202 = t1200 - t1201;
-    const real t1203 = t149 * t1202;
-    const real t1204 = t1169 - t1203;
-    const real t1205 = t251 * t1198;
-    const real t1206 = t1204 - t1205;
-    const real t1207 = t359 * t1196;
-    const real t1208 = t1206 - t1207;
-    const real t1209 = t87 * t1208;
-    const real t1210 = t1164 - t1209;
-    const real t1211 = t164 * t1202;
-    const real t1212 = t1210 - t1211;
-    const real t1213 = t248 * t1198;
-    const real t1214 = t1212 - t1213;
-    const real t1215 = t356 * t1196;
-    const real t1216 = t1214 - t1215;
-    const real t1217 = t1216 * t424;
-    const real t1218 = t56 * d_H[6];
-    const real t1219 = H[6] * t424;
-    const real t1220 = t1218 + t1219;
-    const real t1221 = d_H[7] - t1220;
-    const real t1222 = t59 * t1221;
-    const real t1223 = t1163 * t453;
-    const real t1224 = t1222 - t1223;
-    const real t1225 = t1208 * t508;
-    const real t1226 = t99 * d_H[6];
-    const real t1227 = H[6] * t513;
-    const real t1228 = t1226 + t1227;
-    const real t1229 = d_H[8] - t1228;
-    const real t1230 = t1163 * t508;
-    const real t1231 = t87 * t1221;
-    const real t1232 = t1230 + t1231;
-    const real t1233 = t1229 - t1232;
-    const real t1234 = t104 * t1233;
-    const real t1235 = t1168 * t548;
-    const real t1236 = t1234 - t1235;
-    const real t1237 = t1202 * t634;
-    const real t1238 = t161 * d_H[6];
-    const real t1239 = H[6] * t639;
-    const real t1240 = t1238 + t1239;
-    const real t1241 = d_H[9] - t1240;
-    const real t1242 = t1163 * t645;
-    const real t1243 = t164 * t1221;
-    const real t1244 = t1242 + t1243;
-    const real t1245 = t1241 - t1244;
-    const real t1246 = t1168 * t634;
-    const real t1247 = t149 * t1233;
-    const real t1248 = t1246 + t1247;
-    const real t1249 = t1245 - t1248;
-    const real t1250 = t169 * t1249;
-    const real t1251 = t1175 * t685;
-    const real t1252 = t1250 - t1251;
-    const real t1253 = t1198 * t806;
-    const real t1254 = t245 * d_H[6];
-    const real t1255 = H[6] * t811;
-    const real t1256 = t1254 + t1255;
-    const real t1257 = d_H[10] - t1256;
-    const real t1258 = t1163 * t817;
-    const real t1259 = t248 * t1221;
-    const real t1260 = t1258 + t1259;
-    const real t1261 = t1257 - t1260;
-    const real t1262 = t1168 * t824;
-    const real t1263 = t251 * t1233;
-    const real t1264 = t1262 + t1263;
-    const real t1265 = t1261 - t1264;
-    const real t1266 = t1175 * t806;
-    const real t1267 = t233 * t1249;
-    const real t1268 = t1266 + t1267;
-    const real t1269 = t1265 - t1268;
-    const real t1270 = t256 * t1269;
-    const real t1271 = t1184 * t868;
-    const real t1272 = t1270 - t1271;
-    const real t1273 = t1196 * t1028;
-    const real t1274 = t353 * d_H[6];
-    const real t1275 = H[6] * t1033;
-    const real t1276 = t1274 + t1275;
-    const real t1277 = d_H[11] - t1276;
-    const real t1278 = t1163 * t1039;
-    const real t1279 = t356 * t1221;
-    const real t1280 = t1278 + t1279;
-    const real t1281 = t1277 - t1280;
-    const real t1282 = t1168 * t1046;
-    const real t1283 = t359 * t1233;
-    const real t1284 = t1282 + t1283;
-    const real t1285 = t1281 - t1284;
-    const real t1286 = t1175 * t1053;
-    const real t1287 = t362 * t1249;
-    const real t1288 = t1286 + t1287;
-    const real t1289 = t1285 - t1288;
-    const real t1290 = t1184 * t1028;
-    const real t1291 = t341 * t1269;
-    const real t1292 = t1290 + t1291;
-    const real t1293 = t1289 - t1292;
-    const real t1294 = t367 * t1293;
-    const real t1295 = t1195 * t1101;
-    const real t1296 = t1294 - t1295;
-    const real t1297 = t341 * t1296;
-    const real t1298 = t1273 + t1297;
-    const real t1299 = t1272 - t1298;
-    const real t1300 = t233 * t1299;
-    const real t1301 = t1253 + t1300;
-    const real t1302 = t1252 - t1301;
-    const real t1303 = t1196 * t1053;
-    const real t1304 = t362 * t1296;
-    const real t1305 = t1303 + t1304;
-    const real t1306 = t1302 - t1305;
-    const real t1307 = t149 * t1306;
-    const real t1308 = t1237 + t1307;
-    const real t1309 = t1236 - t1308;
-    const real t1310 = t1198 * t824;
-    const real t1311 = t251 * t1299;
-    const real t1312 = t1310 + t1311;
-    const real t1313 = t1309 - t1312;
-    const real t1314 = t1196 * t1046;
-    const real t1315 = t359 * t1296;
-    const real t1316 = t1314 + t1315;
-    const real t1317 = t1313 - t1316;
-    const real t1318 = t87 * t1317;
-    const real t1319 = t1225 + t1318;
-    const real t1320 = t1224 - t1319;
-    const real t1321 = t1202 * t645;
-    const real t1322 = t164 * t1306;
-    const real t1323 = t1321 + t1322;
-    const real t1324 = t1320 - t1323;
-    const real t1325 = t1198 * t817;
-    const real t1326 = t248 * t1299;
-    const real t1327 = t1325 + t1326;
-    const real t1328 = t1324 - t1327;
-    const real t1329 = t1196 * t1039;
-    const real t1330 = t356 * t1296;
-    const real t1331 = t1329 + t1330;
-    const real t1332 = t1328 - t1331;
-    const real t1333 = t56 * t1332;
-    const real t1334 = t1217 + t1333;
-    const real t1335 = t1161 - t1334;
-    const real t1336 = t1208 * t513;
-    const real t1337 = t99 * t1317;
-    const real t1338 = t1336 + t1337;
-    const real t1339 = t1335 - t1338;
-    const real t1340 = t1202 * t639;
-    const real t1341 = t161 * t1306;
-    const real t1342 = t1340 + t1341;
-    const real t1343 = t1339 - t1342;
-    const real t1344 = t1198 * t811;
-    const real t1345 = t245 * t1299;
-    const real t1346 = t1344 + t1345;
-    const real t1347 = t1343 - t1346;
-    const real t1348 = t1196 * t1033;
-    const real t1349 = t353 * t1296;
-    const real t1350 = t1348 + t1349;
-    const real t1351 = t1347 - t1350;
-    d_W[1] = t1351;
-    const real t1352 = t11 * d_H[12];
-    const real t1353 = H[12] * t31;
-    const real t1354 = t1352 - t1353;
-    const real t1355 = H[12] * t56;
-    const real t1356 = H[13] - t1355;
-    const real t1357 = t59 * t1356;
-    const real t1358 = H[12] * t99;
-    const real t1359 = H[14] - t1358;
-    const real t1360 = t87 * t1356;
-    const real t1361 = t1359 - t1360;
-    const real t1362 = t104 * t1361;
-    const real t1363 = H[12] * t161;
-    const real t1364 = H[15] - t1363;
-    const real t1365 = t164 * t1356;
-    const real t1366 = t1364 - t1365;
-    const real t1367 = t149 * t1361;
-    const real t1368 = t1366 - t1367;
-    const real t1369 = t169 * t1368;
-    const real t1370 = H[12] * t245;
-    const real t1371 = H[16] - t1370;
-    const real t1372 = t248 * t1356;
-    const real t1373 = t1371 - t1372;
-    const real t1374 = t251 * t1361;
-    const real t1375 = t1373 - t1374;
-    const real t1376 = t233 * t1368;
-    const real t1377 = t1375 - t1376;
-    const real t1378 = t256 * t1377;
-    const real t1379 = H[12] * t353;
-    const real t1380 = H[17] - t1379;
-    const real t1381 = t356 * t1356;
-    const real t1382 = t1380 - t1381;
-    const real t1383 = t359 * t1361;
-    const real t1384 = t1382 - t1383;
-    const real t1385 = t362 * t1368;
-    const real t1386 = t1384 - t1385;
-    const real t1387 = t341 * t1377;
-    const real t1388 = t1386 - t1387;
-    const real t1389 = t367 * t1388;
-    const real t1390 = t341 * t1389;
-    const real t1391 = t1378 - t1390;
-    const real t1392 = t233 * t1391;
-    const real t1393 = t1369 - t1392;
-    const real t1394 = t362 * t1389;
-    const real t1395 = t1393 - t1394;
-    const real t1396 = t149 * t1395;
-    const real t1397 = t1362 - t1396;
-    const real t1398 = t251 * t1391;
-    const real t1399 = t1397 - t1398;
-    const real t1400 = t359 * t1389;
-    const real t1401 = t1399 - t1400;
-    const real t1402 = t87 * t1401;
-    const real t1403 = t1357 - t1402;
-    const real t1404 = t164 * t1395;
-    const real t1405 = t1403 - t1404;
-    const real t1406 = t248 * t1391;
-    const real t1407 = t1405 - t1406;
-    const real t1408 = t356 * t1389;
-    const real t1409 = t1407 - t1408;
-    const real t1410 = t1409 * t424;
-    const real t1411 = t56 * d_H[12];
-    const real t1412 = H[12] * t424;
-    const real t1413 = t1411 + t1412;
-    const real t1414 = d_H[13] - t1413;
-    const real t1415 = t59 * t1414;
-    const real t1416 = t1356 * t453;
-    const real t1417 = t1415 - t1416;
-    const real t1418 = t1401 * t508;
-    const real t1419 = t99 * d_H[12];
-    const real t1420 = H[12] * t513;
-    const real t1421 = t1419 + t1420;
-    const real t1422 = d_H[14] - t1421;
-    const real t1423 = t1356 * t508;
-    const real t1424 = t87 * t1414;
-    const real t1425 = t1423 + t1424;
-    const real t1426 = t1422 - t1425;
-    const real t1427 = t104 * t1426;
-    const real t1428 = t1361 * t548;
-    const real t1429 = t1427 - t1428;
-    const real t1430 = t1395 * t634;
-    const real t1431 = t161 * d_H[12];
-    const real t1432 = H[12] * t639;
-    const real t1433 = t1431 + t1432;
-    const real t1434 = d_H[15] - t1433;
-    const real t1435 = t1356 * t645;
-    const real t1436 = t164 * t1414;
-    const real t1437 = t1435 + t1436;
-    const real t1438 = t1434 - t1437;
-    const real t1439 = t1361 * t634;
-    const real t1440 = t149 * t1426;
-    const real t1441 = t1439 + t1440;
-    const real t1442 = t1438 - t1441;
-    const real t1443 = t169 * t1442;
-    const real t1444 = t1368 * t685;
-    const real t1445 = t1443 - t1444;
-    const real t1446 = t1391 * t806;
-    const real t1447 = t245 * d_H[12];
-    const real t1448 = H[12] * t811;
-    const real t1449 = t1447 + t1448;
-    const real t1450 = d_H[16] - t1449;
-    const real t1451 = t1356 * t817;
-    const real t1452 = t248 * t1414;
-    const real t1453 = t1451 + t1452;
-    const real t1454 = t1450 - t1453;
-    const real t1455 = t1361 * t824;
-    const real t1456 = t251 * t1426;
-    const real t1457 = t1455 + t1456;
-    const real t1458 = t1454 - t1457;
-    const real t1459 = t1368 * t806;
-    const real t1460 = t233 * t1442;
-    const real t1461 = t1459 + t1460;
-    const real t1462 = t1458 - t1461;
-    const real t1463 = t256 * t1462;
-    const real t1464 = t1377 * t868;
-    const real t1465 = t1463 - t1464;
-    const real t1466 = t1389 * t1028;
-    const real t1467 = t353 * d_H[12];
-    const real t1468 = H[12] * t1033;
-    const real t1469 = t1467 + t1468;
-    const real t1470 = d_H[17] - t1469;
-    const real t1471 = t1356 * t1039;
-    const real t1472 = t356 * t1414;
-    const real t1473 = t1471 + t1472;
-    const real t1474 = t1470 - t1473;
-    const real t1475 = t1361 * t1046;
-    const real t1476 = t359 * t1426;
-    const real t1477 = t1475 + t1476;
-    const real t1478 = t1474 - t1477;
-    const real t1479 = t1368 * t1053;
-    const real t1480 = t362 * t1442;
-    const real t1481 = t1479 + t1480;
-    const real t1482 = t1478 - t1481;
-    const real t1483 = t1377 * t1028;
-    const real t1484 = t341 * t1462;
-    const real t1485 = t1483 + t1484;
-    const real t1486 = t1482 - t1485;
-    const real t1487 = t367 * t1486;
-    const real t1488 = t1388 * t1101;
-    const real t1489 = t1487 - t1488;
-    const real t1490 = t341 * t1489;
-    const real t1491 = t1466 + t1490;
-    const real t1492 = t1465 - t1491;
-    const real t1493 = t233 * t1492;
-    const real t1494 = t1446 + t1493;
-    const real t1495 = t1445 - t1494;
-    const real t1496 = t1389 * t1053;
-    const real t1497 = t362 * t1489;
-    const real t1498 = t1496 + t1497;
-    const real t1499 = t1495 - t1498;
-    const real t1500 = t149 * t1499;
-    const real t1501 = t1430 + t1500;
-    const real t1502 = t1429 - t1501;
-    const real t1503 = t1391 * t824;
-    const real t1504 = t251 * t1492;
-    const real t1505 = t1503 + t1504;
-    const real t1506 = t1502 - t1505;
-    const real t1507 = t1389 * t1046;
-    const real t1508 = t359 * t1489;
-    const real t1509 = t1507 + t1508;
-    const real t1510 = t1506 - t1509;
-    const real t1511 = t87 * t1510;
-    const real t1512 = t1418 + t1511;
-    const real t1513 = t1417 - t1512;
-    const real t1514 = t1395 * t645;
-    const real t1515 = t164 * t1499;
-    const real t1516 = t1514 + t1515;
-    const real t1517 = t1513 - t1516;
-    const real t1518 = t1391 * t817;
-    const real t1519 = t248 * t1492;
-    const real t1520 = t1518 + t1519;
-    const real t1521 = t1517 - t1520;
-    const real t1522 = t1389 * t1039;
-    const real t1523 = t356 * t1489;
-    const real t1524 = t1522 + t1523;
-    const real t1525 = t1521 - t1524;
-    const real t1526 = t56 * t1525;
-    const real t1527 = t1410 + t1526;
-    const real t1528 = t1354 - t1527;
-    const real t1529 = t1401 * t513;
-    const real t1530 = t99 * t1510;
-    const real t1531 = t1529 + t1530;
-    const real t1532 = t1528 - t1531;
-    const real t1533 = t1395 * t639;
-    const real t1534 = t161 * t1499;
-    const real t1535 = t1533 + t1534;
-    const real t1536 = t1532 - t1535;
-    const real t1537 = t1391 * t811;
-    const real t1538 = t245 * t1492;
-    const real t1539 = t1537 + t1538;
-    const real t1540 = t1536 - t1539;
-    const real t1541 = t1389 * t1033;
-    const real t1542 = t353 * t1489;
-    const real t1543 = t1541 + t1542;
-    const real t1544 = t1540 - t1543;
-    d_W[2] = t1544;
-    const real t1545 = t11 * d_H[18];
-    const real t1546 = H[18] * t31;
-    const real t1547 = t1545 - t1546;
-    const real t1548 = H[18] * t56;
-    const real t1549 = H[19] - t1548;
-    const real t1550 = t59 * t1549;
-    const real t1551 = H[18] * t99;
-    const real t1552 = H[20] - t1551;
-    const real t1553 = t87 * t1549;
-    const real t1554 = t1552 - t1553;
-    const real t1555 = t104 * t1554;
-    const real t1556 = H[18] * t161;
-    const real t1557 = H[21] - t1556;
-    const real t1558 = t164 * t1549;
-    const real t1559 = t1557 - t1558;
-    const real t1560 = t149 * t1554;
-    const real t1561 = t1559 - t1560;
-    const real t1562 = t169 * t1561;
-    const real t1563 = H[18] * t245;
-    const real t1564 = H[22] - t1563;
-    const real t1565 = t248 * t1549;
-    const real t1566 = t1564 - t1565;
-    const real t1567 = t251 * t1554;
-    const real t1568 = t1566 - t1567;
-    const real t1569 = t233 * t1561;
-    const real t1570 = t1568 - t1569;
-    const real t1571 = t256 * t1570;
-    const real t1572 = H[18] * t353;
-    const real t1573 = H[23] - t1572;
-    const real t1574 = t356 * t1549;
-    const real t1575 = t1573 - t1574;
-    const real t1576 = t359 * t1554;
-    const real t1577 = t1575 - t1576;
-    const real t1578 = t362 * t1561;
-    const real t1579 = t1577 - t1578;
-    const real t1580 = t341 * t1570;
-    const real t1581 = t1579 - t1580;
-    const real t1582 = t367 * t1581;
-    const real t1583 = t341 * t1582;
-    const real t1584 = t1571 - t1583;
-    const real t1585 = t233 * t1584;
-    const real t1586 = t1562 - t1585;
-    const real t1587 = t362 * t1582;
-    const real t1588 = t1586 - t1587;
-    const real t1589 = t149 * t1588;
-    const real t1590 = t1555 - t1589;
-    const real t1591 = t251 * t1584;
-    const real t1592 = t1590 - t1591;
-    const real t1593 = t359 * t1582;
-    const real t1594 = t1592 - t1593;
-    const real t1595 = t87 * t1594;
-    const real t1596 = t1550 - t1595;
-    const real t1597 = t164 * t1588;
-    const real t1598 = t1596 - t1597;
-    const real t1599 = t248 * t1584;
-    const real t1600 = t1598 - t1599;
-    const real t1601 = t356 * t1582;
-    const real t1602 = t1600 - t1601;
-    const real t1603 = t1602 * t424;
-    const real t1604 = t56 * d_H[18];
-    const real t1605 = H[18] * t424;
-    const real t1606 = t1604 + t1605;
-    const real t1607 = d_H[19] - t1606;
-    const real t1608 = t59 * t1607;
-    const real t1609 = t1549 * t453;
-    const real t1610 = t1608 - t1609;
-    const real t1611 = t1594 * t508;
-    const real t1612 = t99 * d_H[18];
-    const real t1613 = H[18] * t513;
-    const real t1614 = t1612 + t1613;
-    const real t1615 = d_H[20] - t1614;
-    const real t1616 = t1549 * t508;
-    const real t1617 = t87 * t1607;
-    const real t1618 = t1616 + t1617;
-    const real t1619 = t1615 - t1618;
-    const real t1620 = t104 * t1619;
-    const real t1621 = t1554 * t548;
-    const real t1622 = t1620 - t1621;
-    const real t1623 = t1588 * t634;
-    const real t1624 = t161 * d_H[18];
-    const real t1625 = H[18] * t639;
-    const real t1626 = t1624 + t1625;
-    const real t1627 = d_H[21] - t1626;
-    const real t1628 = t1549 * t645;
-    const real t1629 = t164 * t1607;
-    const real t1630 = t1628 + t1629;
-    const real t1631 = t1627 - t1630;
-    const real t1632 = t1554 * t634;
-    const real t1633 = t149 * t1619;
-    const real t1634 = t1632 + t1633;
-    const real t1635 = t1631 - t1634;
-    const real t1636 = t169 * t1635;
-    const real t1637 = t1561 * t685;
-    const real t1638 = t1636 - t1637;
-    const real t1639 = t1584 * t806;
-    const real t1640 = t245 * d_H[18];
-    const real t1641 = H[18] * t811;
-    const real t1642 = t1640 + t1641;
-    const real t1643 = d_H[22] - t1642;
-    const real t1644 = t1549 * t817;
-    const real t1645 = t248 * t1607;
-    const real t1646 = t1644 + t1645;
-    const real t1647 = t1643 - t1646;
-    const real t1648 = t1554 * t824;
-    const real t1649 = t251 * t1619;
-    const real t1650 = t1648 + t1649;
-    const real t1651 = t1647 - t1650;
-    const real t1652 = t1561 * t806;
-    const real t1653 = t233 * t1635;
-    const real t1654 = t1652 + t1653;
-    const real t1655 = t1651 - t1654;
-    const real t1656 = t256 * t1655;
-    const real t1657 = t1570 * t868;
-    const real t1658 = t1656 - t1657;
-    const real t1659 = t1582 * t1028;
-    const real t1660 = t353 * d_H[18];
-    const real t1661 = H[18] * t1033;
-    const real t1662 = t1660 + t1661;
-    const real t1663 = d_H[23] - t1662;
-    const real t1664 = t1549 * t1039;
-    const real t1665 = t356 * t1607;
-    const real t1666 = t1664 + t1665;
-    const real t1667 = t1663 - t1666;
-    const real t1668 = t1554 * t1046;
-    const real t1669 = t359 * t1619;
-    const real t1670 = t1668 + t1669;
-    const real t1671 = t1667 - t1670;
-    const real t1672 = t1561 * t1053;
-    const real t1673 = t362 * t1635;
-    const real t1674 = t1672 + t1673;
-    const real t1675 = t1671 - t1674;
-    const real t1676 = t1570 * t1028;
-    const real t1677 = t341 * t1655;
-    const real t1678 = t1676 + t1677;
-    const real t1679 = t1675 - t1678;
-    const real t1680 = t367 * t1679;
-    const real t1681 = t1581 * t1101;
-    const real t1682 = t1680 - t1681;
-    const real t1683 = t341 * t1682;
-    const real t1684 = t1659 + t1683;
-    const real t1685 = t1658 - t1684;
-    const real t1686 = t233 * t1685;
-    const real t1687 = t1639 + t1686;
-    const real t1688 = t1638 - t1687;
-    const real t1689 = t1582 * t1053;
-    const real t1690 = t362 * t1682;
-    const real t1691 = t1689 + t1690;
-    const real t1692 = t1688 - t1691;
-    const real t1693 = t149 * t1692;
-    const real t1694 = t1623 + t1693;
-    const real t1695 = t1622 - t1694;
-    const real t1696 = t1584 * t824;
-    const real t1697 = t251 * t1685;
-    const real t1698 = t1696 + t1697;
-    const real t1699 = t1695 - t1698;
-    const real t1700 = t1582 * t1046;
-    const real t1701 = t359 * t1682;
-    const real t1702 = t1700 + t1701;
-    const real t1703 = t1699 - t1702;
-    const real t1704 = t87 * t1703;
-    const real t1705 = t1611 + t1704;
-    const real t1706 = t1610 - t1705;
-    const real t1707 = t1588 * t645;
-    const real t1708 = t164 * t1692;
-    const real t1709 = t1707 + t1708;
-    const real t1710 = t1706 - t1709;
-    const real t1711 = t1584 * t817;
-    const real t1712 = t248 * t1685;
-    const real t1713 = t1711 + t1712;
-    const real t1714 = t1710 - t1713;
-    const real t1715 = t1582 * t1039;
-    const real t1716 = t356 * t1682;
-    const real t1717 = t1715 + t1716;
-    const real t1718 = t1714 - t1717;
-    const real t1719 = t56 * t1718;
-    const real t1720 = t1603 + t1719;
-    const real t1721 = t1547 - t1720;
-    const real t1722 = t1594 * t513;
-    const real t1723 = t99 * t1703;
-    const real t1724 = t1722 + t1723;
-    const real t1725 = t1721 - t1724;
-    const real t1726 = t1588 * t639;
-    const real t1727 = t161 * t1692;
-    const real t1728 = t1726 + t1727;
-    const real t1729 = t1725 - t1728;
-    const real t1730 = t1584 * t811;
-    const real t1731 = t245 * t1685;
-    const real t1732 = t1730 + t1731;
-    const real t1733 = t1729 - t1732;
-    const real t1734 = t1582 * t1033;
-    const real t1735 = t353 * t1682;
-    const real t1736 = t1734 + t1735;
-    const real t1737 = t1733 - t1736;
-    d_W[3] = t1737;
-    const real t1738 = t11 * d_H[24];
-    const real t1739 = H[24] * t31;
-    const real t1740 = t1738 - t1739;
-    const real t1741 = H[24] * t56;
-    const real t1742 = H[25] - t1741;
-    const real t1743 = t59 * t1742;
-    const real t1744 = H[24] * t99;
-    const real t1745 = H[26] - t1744;
-    const real t1746 = t87 * t1742;
-    const real t1747 = t1745 - t1746;
-    const real t1748 = t104 * t1747;
-    const real t1749 = H[24] * t161;
-    const real t1750 = H[27] - t1749;
-    const real t1751 = t164 * t1742;
-    const real t1752 = t1750 - t1751;
-    const real t1753 = t149 * t1747;
-    const real t1754 = t1752 - t1753;
-    const real t1755 = t169 * t1754;
-    const real t1756 = H[24] * t245;
-    const real t1757 = H[28] - t1756;
-    const real t1758 = t248 * t1742;
-    const real t1759 = t1757 - t1758;
-    const real t1760 = t251 * t1747;
-    const real t1761 = t1759 - t1760;
-    const real t1762 = t233 * t1754;
-    const real t1763 = t1761 - t1762;
-    const real t1764 = t256 * t1763;
-    const real t1765 = H[24] * t353;
-    const real t1766 = H[29] - t1765;
-    const real t1767 = t356 * t1742;
-    const real t1768 = t1766 - t1767;
-    const real t1769 = t359 * t1747;
-    const real t1770 = t1768 - t1769;
-    const real t1771 = t362 * t1754;
-    const real t1772 = t1770 - t1771;
-    const real t1773 = t341 * t1763;
-    const real t1774 = t1772 - t1773;
-    const real t1775 = t367 * t1774;
-    const real t1776 = t341 * t1775;
-    const real t1777 = t1764 - t1776;
-    const real t1778 = t233 * t1777;
-    const real t1779 = t1755 - t1778;
-    const real t1780 = t362 * t1775;
-    const real t1781 = t1779 - t1780;
-    const real t1782 = t149 * t1781;
-    const real t1783 = t1748 - t1782;
-    const real t1784 = t251 * t1777;
-    const real t1785 = t1783 - t1784;
-    const real t1786 = t359 * t1775;
-    const real t1787 = t1785 - t1786;
-    const real t1788 = t87 * t1787;
-    const real t1789 = t1743 - t1788;
-    const real t1790 = t164 * t1781;
-    const real t1791 = t1789 - t1790;
-    const real t1792 = t248 * t1777;
-    const real t1793 = t1791 - t1792;
-    const real t1794 = t356 * t1775;
-    const real t1795 = t1793 - t1794;
-    const real t1796 = t1795 * t424;
-    const real t1797 = t56 * d_H[24];
-    const real t1798 = H[24] * t424;
-    const real t1799 = t1797 + t1798;
-    const real t1800 = d_H[25] - t1799;
-    const real t1801 = t59 * t1800;
-    const real t1802 = t1742 * t453;
-    const real t1803 = t1801 - t1802;
-    const real t1804 = t1787 * t508;
-    const real t1805 = t99 * d_H[24];
-    const real t1806 = H[24] * t513;
-    const real t1807 = t1805 + t1806;
-    const real t1808 = d_H[26] - t1807;
-    const real t1809 = t1742 * t508;
-    const real t1810 = t87 * t1800;
-    const real t1811 = t1809 + t1810;
-    const real t1812 = t1808 - t1811;
-    const real t1813 = t104 * t1812;
-    const real t1814 = t1747 * t548;
-    const real t1815 = t1813 - t1814;
-    const real t1816 = t1781 * t634;
-    const real t1817 = t161 * d_H[24];
-    const real t1818 = H[24] * t639;
-    const real t1819 = t1817 + t1818;
-    const real t1820 = d_H[27] - t1819;
-    const real t1821 = t1742 * t645;
-    const real t1822 = t164 * t1800;
-    const real t1823 = t1821 + t1822;
-    const real t1824 = t1820 - t1823;
-    const real t1825 = t1747 * t634;
-    const real t1826 = t149 * t1812;
-    const real t1827 = t1825 + t1826;
-    const real t1828 = t1824 - t1827;
-    const real t1829 = t169 * t1828;
-    const real t1830 = t1754 * t685;
-    const real t1831 = t1829 - t1830;
-    const real t1832 = t1777 * t806;
-    const real t1833 = t245 * d_H[24];
-    const real t1834 = H[24] * t811;
-    const real t1835 = t1833 + t1834;
-    const real t1836 = d_H[28] - t1835;
-    const real t1837 = t1742 * t817;
-    const real t1838 = t248 * t1800;
-    const real t1839 = t1837 + t1838;
-    const real t1840 = t1836 - t1839;
-    const real t1841 = t1747 * t824;
-    const real t1842 = t251 * t1812;
-    const real t1843 = t1841 + t1842;
-    const real t1844 = t1840 - t1843;
-    const real t1845 = t1754 * t806;
-    const real t1846 = t233 * t1828;
-    const real t1847 = t1845 + t1846;
-    const real t1848 = t1844 - t1847;
-    const real t1849 = t256 * t1848;
-    const real t1850 = t1763 * t868;
-    const real t1851 = t1849 - t1850;
-    const real t1852 = t1775 * t1028;
-    const real t1853 = t353 * d_H[24];
-    const real t1854 = H[24] * t1033;
-    const real t1855 = t1853 + t1854;
-    const real t1856 = d_H[29] - t1855;
-    const real t1857 = t1742 * t1039;
-    const real t1858 = t356 * t1800;
-    const real t1859 = t1857 + t1858;
-    const real t1860 = t1856 - t1859;
-    const real t1861 = t1747 * t1046;
-    const real t1862 = t359 * t1812;
-    const real t1863 = t1861 + t1862;
-    const real t1864 = t1860 - t1863;
-    const real t1865 = t1754 * t1053;
-    const real t1866 = t362 * t1828;
-    const real t1867 = t1865 + t1866;
-    const real t1868 = t1864 - t1867;
-    const real t1869 = t1763 * t1028;
-    const real t1870 = t341 * t1848;
-    const real t1871 = t1869 + t1870;
-    const real t1872 = t1868 - t1871;
-    const real t1873 = t367 * t1872;
-    const real t1874 = t1774 * t1101;
-    const real t1875 = t1873 - t1874;
-    const real t1876 = t341 * t1875;
-    const real t1877 = t1852 + t1876;
-    const real t1878 = t1851 - t1877;
-    const real t1879 = t233 * t1878;
-    const real t1880 = t1832 + t1879;
-    const real t1881 = t1831 - t1880;
-    const real t1882 = t1775 * t1053;
-    const real t1883 = t362 * t1875;
-    const real t1884 = t1882 + t1883;
-    const real t1885 = t1881 - t1884;
-    const real t1886 = t149 * t1885;
-    const real t1887 = t1816 + t1886;
-    const real t1888 = t1815 - t1887;
-    const real t1889 = t1777 * t824;
-    const real t1890 = t251 * t1878;
-    const real t1891 = t1889 + t1890;
-    const real t1892 = t1888 - t1891;
-    const real t1893 = t1775 * t1046;
-    const real t1894 = t359 * t1875;
-    const real t1895 = t1893 + t1894;
-    const real t1896 = t1892 - t1895;
-    const real t1897 = t87 * t1896;
-    const real t1898 = t1804 + t1897;
-    const real t1899 = t1803 - t1898;
-    const real t1900 = t1781 * t645;
-    const real t1901 = t164 * t1885;
-    const real t1902 = t1900 + t1901;
-    const real t1903 = t1899 - t1902;
-    const real t1904 = t1777 * t817;
-    const real t1905 = t248 * t1878;
-    const real t1906 = t1904 + t1905;
-    const real t1907 = t1903 - t1906;
-    const real t1908 = t1775 * t1039;
-    const real t1909 = t356 * t1875;
-    const real t1910 = t1908 + t1909;
-    const real t1911 = t1907 - t1910;
-    const real t1912 = t56 * t1911;
-    const real t1913 = t1796 + t1912;
-    const real t1914 = t1740 - t1913;
-    const real t1915 = t1787 * t513;
-    const real t1916 = t99 * t1896;
-    const real t1917 = t1915 + t1916;
-    const real t1918 = t1914 - t1917;
-    const real t1919 = t1781 * t639;
-    const real t1920 = t161 * t1885;
-    const real t1921 = t1919 + t1920;
-    const real t1922 = t1918 - t1921;
-    const real t1923 = t1777 * t811;
-    const real t1924 = t245 * t1878;
-    const real t1925 = t1923 + t1924;
-    const real t1926 = t1922 - t1925;
-    const real t1927 = t1775 * t1033;
-    const real t1928 = t353 * t1875;
-    const real t1929 = t1927 + t1928;
-    const real t1930 = t1926 - t1929;
-    d_W[4] = t1930;
-    const real t1931 = t11 * d_H[30];
-    const real t1932 = H[30] * t31;
-    const real t1933 = t1931 - t1932;
-    const real t1934 = H[30] * t56;
-    const real t1935 = H[31] - t1934;
-    const real t1936 = t59 * t1935;
-    const real t1937 = H[30] * t99;
-    const real t1938 = H[32] - t1937;
-    const real t1939 = t87 * t1935;
-    const real t1940 = t1938 - t1939;
-    const real t1941 = t104 * t1940;
-    const real t1942 = H[30] * t161;
-    const real t1943 = H[33] - t1942;
-    const real t1944 = t164 * t1935;
-    const real t1945 = t1943 - t1944;
-    const real t1946 = t149 * t1940;
-    const real t1947 = t1945 - t1946;
-    const real t1948 = t169 * t1947;
-    const real t1949 = H[30] * t245;
-    const real t1950 = H[34] - t1949;
-    const real t1951 = t248 * t1935;
-    const real t1952 = t1950 - t1951;
-    const real t1953 = t251 * t1940;
-    const real t1954 = t1952 - t1953;
-    const real t1955 = t233 * t1947;
-    const real t1956 = t1954 - t1955;
-    const real t1957 = t256 * t1956;
-    const real t1958 = H[30] * t353;
-    const real t1959 = H[35] - t1958;
-    const real t1960 = t356 * t1935;
-    const real t1961 = t1959 - t1960;
-    const real t1962 = t359 * t1940;
-    const real t1963 = t1961 - t1962;
-    const real t1964 = t362 * t1947;
-    const real t1965 = t1963 - t1964;
-    const real t1966 = t341 * t1956;
-    const real t1967 = t1965 - t1966;
-    const real t1968 = t367 * t1967;
-    const real t1969 = t341 * t1968;
-    const real t1970 = t1957 - t1969;
-    const real t1971 = t233 * t1970;
-    const real t1972 = t1948 - t1971;
-    const real t1973 = t362 * t1968;
-    const real t1974 = t1972 - t1973;
-    const real t1975 = t149 * t1974;
-    const real t1976 = t1941 - t1975;
-    const real t1977 = t251 * t1970;
-    const real t1978 = t1976 - t1977;
-    const real t1979 = t359 * t1968;
-    const real t1980 = t1978 - t1979;
-    const real t1981 = t87 * t1980;
-    const real t1982 = t1936 - t1981;
-    const real t1983 = t164 * t1974;
-    const real t1984 = t1982 - t1983;
-    const real t1985 = t248 * t1970;
-    const real t1986 = t1984 - t1985;
-    const real t1987 = t356 * t1968;
-    const real t1988 = t1986 - t1987;
-    const real t1989 = t1988 * t424;
-    const real t1990 = t56 * d_H[30];
-    const real t1991 = H[30] * t424;
-    const real t1992 = t1990 + t1991;
-    const real t1993 = d_H[31] - t1992;
-    const real t1994 = t59 * t1993;
-    const real t1995 = t1935 * t453;
-    const real t1996 = t1994 - t1995;
-    const real t1997 = t1980 * t508;
-    const real t1998 = t99 * d_H[30];
-    const real t1999 = H[30] * t513;
-    const real t2000 = t1998 + t1999;
-    const real t2001 = d_H[32] - t2000;
-    const real t2002 = t1935 * t508;
-    const real t2003 = t87 * t1993;
-    const real t2004 = t2002 + t2003;
-    const real t2005 = t2001 - t2004;
-    const real t2006 = t104 * t2005;
-    const real t2007 = t1940 * t548;
-    const real t2008 = t2006 - t2007;
-    const real t2009 = t1974 * t634;
-    const real t2010 = t161 * d_H[30];
-    const real t2011 = H[30] * t639;
-    const real t2012 = t2010 + t2011;
-    const real t2013 = d_H[33] - t2012;
-    const real t2014 = t1935 * t645;
-    const real t2015 = t164 * t1993;
-    const real t2016 = t2014 + t2015;
-    const real t2017 = t2013 - t2016;
-    const real t2018 = t1940 * t634;
-    const real t2019 = t149 * t2005;
-    const real t2020 = t2018 + t2019;
-    const real t2021 = t2017 - t2020;
-    const real t2022 = t169 * t2021;
-    const real t2023 = t1947 * t685;
-    const real t2024 = t2022 - t2023;
-    const real t2025 = t1970 * t806;
-    const real t2026 = t245 * d_H[30];
-    const real t2027 = H[30] * t811;
-    const real t2028 = t2026 + t2027;
-    const real t2029 = d_H[34] - t2028;
-    const real t2030 = t1935 * t817;
-    const real t2031 = t248 * t1993;
-    const real t2032 = t2030 + t2031;
-    const real t2033 = t2029 - t2032;
-    const real t2034 = t1940 * t824;
-    const real t2035 = t251 * t2005;
-    const real t2036 = t2034 + t2035;
-    const real t2037 = t2033 - t2036;
-    const real t2038 = t1947 * t806;
-    const real t2039 = t233 * t2021;
-    const real t2040 = t2038 + t2039;
-    const real t2041 = t2037 - t2040;
-    const real t2042 = t256 * t2041;
-    const real t2043 = t1956 * t868;
-    const real t2044 = t2042 - t2043;
-    const real t2045 = t1968 * t1028;
-    const real t2046 = t353 * d_H[30];
-    const real t2047 = H[30] * t1033;
-    const real t2048 = t2046 + t2047;
-    const real t2049 = d_H[35] - t2048;
-    const real t2050 = t1935 * t1039;
-    const real t2051 = t356 * t1993;
-    const real t2052 = t2050 + t2051;
-    const real t2053 = t2049 - t2052;
-    const real t2054 = t1940 * t1046;
-    const real t2055 = t359 * t2005;
-    const real t2056 = t2054 + t2055;
-    const real t2057 = t2053 - t2056;
-    const real t2058 = t1947 * t1053;
-    const real t2059 = t362 * t2021;
-    const real t2060 = t2058 + t2059;
-    const real t2061 = t2057 - t2060;
-    const real t2062 = t1956 * t1028;
-    const real t2063 = t341 * t2041;
-    const real t2064 = t2062 + t2063;
-    const real t2065 = t2061 - t2064;
-    const real t2066 = t367 * t2065;
-    const real t2067 = t1967 * t1101;
-    const real t2068 = t2066 - t2067;
-    const real t2069 = t341 * t2068;
-    const real t2070 = t2045 + t2069;
-    const real t2071 = t2044 - t2070;
-    const real t2072 = t233 * t2071;
-    const real t2073 = t2025 + t2072;
-    const real t2074 = t2024 - t2073;
-    const real t2075 = t1968 * t1053;
-    const real t2076 = t362 * t2068;
-    const real t2077 = t2075 + t2076;
-    const real t2078 = t2074 - t2077;
-    const real t2079 = t149 * t2078;
-    const real t2080 = t2009 + t2079;
-    const real t2081 = t2008 - t2080;
-    const real t2082 = t1970 * t824;
-    const real t2083 = t251 * t2071;
-    const real t2084 = t2082 + t2083;
-    const real t2085 = t2081 - t2084;
-    const real t2086 = t1968 * t1046;
-    const real t2087 = t359 * t2068;
-    const real t2088 = t2086 + t2087;
-    const real t2089 = t2085 - t2088;
-    const real t2090 = t87 * t2089;
-    const real t2091 = t1997 + t2090;
-    const real t2092 = t1996 - t2091;
-    const real t2093 = t1974 * t645;
-    const real t2094 = t164 * t2078;
-    const real t2095 = t2093 + t2094;
-    const real t2096 = t2092 - t2095;
-    const real t2097 = t1970 * t817;
-    const real t2098 = t248 * t2071;
-    const real t2099 = t2097 + t2098;
-    const real t2100 = t2096 - t2099;
-    const real t2101 = t1968 * t1039;
-    const real t2102 = t356 * t2068;
-    const real t2103 = t2101 + t2102;
-    const real t2104 = t2100 - t2103;
-    const real t2105 = t56 * t2104;
-    const real t2106 = t1989 + t2105;
-    const real t2107 = t1933 - t2106;
-    const real t2108 = t1980 * t513;
-    const real t2109 = t99 * t2089;
-    const real t2110 = t2108 + t2109;
-    const real t2111 = t2107 - t2110;
-    const real t2112 = t1974 * t639;
-    const real t2113 = t161 * t2078;
-    const real t2114 = t2112 + t2113;
-    const real t2115 = t2111 - t2114;
-    const real t2116 = t1970 * t811;
-    const real t2117 = t245 * t2071;
-    const real t2118 = t2116 + t2117;
-    const real t2119 = t2115 - t2118;
-    const real t2120 = t1968 * t1033;
-    const real t2121 = t353 * t2068;
-    const real t2122 = t2120 + t2121;
-    const real t2123 = t2119 - t2122;
-    d_W[5] = t2123;
-    d_W[6] = t1139;
-    d_W[7] = t1332;
-    d_W[8] = t1525;
-    d_W[9] = t1718;
-    d_W[10] = t1911;
-    d_W[11] = t2104;
-    d_W[12] = t1124;
-    d_W[13] = t1317;
-    d_W[14] = t1510;
-    d_W[15] = t1703;
-    d_W[16] = t1896;
-    d_W[17] = t2089;
-    d_W[18] = t1113;
-    d_W[19] = t1306;
-    d_W[20] = t1499;
-    d_W[21] = t1692;
-    d_W[22] = t1885;
-    d_W[23] = t2078;
-    d_W[24] = t1106;
-    d_W[25] = t1299;
-    d_W[26] = t1492;
-    d_W[27] = t1685;
-    d_W[28] = t1878;
-    d_W[29] = t2071;
-    d_W[30] = t1103;
-    d_W[31] = t1296;
-    d_W[32] = t1489;
-    d_W[33] = t1682;
-    d_W[34] = t1875;
-    d_W[35] = t2068;
-    return 0;
+  real t10 = H[30] * H[30] + (H[24] * H[24] + (H[18] * H[18] + (H[12] * H[12] + (H[0] * H[0] + H[6]
+    * H[6]))));
+  real t11 = 1.0 / t10;
+  real t13 = H[6] * d_H[6];
+  real t15 = H[0] * d_H[0];
+  real t18 = H[12] * d_H[12];
+  real t21 = H[18] * d_H[18];
+  real t24 = H[24] * d_H[24];
+  real t27 = H[30] * d_H[30];
+  real t31 = t11 * (t13 + t13 + (t15 + t15) + (t18 + t18) + (t21 + t21) + (t24 + t24) + (t27 + t27))
+    / t10;
+  real t55 = H[30] * H[31] + (H[24] * H[25] + (H[18] * H[19] + (H[12] * H[13] + (H[6] * H[7] + H[0]
+    * H[1]))));
+  real t56 = t55 * t11;
+  real t58 = H[1] * H[1] + H[7] * H[7] + H[13] * H[13] + H[19] * H[19] + H[25] * H[25] + H[31] *
+    H[31] - t55 * t56;
+  real t59 = 1.0 / t58;
+  real t61 = H[1] - H[0] * t56;
+  real t84 = H[30] * H[32] + (H[24] * H[26] + (H[18] * H[20] + (H[12] * H[14] + (H[6] * H[8] + H[0]
+    * H[2]))));
+  real t86 = H[1] * H[2] + H[7] * H[8] + H[13] * H[14] + H[19] * H[20] + H[25] * H[26] + H[31] *
+    H[32] - t56 * t84;
+  real t87 = t86 * t59;
+  real t99 = t11 * t84;
+  real t103 = H[2] * H[2] + H[8] * H[8] + H[14] * H[14] + H[20] * H[20] + H[26] * H[26] + H[32] *
+    H[32] - t84 * t99 - t86 * t87;
+  real t104 = 1.0 / t103;
+  real t108 = H[2] - H[0] * t99 - t87 * t61;
+  real t131 = H[30] * H[33] + (H[24] * H[27] + (H[18] * H[21] + (H[12] * H[15] + (H[6] * H[9] + H[0]
+    * H[3]))));
+  real t146 = H[1] * H[3] + H[7] * H[9] + H[13] * H[15] + H[19] * H[21] + H[25] * H[27] + H[31] *
+    H[33] - t56 * t131;
+  real t148 = H[2] * H[3] + H[8] * H[9] + H[14] * H[15] + H[20] * H[21] + H[26] * H[27] + H[32] *
+    H[33] - t99 * t131 - t87 * t146;
+  real t149 = t148 * t104;
+  real t161 = t11 * t131;
+  real t164 = t59 * t146;
+  real t168 = H[3] * H[3] + H[9] * H[9] + H[15] * H[15] + H[21] * H[21] + H[27] * H[27] + H[33] *
+    H[33] - t131 * t161 - t146 * t164 - t148 * t149;
+  real t169 = 1.0 / t168;
+  real t175 = H[3] - H[0] * t161 - t164 * t61 - t149 * t108;
+  real t198 = H[30] * H[34] + (H[24] * H[28] + (H[18] * H[22] + (H[12] * H[16] + (H[6] * H[10] +
+    H[0] * H[4]))));
+  real t213 = H[1] * H[4] + H[7] * H[10] + H[13] * H[16] + H[19] * H[22] + H[25] * H[28] + H[31] *
+    H[34] - t56 * t198;
+  real t230 = H[2] * H[4] + H[8] * H[10] + H[14] * H[16] + H[20] * H[22] + H[26] * H[28] + H[32] *
+    H[34] - t99 * t198 - t87 * t213;
+  real t232 = H[3] * H[4] + H[9] * H[10] + H[15] * H[16] + H[21] * H[22] + H[27] * H[28] + H[33] *
+    H[34] - t161 * t198 - t164 * t213 - t149 * t230;
+  real t233 = t232 * t169;
+  real t245 = t11 * t198;
+  real t248 = t59 * t213;
+  real t251 = t104 * t230;
+  real t255 = H[4] * H[4] + H[10] * H[10] + H[16] * H[16] + H[22] * H[22] + H[28] * H[28] + H[34] *
+    H[34] - t198 * t245 - t213 * t248 - t230 * t251 - t232 * t233;
+  real t256 = 1.0 / t255;
+  real t264 = H[4] - H[0] * t245 - t248 * t61 - t251 * t108 - t233 * t175;
+  real t287 = H[30] * H[35] + (H[24] * H[29] + (H[18] * H[23] + (H[12] * H[17] + (H[6] * H[11] +
+    H[0] * H[5]))));
+  real t302 = H[1] * H[5] + H[7] * H[11] + H[13] * H[17] + H[19] * H[23] + H[25] * H[29] + H[31] *
+    H[35] - t56 * t287;
+  real t319 = H[2] * H[5] + H[8] * H[11] + H[14] * H[17] + H[20] * H[23] + H[26] * H[29] + H[32] *
+    H[35] - t99 * t287 - t87 * t302;
+  real t338 = H[3] * H[5] + H[9] * H[11] + H[15] * H[17] + H[21] * H[23] + H[27] * H[29] + H[33] *
+    H[35] - t161 * t287 - t164 * t302 - t149 * t319;
+  real t340 = H[4] * H[5] + H[10] * H[11] + H[16] * H[17] + H[22] * H[23] + H[28] * H[29] + H[34] *
+    H[35] - t245 * t287 - t248 * t302 - t251 * t319 - t233 * t338;
+  real t341 = t340 * t256;
+  real t353 = t11 * t287;
+  real t356 = t59 * t302;
+  real t359 = t104 * t319;
+  real t362 = t169 * t338;
+  real t366 = H[5] * H[5] + H[11] * H[11] + H[17] * H[17] + H[23] * H[23] + H[29] * H[29] + H[35] *
+    H[35] - t287 * t353 - t302 * t356 - t319 * t359 - t338 * t362 - t340 * t341;
+  real t367 = 1.0 / t366;
+  real t377 = H[5] - H[0] * t353 - t356 * t61 - t359 * t108 - t362 * t175 - t341 * t264;
+  real t378 = t367 * t377;
+  real t380 = t256 * t264 - t341 * t378;
+  real t384 = t169 * t175 - t233 * t380 - t362 * t378;
+  real t390 = t104 * t108 - t149 * t384 - t251 * t380 - t359 * t378;
+  real t421 = H[1] * d_H[0] + H[0] * d_H[1] + (H[7] * d_H[6] + H[6] * d_H[7]) + (H[13] * d_H[12] +
+    H[12] * d_H[13]) + (H[19] * d_H[18] + H[18] * d_H[19]) + (H[25] * d_H[24] + H[24] * d_H[25]) +
+    (H[31] * d_H[30] + H[30] * d_H[31]);
+  real t424 = t11 * t421 - t55 * t31;
+  real t429 = d_H[1] - (t56 * d_H[0] + H[0] * t424);
+  real t431 = H[31] * d_H[31];
+  real t433 = H[25] * d_H[25];
+  real t435 = H[19] * d_H[19];
+  real t437 = H[13] * d_H[13];
+  real t439 = H[7] * d_H[7];
+  real t441 = H[1] * d_H[1];
+  real t453 = t59 * (t431 + t431 + (t433 + t433 + (t435 + t435 + (t437 + t437 + (t439 + t439 + (t441
+    + t441))))) - (t56 * t421 + t55 * t424)) / t58;
+  real t502 = H[2] * d_H[0] + H[0] * d_H[2] + (H[8] * d_H[6] + H[6] * d_H[8]) + (H[14] * d_H[12] +
+    H[12] * d_H[14]) + (H[20] * d_H[18] + H[18] * d_H[20]) + (H[26] * d_H[24] + H[24] * d_H[26]) +
+    (H[32] * d_H[30] + H[30] * d_H[32]);
+  real t505 = H[32] * d_H[31] + H[31] * d_H[32] + (H[26] * d_H[25] + H[25] * d_H[26] + (H[20] *
+    d_H[19] + H[19] * d_H[20] + (H[14] * d_H[13] + H[13] * d_H[14] + (H[8] * d_H[7] + H[7] * d_H[8]
+    + (H[2] * d_H[1] + H[1] * d_H[2]))))) - (t84 * t424 + t56 * t502);
+  real t508 = t59 * t505 - t86 * t453;
+  real t513 = t11 * t502 - t84 * t31;
+  real t520 = d_H[2] - (t99 * d_H[0] + H[0] * t513) - (t61 * t508 + t87 * t429);
+  real t522 = H[32] * d_H[32];
+  real t524 = H[26] * d_H[26];
+  real t526 = H[20] * d_H[20];
+  real t528 = H[14] * d_H[14];
+  real t530 = H[8] * d_H[8];
+  real t532 = H[2] * d_H[2];
+  real t548 = t104 * (t522 + t522 + (t524 + t524 + (t526 + t526 + (t528 + t528 + (t530 + t530 +
+    (t532 + t532))))) - (t99 * t502 + t84 * t513) - (t87 * t505 + t86 * t508)) / t103;
+  real t597 = H[3] * d_H[0] + H[0] * d_H[3] + (H[9] * d_H[6] + H[6] * d_H[9]) + (H[15] * d_H[12] +
+    H[12] * d_H[15]) + (H[21] * d_H[18] + H[18] * d_H[21]) + (H[27] * d_H[24] + H[24] * d_H[27]) +
+    (H[33] * d_H[30] + H[30] * d_H[33]);
+  real t628 = H[33] * d_H[31] + H[31] * d_H[33] + (H[27] * d_H[25] + H[25] * d_H[27] + (H[21] *
+    d_H[19] + H[19] * d_H[21] + (H[15] * d_H[13] + H[13] * d_H[15] + (H[9] * d_H[7] + H[7] * d_H[9]
+    + (H[3] * d_H[1] + H[1] * d_H[3]))))) - (t131 * t424 + t56 * t597);
+  real t631 = H[33] * d_H[32] + H[32] * d_H[33] + (H[27] * d_H[26] + H[26] * d_H[27] + (H[21] *
+    d_H[20] + H[20] * d_H[21] + (H[15] * d_H[14] + H[14] * d_H[15] + (H[9] * d_H[8] + H[8] * d_H[9]
+    + (H[3] * d_H[2] + H[2] * d_H[3]))))) - (t131 * t513 + t99 * t597) - (t146 * t508 + t87 * t628);
+  real t634 = t104 * t631 - t148 * t548;
+  real t639 = t11 * t597 - t131 * t31;
+  real t645 = t59 * t628 - t146 * t453;
+  real t653 = d_H[3] - (t161 * d_H[0] + H[0] * t639) - (t61 * t645 + t164 * t429) - (t108 * t634 +
+    t149 * t520);
+  real t655 = H[33] * d_H[33];
+  real t657 = H[27] * d_H[27];
+  real t659 = H[21] * d_H[21];
+  real t661 = H[15] * d_H[15];
+  real t663 = H[9] * d_H[9];
+  real t665 = H[3] * d_H[3];
+  real t685 = t169 * (t655 + t655 + (t657 + t657 + (t659 + t659 + (t661 + t661 + (t663 + t663 +
+    (t665 + t665))))) - (t161 * t597 + t131 * t639) - (t164 * t628 + t146 * t645) - (t149 * t631 +
+    t148 * t634)) / t168;
+  real t734 = H[4] * d_H[0] + H[0] * d_H[4] + (H[10] * d_H[6] + H[6] * d_H[10]) + (H[16] * d_H[12] +
+    H[12] * d_H[16]) + (H[22] * d_H[18] + H[18] * d_H[22]) + (H[28] * d_H[24] + H[24] * d_H[28]) +
+    (H[34] * d_H[30] + H[30] * d_H[34]);
+  real t765 = H[34] * d_H[31] + H[31] * d_H[34] + (H[28] * d_H[25] + H[25] * d_H[28] + (H[22] *
+    d_H[19] + H[19] * d_H[22] + (H[16] * d_H[13] + H[13] * d_H[16] + (H[10] * d_H[7] + H[7] *
+    d_H[10] + (H[4] * d_H[1] + H[1] * d_H[4]))))) - (t198 * t424 + t56 * t734);
+  real t800 = H[34] * d_H[32] + H[32] * d_H[34] + (H[28] * d_H[26] + H[26] * d_H[28] + (H[22] *
+    d_H[20] + H[20] * d_H[22] + (H[16] * d_H[14] + H[14] * d_H[16] + (H[10] * d_H[8] + H[8] *
+    d_H[10] + (H[4] * d_H[2] + H[2] * d_H[4]))))) - (t198 * t513 + t99 * t734) - (t213 * t508 + t87
+    * t765);
+  real t803 = H[34] * d_H[33] + H[33] * d_H[34] + (H[28] * d_H[27] + H[27] * d_H[28] + (H[22] *
+    d_H[21] + H[21] * d_H[22] + (H[16] * d_H[15] + H[15] * d_H[16] + (H[10] * d_H[9] + H[9] *
+    d_H[10] + (H[4] * d_H[3] + H[3] * d_H[4]))))) - (t198 * t639 + t161 * t734) - (t213 * t645 +
+    t164 * t765) - (t230 * t634 + t149 * t800);
+  real t806 = t169 * t803 - t232 * t685;
+  real t811 = t11 * t734 - t198 * t31;
+  real t817 = t59 * t765 - t213 * t453;
+  real t824 = t104 * t800 - t230 * t548;
+  real t832 = d_H[4] - (t245 * d_H[0] + H[0] * t811) - (t61 * t817 + t248 * t429) - (t108 * t824 +
+    t251 * t520) - (t175 * t806 + t233 * t653);
+  real t834 = H[34] * d_H[34];
+  real t836 = H[28] * d_H[28];
+  real t838 = H[22] * d_H[22];
+  real t840 = H[16] * d_H[16];
+  real t842 = H[10] * d_H[10];
+  real t844 = H[4] * d_H[4];
+  real t868 = t256 * (t834 + t834 + (t836 + t836 + (t838 + t838 + (t840 + t840 + (t842 + t842 +
+    (t844 + t844))))) - (t245 * t734 + t198 * t811) - (t248 * t765 + t213 * t817) - (t251 * t800 +
+    t230 * t824) - (t233 * t803 + t232 * t806)) / t255;
+  real t917 = H[5] * d_H[0] + H[0] * d_H[5] + (H[11] * d_H[6] + H[6] * d_H[11]) + (H[17] * d_H[12] +
+    H[12] * d_H[17]) + (H[23] * d_H[18] + H[18] * d_H[23]) + (H[29] * d_H[24] + H[24] * d_H[29]) +
+    (H[35] * d_H[30] + H[30] * d_H[35]);
+  real t948 = H[35] * d_H[31] + H[31] * d_H[35] + (H[29] * d_H[25] + H[25] * d_H[29] + (H[23] *
+    d_H[19] + H[19] * d_H[23] + (H[17] * d_H[13] + H[13] * d_H[17] + (H[11] * d_H[7] + H[7] *
+    d_H[11] + (H[5] * d_H[1] + H[1] * d_H[5]))))) - (t287 * t424 + t56 * t917);
+  real t983 = H[35] * d_H[32] + H[32] * d_H[35] + (H[29] * d_H[26] + H[26] * d_H[29] + (H[23] *
+    d_H[20] + H[20] * d_H[23] + (H[17] * d_H[14] + H[14] * d_H[17] + (H[11] * d_H[8] + H[8] *
+    d_H[11] + (H[5] * d_H[2] + H[2] * d_H[5]))))) - (t287 * t513 + t99 * t917) - (t302 * t508 + t87
+    * t948);
+  real t1022 = H[35] * d_H[33] + H[33] * d_H[35] + (H[29] * d_H[27] + H[27] * d_H[29] + (H[23] *
+    d_H[21] + H[21] * d_H[23] + (H[17] * d_H[15] + H[15] * d_H[17] + (H[11] * d_H[9] + H[9] *
+    d_H[11] + (H[5] * d_H[3] + H[3] * d_H[5]))))) - (t287 * t639 + t161 * t917) - (t302 * t645 +
+    t164 * t948) - (t319 * t634 + t149 * t983);
+  real t1025 = H[35] * d_H[34] + H[34] * d_H[35] + (H[29] * d_H[28] + H[28] * d_H[29] + (H[23] *
+    d_H[22] + H[22] * d_H[23] + (H[17] * d_H[16] + H[16] * d_H[17] + (H[11] * d_H[10] + H[10] *
+    d_H[11] + (H[5] * d_H[4] + H[4] * d_H[5]))))) - (t287 * t811 + t245 * t917) - (t302 * t817 +
+    t248 * t948) - (t319 * t824 + t251 * t983) - (t338 * t806 + t233 * t1022);
+  real t1028 = t256 * t1025 - t340 * t868;
+  real t1033 = t11 * t917 - t287 * t31;
+  real t1039 = t59 * t948 - t302 * t453;
+  real t1046 = t104 * t983 - t319 * t548;
+  real t1053 = t169 * t1022 - t338 * t685;
+  real t1063 = H[35] * d_H[35];
+  real t1065 = H[29] * d_H[29];
+  real t1067 = H[23] * d_H[23];
+  real t1069 = H[17] * d_H[17];
+  real t1071 = H[11] * d_H[11];
+  real t1073 = H[5] * d_H[5];
+  real t1101 = t367 * (t1063 + t1063 + (t1065 + t1065 + (t1067 + t1067 + (t1069 + t1069 + (t1071 +
+    t1071 + (t1073 + t1073))))) - (t353 * t917 + t287 * t1033) - (t356 * t948 + t302 * t1039) -
+    (t359 * t983 + t319 * t1046) - (t362 * t1022 + t338 * t1053) - (t341 * t1025 + t340 * t1028)) /
+    t366;
+  real t1103 = t367 * (d_H[5] - (t353 * d_H[0] + H[0] * t1033) - (t61 * t1039 + t356 * t429) - (t108
+    * t1046 + t359 * t520) - (t175 * t1053 + t362 * t653) - (t264 * t1028 + t341 * t832)) - t377 *
+    t1101;
+  real t1106 = t256 * t832 - t264 * t868 - (t378 * t1028 + t341 * t1103);
+  real t1113 = t169 * t653 - t175 * t685 - (t380 * t806 + t233 * t1106) - (t378 * t1053 + t362 *
+    t1103);
+  real t1124 = t104 * t520 - t108 * t548 - (t384 * t634 + t149 * t1113) - (t380 * t824 + t251 *
+    t1106) - (t378 * t1046 + t359 * t1103);
+  real t1139 = t59 * t429 - t61 * t453 - (t390 * t508 + t87 * t1124) - (t384 * t645 + t164 * t1113)
+    - (t380 * t817 + t248 * t1106) - (t378 * t1039 + t356 * t1103);
+  d_W[0] = t11 * d_H[0] - H[0] * t31 - ((t59 * t61 - t87 * t390 - t164 * t384 - t248 * t380 - t356 *
+    t378) * t424 + t56 * t1139) - (t390 * t513 + t99 * t1124) - (t384 * t639 + t161 * t1113) - (t380
+    * t811 + t245 * t1106) - (t378 * t1033 + t353 * t1103);
+  real t1163 = H[7] - H[6] * t56;
+  real t1168 = H[8] - H[6] * t99 - t87 * t1163;
+  real t1175 = H[9] - H[6] * t161 - t164 * t1163 - t149 * t1168;
+  real t1184 = H[10] - H[6] * t245 - t248 * t1163 - t251 * t1168 - t233 * t1175;
+  real t1195 = H[11] - H[6] * t353 - t356 * t1163 - t359 * t1168 - t362 * t1175 - t341 * t1184;
+  real t1196 = t367 * t1195;
+  real t1198 = t256 * t1184 - t341 * t1196;
+  real t1202 = t169 * t1175 - t233 * t1198 - t362 * t1196;
+  real t1208 = t104 * t1168 - t149 * t1202 - t251 * t1198 - t359 * t1196;
+  real t1221 = d_H[7] - (t56 * d_H[6] + H[6] * t424);
+  real t1233 = d_H[8] - (t99 * d_H[6] + H[6] * t513) - (t1163 * t508 + t87 * t1221);
+  real t1249 = d_H[9] - (t161 * d_H[6] + H[6] * t639) - (t1163 * t645 + t164 * t1221) - (t1168 *
+    t634 + t149 * t1233);
+  real t1269 = d_H[10] - (t245 * d_H[6] + H[6] * t811) - (t1163 * t817 + t248 * t1221) - (t1168 *
+    t824 + t251 * t1233) - (t1175 * t806 + t233 * t1249);
+  real t1296 = t367 * (d_H[11] - (t353 * d_H[6] + H[6] * t1033) - (t1163 * t1039 + t356 * t1221) -
+    (t1168 * t1046 + t359 * t1233) - (t1175 * t1053 + t362 * t1249) - (t1184 * t1028 + t341 *
+    t1269)) - t1195 * t1101;
+  real t1299 = t256 * t1269 - t1184 * t868 - (t1196 * t1028 + t341 * t1296);
+  real t1306 = t169 * t1249 - t1175 * t685 - (t1198 * t806 + t233 * t1299) - (t1196 * t1053 + t362 *
+    t1296);
+  real t1317 = t104 * t1233 - t1168 * t548 - (t1202 * t634 + t149 * t1306) - (t1198 * t824 + t251 *
+    t1299) - (t1196 * t1046 + t359 * t1296);
+  real t1332 = t59 * t1221 - t1163 * t453 - (t1208 * t508 + t87 * t1317) - (t1202 * t645 + t164 *
+    t1306) - (t1198 * t817 + t248 * t1299) - (t1196 * t1039 + t356 * t1296);
+  d_W[1] = t11 * d_H[6] - H[6] * t31 - ((t59 * t1163 - t87 * t1208 - t164 * t1202 - t248 * t1198 -
+    t356 * t1196) * t424 + t56 * t1332) - (t1208 * t513 + t99 * t1317) - (t1202 * t639 + t161 *
+    t1306) - (t1198 * t811 + t245 * t1299) - (t1196 * t1033 + t353 * t1296);
+  real t1356 = H[13] - H[12] * t56;
+  real t1361 = H[14] - H[12] * t99 - t87 * t1356;
+  real t1368 = H[15] - H[12] * t161 - t164 * t1356 - t149 * t1361;
+  real t1377 = H[16] - H[12] * t245 - t248 * t1356 - t251 * t1361 - t233 * t1368;
+  real t1388 = H[17] - H[12] * t353 - t356 * t1356 - t359 * t1361 - t362 * t1368 - t341 * t1377;
+  real t1389 = t367 * t1388;
+  real t1391 = t256 * t1377 - t341 * t1389;
+  real t1395 = t169 * t1368 - t233 * t1391 - t362 * t1389;
+  real t1401 = t104 * t1361 - t149 * t1395 - t251 * t1391 - t359 * t1389;
+  real t1414 = d_H[13] - (t56 * d_H[12] + H[12] * t424);
+  real t1426 = d_H[14] - (t99 * d_H[12] + H[12] * t513) - (t1356 * t508 + t87 * t1414);
+  real t1442 = d_H[15] - (t161 * d_H[12] + H[12] * t639) - (t1356 * t645 + t164 * t1414) - (t1361 *
+    t634 + t149 * t1426);
+  real t1462 = d_H[16] - (t245 * d_H[12] + H[12] * t811) - (t1356 * t817 + t248 * t1414) - (t1361 *
+    t824 + t251 * t1426) - (t1368 * t806 + t233 * t1442);
+  real t1489 = t367 * (d_H[17] - (t353 * d_H[12] + H[12] * t1033) - (t1356 * t1039 + t356 * t1414) -
+    (t1361 * t1046 + t359 * t1426) - (t1368 * t1053 + t362 * t1442) - (t1377 * t1028 + t341 *
+    t1462)) - t1388 * t1101;
+  real t1492 = t256 * t1462 - t1377 * t868 - (t1389 * t1028 + t341 * t1489);
+  real t1499 = t169 * t1442 - t1368 * t685 - (t1391 * t806 + t233 * t1492) - (t1389 * t1053 + t362 *
+    t1489);
+  real t1510 = t104 * t1426 - t1361 * t548 - (t1395 * t634 + t149 * t1499) - (t1391 * t824 + t251 *
+    t1492) - (t1389 * t1046 + t359 * t1489);
+  real t1525 = t59 * t1414 - t1356 * t453 - (t1401 * t508 + t87 * t1510) - (t1395 * t645 + t164 *
+    t1499) - (t1391 * t817 + t248 * t1492) - (t1389 * t1039 + t356 * t1489);
+  d_W[2] = t11 * d_H[12] - H[12] * t31 - ((t59 * t1356 - t87 * t1401 - t164 * t1395 - t248 * t1391 -
+    t356 * t1389) * t424 + t56 * t1525) - (t1401 * t513 + t99 * t1510) - (t1395 * t639 + t161 *
+    t1499) - (t1391 * t811 + t245 * t1492) - (t1389 * t1033 + t353 * t1489);
+  real t1549 = H[19] - H[18] * t56;
+  real t1554 = H[20] - H[18] * t99 - t87 * t1549;
+  real t1561 = H[21] - H[18] * t161 - t164 * t1549 - t149 * t1554;
+  real t1570 = H[22] - H[18] * t245 - t248 * t1549 - t251 * t1554 - t233 * t1561;
+  real t1581 = H[23] - H[18] * t353 - t356 * t1549 - t359 * t1554 - t362 * t1561 - t341 * t1570;
+  real t1582 = t367 * t1581;
+  real t1584 = t256 * t1570 - t341 * t1582;
+  real t1588 = t169 * t1561 - t233 * t1584 - t362 * t1582;
+  real t1594 = t104 * t1554 - t149 * t1588 - t251 * t1584 - t359 * t1582;
+  real t1607 = d_H[19] - (t56 * d_H[18] + H[18] * t424);
+  real t1619 = d_H[20] - (t99 * d_H[18] + H[18] * t513) - (t1549 * t508 + t87 * t1607);
+  real t1635 = d_H[21] - (t161 * d_H[18] + H[18] * t639) - (t1549 * t645 + t164 * t1607) - (t1554 *
+    t634 + t149 * t1619);
+  real t1655 = d_H[22] - (t245 * d_H[18] + H[18] * t811) - (t1549 * t817 + t248 * t1607) - (t1554 *
+    t824 + t251 * t1619) - (t1561 * t806 + t233 * t1635);
+  real t1682 = t367 * (d_H[23] - (t353 * d_H[18] + H[18] * t1033) - (t1549 * t1039 + t356 * t1607) -
+    (t1554 * t1046 + t359 * t1619) - (t1561 * t1053 + t362 * t1635) - (t1570 * t1028 + t341 *
+    t1655)) - t1581 * t1101;
+  real t1685 = t256 * t1655 - t1570 * t868 - (t1582 * t1028 + t341 * t1682);
+  real t1692 = t169 * t1635 - t1561 * t685 - (t1584 * t806 + t233 * t1685) - (t1582 * t1053 + t362 *
+    t1682);
+  real t1703 = t104 * t1619 - t1554 * t548 - (t1588 * t634 + t149 * t1692) - (t1584 * t824 + t251 *
+    t1685) - (t1582 * t1046 + t359 * t1682);
+  real t1718 = t59 * t1607 - t1549 * t453 - (t1594 * t508 + t87 * t1703) - (t1588 * t645 + t164 *
+    t1692) - (t1584 * t817 + t248 * t1685) - (t1582 * t1039 + t356 * t1682);
+  d_W[3] = t11 * d_H[18] - H[18] * t31 - ((t59 * t1549 - t87 * t1594 - t164 * t1588 - t248 * t1584 -
+    t356 * t1582) * t424 + t56 * t1718) - (t1594 * t513 + t99 * t1703) - (t1588 * t639 + t161 *
+    t1692) - (t1584 * t811 + t245 * t1685) - (t1582 * t1033 + t353 * t1682);
+  real t1742 = H[25] - H[24] * t56;
+  real t1747 = H[26] - H[24] * t99 - t87 * t1742;
+  real t1754 = H[27] - H[24] * t161 - t164 * t1742 - t149 * t1747;
+  real t1763 = H[28] - H[24] * t245 - t248 * t1742 - t251 * t1747 - t233 * t1754;
+  real t1774 = H[29] - H[24] * t353 - t356 * t1742 - t359 * t1747 - t362 * t1754 - t341 * t1763;
+  real t1775 = t367 * t1774;
+  real t1777 = t256 * t1763 - t341 * t1775;
+  real t1781 = t169 * t1754 - t233 * t1777 - t362 * t1775;
+  real t1787 = t104 * t1747 - t149 * t1781 - t251 * t1777 - t359 * t1775;
+  real t1800 = d_H[25] - (t56 * d_H[24] + H[24] * t424);
+  real t1812 = d_H[26] - (t99 * d_H[24] + H[24] * t513) - (t1742 * t508 + t87 * t1800);
+  real t1828 = d_H[27] - (t161 * d_H[24] + H[24] * t639) - (t1742 * t645 + t164 * t1800) - (t1747 *
+    t634 + t149 * t1812);
+  real t1848 = d_H[28] - (t245 * d_H[24] + H[24] * t811) - (t1742 * t817 + t248 * t1800) - (t1747 *
+    t824 + t251 * t1812) - (t1754 * t806 + t233 * t1828);
+  real t1875 = t367 * (d_H[29] - (t353 * d_H[24] + H[24] * t1033) - (t1742 * t1039 + t356 * t1800) -
+    (t1747 * t1046 + t359 * t1812) - (t1754 * t1053 + t362 * t1828) - (t1763 * t1028 + t341 *
+    t1848)) - t1774 * t1101;
+  real t1878 = t256 * t1848 - t1763 * t868 - (t1775 * t1028 + t341 * t1875);
+  real t1885 = t169 * t1828 - t1754 * t685 - (t1777 * t806 + t233 * t1878) - (t1775 * t1053 + t362 *
+    t1875);
+  real t1896 = t104 * t1812 - t1747 * t548 - (t1781 * t634 + t149 * t1885) - (t1777 * t824 + t251 *
+    t1878) - (t1775 * t1046 + t359 * t1875);
+  real t1911 = t59 * t1800 - t1742 * t453 - (t1787 * t508 + t87 * t1896) - (t1781 * t645 + t164 *
+    t1885) - (t1777 * t817 + t248 * t1878) - (t1775 * t1039 + t356 * t1875);
+  d_W[4] = t11 * d_H[24] - H[24] * t31 - ((t59 * t1742 - t87 * t1787 - t164 * t1781 - t248 * t1777 -
+    t356 * t1775) * t424 + t56 * t1911) - (t1787 * t513 + t99 * t1896) - (t1781 * t639 + t161 *
+    t1885) - (t1777 * t811 + t245 * t1878) - (t1775 * t1033 + t353 * t1875);
+  real t1935 = H[31] - H[30] * t56;
+  real t1940 = H[32] - H[30] * t99 - t87 * t1935;
+  real t1947 = H[33] - H[30] * t161 - t164 * t1935 - t149 * t1940;
+  real t1956 = H[34] - H[30] * t245 - t248 * t1935 - t251 * t1940 - t233 * t1947;
+  real t1967 = H[35] - H[30] * t353 - t356 * t1935 - t359 * t1940 - t362 * t1947 - t341 * t1956;
+  real t1968 = t367 * t1967;
+  real t1970 = t256 * t1956 - t341 * t1968;
+  real t1974 = t169 * t1947 - t233 * t1970 - t362 * t1968;
+  real t1980 = t104 * t1940 - t149 * t1974 - t251 * t1970 - t359 * t1968;
+  real t1993 = d_H[31] - (t56 * d_H[30] + H[30] * t424);
+  real t2005 = d_H[32] - (t99 * d_H[30] + H[30] * t513) - (t1935 * t508 + t87 * t1993);
+  real t2021 = d_H[33] - (t161 * d_H[30] + H[30] * t639) - (t1935 * t645 + t164 * t1993) - (t1940 *
+    t634 + t149 * t2005);
+  real t2041 = d_H[34] - (t245 * d_H[30] + H[30] * t811) - (t1935 * t817 + t248 * t1993) - (t1940 *
+    t824 + t251 * t2005) - (t1947 * t806 + t233 * t2021);
+  real t2068 = t367 * (d_H[35] - (t353 * d_H[30] + H[30] * t1033) - (t1935 * t1039 + t356 * t1993) -
+    (t1940 * t1046 + t359 * t2005) - (t1947 * t1053 + t362 * t2021) - (t1956 * t1028 + t341 *
+    t2041)) - t1967 * t1101;
+  real t2071 = t256 * t2041 - t1956 * t868 - (t1968 * t1028 + t341 * t2068);
+  real t2078 = t169 * t2021 - t1947 * t685 - (t1970 * t806 + t233 * t2071) - (t1968 * t1053 + t362 *
+    t2068);
+  real t2089 = t104 * t2005 - t1940 * t548 - (t1974 * t634 + t149 * t2078) - (t1970 * t824 + t251 *
+    t2071) - (t1968 * t1046 + t359 * t2068);
+  real t2104 = t59 * t1993 - t1935 * t453 - (t1980 * t508 + t87 * t2089) - (t1974 * t645 + t164 *
+    t2078) - (t1970 * t817 + t248 * t2071) - (t1968 * t1039 + t356 * t2068);
+  d_W[5] = t11 * d_H[30] - H[30] * t31 - ((t59 * t1935 - t87 * t1980 - t164 * t1974 - t248 * t1970 -
+    t356 * t1968) * t424 + t56 * t2104) - (t1980 * t513 + t99 * t2089) - (t1974 * t639 + t161 *
+    t2078) - (t1970 * t811 + t245 * t2071) - (t1968 * t1033 + t353 * t2068);
+  d_W[6] = t1139;
+  d_W[7] = t1332;
+  d_W[8] = t1525;
+  d_W[9] = t1718;
+  d_W[10] = t1911;
+  d_W[11] = t2104;
+  d_W[12] = t1124;
+  d_W[13] = t1317;
+  d_W[14] = t1510;
+  d_W[15] = t1703;
+  d_W[16] = t1896;
+  d_W[17] = t2089;
+  d_W[18] = t1113;
+  d_W[19] = t1306;
+  d_W[20] = t1499;
+  d_W[21] = t1692;
+  d_W[22] = t1885;
+  d_W[23] = t2078;
+  d_W[24] = t1106;
+  d_W[25] = t1299;
+  d_W[26] = t1492;
+  d_W[27] = t1685;
+  d_W[28] = t1878;
+  d_W[29] = t2071;
+  d_W[30] = t1103;
+  d_W[31] = t1296;
+  d_W[32] = t1489;
+  d_W[33] = t1682;
+  d_W[34] = t1875;
+  d_W[35] = t2068;
+  return 0;
 }
 
-static int mstmm_sweep_generic6_complement_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_complement_slope(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_complement_slope_inputs[] = {
-    {"H", 36, "", 0, 0},
-    {"d_H", 36, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_complement_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_complement_slope, (in[0], in[1], out[0]))
 
 /* add_known_part and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -17493,53 +4441,15 @@ static const mstmm_port mstmm_sweep_generic6_complement_slope_outputs[] = {
  * in  d_z[6] derivative of z
  * out d_l[1] derivative of l, added to what is there
  */
-int mstmm_sweep_generic6_add_known_part_slope(const real *restrict y, const real *restrict z,
-    const real *restrict d_y, const real *restrict d_z, real *restrict d_l)
+int mstmm_sweep_generic6_add_known_part_slope(in_t y, in_t z, in_t d_y, in_t d_z, out_t d_l)
 {
-    const real t0 = z[5] * d_y[5];
-    const real t1 = y[5] * d_z[5];
-    const real t2 = t0 + t1;
-    const real t3 = z[4] * d_y[4];
-    const real t4 = y[4] * d_z[4];
-    const real t5 = t3 + t4;
-    const real t6 = z[3] * d_y[3];
-    const real t7 = y[3] * d_z[3];
-    const real t8 = t6 + t7;
-    const real t9 = z[2] * d_y[2];
-    const real t10 = y[2] * d_z[2];
-    const real t11 = t9 + t10;
-    const real t12 = z[1] * d_y[1];
-    const real t13 = y[1] * d_z[1];
-    const real t14 = t12 + t13;
-    const real t15 = z[0] * d_y[0];
-    const real t16 = y[0] * d_z[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    const real t23 = -t22;
-    d_l[0] += t23;
-    return 0;
+  d_l[0] += -(z[5] * d_y[5] + y[5] * d_z[5] + (z[4] * d_y[4] + y[4] * d_z[4] + (z[3] * d_y[3] + y[3]
+    * d_z[3] + (z[2] * d_y[2] + y[2] * d_z[2] + (z[1] * d_y[1] + y[1] * d_z[1] + (z[0] * d_y[0] +
+    y[0] * d_z[0]))))));
+  return 0;
 }
 
-static int mstmm_sweep_generic6_add_known_part_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_add_known_part_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_add_known_part_slope_inputs[] = {
-    {"y", 6, "", 0, 0},
-    {"z", 6, "", 0, 0},
-    {"d_y", 6, "", 0, 0},
-    {"d_z", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_add_known_part_slope_outputs[] = {
-    {"d_l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_add_known_part_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* add_multiplier_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -17550,445 +4460,229 @@ static const mstmm_port mstmm_sweep_generic6_add_known_part_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_y_0[6] derivative of y_0, added to what is there
  */
-int mstmm_sweep_generic6_add_multiplier_effort_slope(const real *restrict y, const real *restrict x,
-    const real *restrict d_y, const real *restrict d_x, real *restrict d_y_0)
+int mstmm_sweep_generic6_add_multiplier_effort_slope(in_t y, in_t x, in_t d_y, in_t d_x,
+    out_t d_y_0)
 {
-    const real t0 = x[0] * d_y[0];
-    const real t1 = y[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_y_0[0] += t2;
-    const real t3 = y[1] * d_x[0];
-    const real t4 = x[0] * d_y[1];
-    const real t5 = t3 + t4;
-    d_y_0[1] += t5;
-    const real t6 = y[2] * d_x[0];
-    const real t7 = x[0] * d_y[2];
-    const real t8 = t6 + t7;
-    d_y_0[2] += t8;
-    const real t9 = y[3] * d_x[0];
-    const real t10 = x[0] * d_y[3];
-    const real t11 = t9 + t10;
-    d_y_0[3] += t11;
-    const real t12 = y[4] * d_x[0];
-    const real t13 = x[0] * d_y[4];
-    const real t14 = t12 + t13;
-    d_y_0[4] += t14;
-    const real t15 = y[5] * d_x[0];
-    const real t16 = x[0] * d_y[5];
-    const real t17 = t15 + t16;
-    d_y_0[5] += t17;
-    return 0;
+  d_y_0[0] += x[0] * d_y[0] + y[0] * d_x[0];
+  d_y_0[1] += y[1] * d_x[0] + x[0] * d_y[1];
+  d_y_0[2] += y[2] * d_x[0] + x[0] * d_y[2];
+  d_y_0[3] += y[3] * d_x[0] + x[0] * d_y[3];
+  d_y_0[4] += y[4] * d_x[0] + x[0] * d_y[4];
+  d_y_0[5] += y[5] * d_x[0] + x[0] * d_y[5];
+  return 0;
 }
 
-static int mstmm_sweep_generic6_add_multiplier_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_generic6_add_multiplier_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_slope_inputs[] = {
-    {"y", 6, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_y", 6, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_generic6_add_multiplier_effort_slope_outputs[] = {
-    {"d_y_0", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_generic6_add_multiplier_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 static const mstmm_kernel mstmm_sweep_generic6_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_generic6_forward,
-        .call = mstmm_sweep_generic6_forward_call,
-        .n_inputs = 10,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_forward_inputs,
-        .outputs = mstmm_sweep_generic6_forward_outputs,
-        .ir_hash = "91998ed65ac3c21cd85918d7c3e9939cb19f4e21e4286beb648c84aa95867dc2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_generic6_condense,
-        .call = mstmm_sweep_generic6_condense_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic6_condense_inputs,
-        .outputs = mstmm_sweep_generic6_condense_outputs,
-        .ir_hash = "40cd103e3c2914fe60b1b968bbc1673c1d3dc21dfd285ba6c34bab833ac8d720",
-        .n_guards = 18,
-        .guards = mstmm_sweep_generic6_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_generic6_recover,
-        .call = mstmm_sweep_generic6_recover_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_recover_inputs,
-        .outputs = mstmm_sweep_generic6_recover_outputs,
-        .ir_hash = "bd686c0a3fbd778875a43dfe31b540e2de7491b2ed20adeefbe0115300d813b3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort",
-        .function = (void (*)(void))mstmm_sweep_generic6_effort,
-        .call = mstmm_sweep_generic6_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_effort_inputs,
-        .outputs = mstmm_sweep_generic6_effort_outputs,
-        .ir_hash = "da92999c2fdc488f19b906d299ab21960f95e2e63bfffbf9543ea0ab1de9050b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "project",
-        .function = (void (*)(void))mstmm_sweep_generic6_project,
-        .call = mstmm_sweep_generic6_project_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_project_inputs,
-        .outputs = mstmm_sweep_generic6_project_outputs,
-        .ir_hash = "3a9081991a47953916b937dfa9bbeca033863fcf7fdf723a962a8e9f3a917754",
-        .n_guards = 6,
-        .guards = mstmm_sweep_generic6_project_guards,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_generic6_factor,
-        .call = mstmm_sweep_generic6_factor_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_factor_inputs,
-        .outputs = mstmm_sweep_generic6_factor_outputs,
-        .ir_hash = "b5314e4379c84a1d9263421b67bb40bdf09f4b404e751bc0c8d6b1b8f6129e2c",
-        .n_guards = 12,
-        .guards = mstmm_sweep_generic6_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_generic6_column_load,
-        .call = mstmm_sweep_generic6_column_load_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_column_load_inputs,
-        .outputs = mstmm_sweep_generic6_column_load_outputs,
-        .ir_hash = "7d915c610e1d203c6c96e373bc910b07216f8b2ce68f1676f9056884a974f208",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_generic6_column_acceleration,
-        .call = mstmm_sweep_generic6_column_acceleration_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_column_acceleration_inputs,
-        .outputs = mstmm_sweep_generic6_column_acceleration_outputs,
-        .ir_hash = "c4bd4bc29e5247622787c78f86dd2d33ebaa8bd40fb03cfa7c9ab17244d37496",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "qr_eliminate",
-        .function = (void (*)(void))mstmm_sweep_generic6_qr_eliminate,
-        .call = mstmm_sweep_generic6_qr_eliminate_call,
-        .n_inputs = 7,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_generic6_qr_eliminate_inputs,
-        .outputs = mstmm_sweep_generic6_qr_eliminate_outputs,
-        .ir_hash = "b485fb3eda4987fcbf25cedc496561a51db67596871b96775d8952f17c5142b4",
-        .n_guards = 12,
-        .guards = mstmm_sweep_generic6_qr_eliminate_guards,
-    },
-    {
-        .name = "tangent_carrier",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_carrier,
-        .call = mstmm_sweep_generic6_tangent_carrier_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_tangent_carrier_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_carrier_outputs,
-        .ir_hash = "4b9c86107e94280715013e8b83a1ff450fbb2a5425d04972583260ce11bd68a3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_column",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_column,
-        .call = mstmm_sweep_generic6_tangent_column_call,
-        .n_inputs = 15,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_tangent_column_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_column_outputs,
-        .ir_hash = "7521769fcf0536cde85133c44ff781c26f6ba1187690e6ede465a7c631e61746",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_coordinate_change",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_coordinate_change,
-        .call = mstmm_sweep_generic6_tangent_coordinate_change_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_coordinate_change_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_coordinate_change_outputs,
-        .ir_hash = "86c610fcd89ebef93572b6432b76734bc5a4d393fc26df87c806bd38627f172f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_steady",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_steady,
-        .call = mstmm_sweep_generic6_tangent_steady_call,
-        .n_inputs = 11,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_tangent_steady_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_steady_outputs,
-        .ir_hash = "24bdabe22a0ca6e9d7755287e88bd8efce5b04080c80e0e5159828218c858929",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rotational",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_rotational,
-        .call = mstmm_sweep_generic6_tangent_rotational_call,
-        .n_inputs = 9,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_tangent_rotational_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_rotational_outputs,
-        .ir_hash = "94cadcf48bbab56bf3ebc45584f6df54e39721642bce3c67c12aeeaff3cf9f4d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_rows",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_rows,
-        .call = mstmm_sweep_generic6_tangent_rows_call,
-        .n_inputs = 4,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_generic6_tangent_rows_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_rows_outputs,
-        .ir_hash = "440932161a784f088dcfc9a369d9139dab57b434052754cc6be3db566aba8ef1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_reduce",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_reduce,
-        .call = mstmm_sweep_generic6_tangent_reduce_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_tangent_reduce_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_reduce_outputs,
-        .ir_hash = "4810eff2e56ffda43fd3e2834bebe7e94297af582c796718755fd6bb1e5962d8",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_load,
-        .call = mstmm_sweep_generic6_tangent_load_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_load_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_load_outputs,
-        .ir_hash = "d94e838e11498103a34c46cdc0e6d827d5993dd6ac3dbe5604e1191cb384acba",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_solution,
-        .call = mstmm_sweep_generic6_tangent_solution_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_solution_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_solution_outputs,
-        .ir_hash = "b3452b42ce114ede18d8d43654b8e8d666f407cc47d1d0c75d6894b79cb05890",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_load_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_load_with_increments,
-        .call = mstmm_sweep_generic6_tangent_load_with_increments_call,
-        .n_inputs = 8,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_load_with_increments_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_load_with_increments_outputs,
-        .ir_hash = "6c73946f5dcfb9e452229e3ea3424e97697c413052af2c862ff7c64edf58993e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "tangent_solution_with_increments",
-        .function = (void (*)(void))mstmm_sweep_generic6_tangent_solution_with_increments,
-        .call = mstmm_sweep_generic6_tangent_solution_with_increments_call,
-        .n_inputs = 10,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_generic6_tangent_solution_with_increments_inputs,
-        .outputs = mstmm_sweep_generic6_tangent_solution_with_increments_outputs,
-        .ir_hash = "dc9939f8f4e872d0c85c09fe1edf94dbb23aedf62f0bdf49633b413d424bbcf2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement",
-        .function = (void (*)(void))mstmm_sweep_generic6_complement,
-        .call = mstmm_sweep_generic6_complement_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_complement_inputs,
-        .outputs = mstmm_sweep_generic6_complement_outputs,
-        .ir_hash = "82674d6ce63d258aa9298801be9f653af1ef082611d0d7204a312c63cc5d2e44",
-        .n_guards = 6,
-        .guards = mstmm_sweep_generic6_complement_guards,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_generic6_divide,
-        .call = mstmm_sweep_generic6_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_divide_inputs,
-        .outputs = mstmm_sweep_generic6_divide_outputs,
-        .ir_hash = "a1fc3262e4e77a9a2b5f74658061f8c508758a1943cbba925174922e045544a0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_generic6_couple,
-        .call = mstmm_sweep_generic6_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_couple_inputs,
-        .outputs = mstmm_sweep_generic6_couple_outputs,
-        .ir_hash = "b191468f9d3d493b0cf5a0bcc6cca0f97195393ca3b951be76f5d191c23a3fb6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_generic6_add_known_part,
-        .call = mstmm_sweep_generic6_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_add_known_part_inputs,
-        .outputs = mstmm_sweep_generic6_add_known_part_outputs,
-        .ir_hash = "5af96afe3f708d7b60d192dea99e00601c89b961dc3b15767f675c80ab8d617c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_generic6_add_multiplier_effort,
-        .call = mstmm_sweep_generic6_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_generic6_add_multiplier_effort_outputs,
-        .ir_hash = "3103e6e1a9e1c54be3c51b23046253c61bc39adfb22aec65e3158cbb6ddbb338",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_load",
-        .function = (void (*)(void))mstmm_sweep_generic6_required_load,
-        .call = mstmm_sweep_generic6_required_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_required_load_inputs,
-        .outputs = mstmm_sweep_generic6_required_load_outputs,
-        .ir_hash = "5eb47071cb0ba8fd78297915e107541fb31aee3617ac28414e355f9b5ef968ea",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_generic6_ground_column_load,
-        .call = mstmm_sweep_generic6_ground_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_ground_column_load_inputs,
-        .outputs = mstmm_sweep_generic6_ground_column_load_outputs,
-        .ir_hash = "663de69f62554f4f1234121e002e33ad274bbcadc5db0958d572f5dde0e10f85",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_forward_slope,
-        .call = mstmm_sweep_generic6_forward_slope_call,
-        .n_inputs = 18,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_generic6_forward_slope_inputs,
-        .outputs = mstmm_sweep_generic6_forward_slope_outputs,
-        .ir_hash = "5337aa6243e10319be4a333e6d0c762d44dc651d9122e232ade58c0c640a361b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_effort_slope,
-        .call = mstmm_sweep_generic6_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic6_effort_slope_outputs,
-        .ir_hash = "97054ee63554574eeef50be1608d13d62bc632b4723953f2eaf267267887dfba",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "complement_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_complement_slope,
-        .call = mstmm_sweep_generic6_complement_slope_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_complement_slope_inputs,
-        .outputs = mstmm_sweep_generic6_complement_slope_outputs,
-        .ir_hash = "a609a7af8d30511a2993b79df9411f2e85bc04449330672fdda6fc588886766b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_add_known_part_slope,
-        .call = mstmm_sweep_generic6_add_known_part_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_add_known_part_slope_inputs,
-        .outputs = mstmm_sweep_generic6_add_known_part_slope_outputs,
-        .ir_hash = "d7248b411f183a1d842e70beecdd39fc353d05f3cae94a3ee3b0b37600ba9aed",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_generic6_add_multiplier_effort_slope,
-        .call = mstmm_sweep_generic6_add_multiplier_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_generic6_add_multiplier_effort_slope_inputs,
-        .outputs = mstmm_sweep_generic6_add_multiplier_effort_slope_outputs,
-        .ir_hash = "a42e0dea3d7c2cb6d5b8dacfb8f9c5d63c85a973b6d268ba6e87612ba11b45ec",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_generic6_forward), 10, 3, (const mstmm_port[]){{"Rt", 9,
+    "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0}, {"H", 36, "", 0, 0},
+    {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 6, "", 0, 0}, {"motion_I", 9,
+    "", 0, 0}}, (const mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"motion", 9, "", 0,
+    0}}, "57f0d0103ca8969b481aa179d969e8c66c1066f62737825b6181ce39ba8cd1b8", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_generic6_condense), 8, 4, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"J", 6, "kg*m2 or kg", 0, 0}, {"floor", 2,
+    "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 6, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"G", 36, "", 0, 0}, {"g", 6, "", 0, 0}, {"S_I", 21, "", 1, 0}, {"e_I", 6,
+    "N, N*m", 1, 0}}, "a47dd22e44d3a7d8a881847dc5763951bd595e91a893e2d92d1912b2a17ca005", 18, (const
+    mstmm_guard[]){{1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 6 of 6 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_generic6_recover), 6, 2, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"G", 36, "", 0, 0}, {"g", 6, "", 0, 0},
+    {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 6, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "34519c847f478a3774b852ea13ff719a073207b813223cfb51e2aa77fbceaf15", 0, NULL},
+  {"effort", MSTMM_FUNCTIONS(mstmm_sweep_generic6_effort), 2, 1, (const mstmm_port[]){{"H", 36, "",
+    0, 0}, {"f", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"tau", 6, "N, N*m", 0, 0}},
+    "0a7076a0bd07cae1df8f1360a525a33c8177fd13cf8f6c9fe8e222174e797628", 0, NULL},
+  {"project", MSTMM_FUNCTIONS(mstmm_sweep_generic6_project), 5, 1, (const mstmm_port[]){{"Rc", 9,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"delta", 6, "", 0, 0}, {"delta_I", 6, "",
+    0, 0}}, (const mstmm_port[]){{"udot", 6, "", 0, 0}},
+    "5208bfda9c27915e2060ae1aca8689c6c2384d188d391a3f25068215bd67ec9c", 6, (const mstmm_guard[]){{1,
+    "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}}},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_generic6_factor), 7, 3, (const mstmm_port[]){{"Rc", 9, "",
+    0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"J", 6, "kg*m2 or kg", 0, 0}, {"W", 36, "", 0,
+    0}, {"floor", 2, "kg, kg*m2", 0, 0}, {"S", 21, "", 0, 0}}, (const mstmm_port[]){{"F", 36, "", 0,
+    0}, {"G", 36, "", 0, 0}, {"S_I", 21, "", 1, 0}},
+    "7d2cc6b3c7b7f6b1b6d7333229e6b1f2ab40eedf3b2d23ad2c455b22b84b0a9d", 12, (const
+    mstmm_guard[]){{1, "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 6 of 6 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic6_column_load), 6, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"G", 36, "", 0,
+    0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 6,
+    "N, N*m", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "329e7dffceb3c615ccac8325b1105cc5a6c8d31229eb092041f8420ac41d9428", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_generic6_column_acceleration), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"F", 36, "", 0,
+    0}, {"G", 36, "", 0, 0}, {"y", 6, "N, N*m", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 6, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "ae4fc273ce1cc623bb67724cd7a06d435777a0719165a9d2595b8e0e1d97025e", 0, NULL},
+  {"qr_eliminate", MSTMM_FUNCTIONS(mstmm_sweep_generic6_qr_eliminate), 7, 5, (const
+    mstmm_port[]){{"H", 36, "", 0, 0}, {"J", 6, "kg*m2 or kg", 0, 0}, {"floor", 2, "kg, kg*m2", 0,
+    0}, {"U", 21, "", 0, 0}, {"d", 6, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 6, "N, N*m", 0,
+    0}}, (const mstmm_port[]){{"G", 36, "", 0, 0}, {"g", 6, "", 0, 0}, {"V", 21, "", 0, 0}, {"d_V",
+    6, "", 0, 0}, {"e_Q", 6, "N, N*m", 0, 0}},
+    "57211fbbcbe38717200888c2bd3f6396ca31009f2430c295fdf58d3d4d12126b", 12, (const
+    mstmm_guard[]){{1, "speed 1 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 4 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 5 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 6 of 6 moves no inertia: its acceleration is undetermined"}, {1,
+    "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}}},
+  {"tangent_carrier", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_carrier), 6, 1, (const
+    mstmm_port[]){{"H", 36, "", 0, 0}, {"s", 6, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0},
+    {"c", 6, "", 0, 0}, {"motion", 9, "", 0, 0}}, (const mstmm_port[]){{"Q", 9, "", 0, 0}},
+    "a75e626823b2fb7bca99eaf7f386d39d35674229a125dae73c8d891b4688776f", 0, NULL},
+  {"tangent_column", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_column), 15, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 36, "", 0, 0}, {"s", 6, "", 0,
+    0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0},
+    {"d_H", 36, "", 0, 0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s",
+    6, "", 0, 0}, {"J", 6, "kg*m2 or kg", 0, 0}, {"laws", 6, "", 0, 0}}, (const mstmm_port[]){{"B",
+    9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 6, "", 0, 0}},
+    "76d440a8c3d304a1eebdfefb6613f3e611e85eb17c5f92bd40db9f4e269ede82", 0, NULL},
+  {"tangent_coordinate_change", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_coordinate_change), 2,
+    2, (const mstmm_port[]){{"H", 36, "", 0, 0}, {"d_q", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}},
+    "d9e089be651e7be749507b36ec0822ee4be828dfe93b3611902f937f96764fb6", 0, NULL},
+  {"tangent_steady", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_steady), 11, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"x", 3, "", 0, 0}, {"H", 36, "", 0, 0}, {"v", 3, "", 0,
+    0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 6, "", 0, 0},
+    {"d_s", 6, "", 0, 0}, {"J", 6, "kg*m2 or kg", 0, 0}, {"laws", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6, "", 0, 0}, {"row", 6, "", 0, 0}},
+    "02dd493cc6454256276f4b808a101818b271d3b7b9de1e62d3c00af4ef79967a", 0, NULL},
+  {"tangent_rotational", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_rotational), 9, 3, (const
+    mstmm_port[]){{"theta", 3, "", 0, 0}, {"H", 36, "", 0, 0}, {"w", 3, "", 0, 0}, {"Q", 9, "", 0,
+    0}, {"f", 6, "N, N*m", 0, 0}, {"d_u", 6, "", 0, 0}, {"d_s", 6, "", 0, 0}, {"J", 6,
+    "kg*m2 or kg", 0, 0}, {"laws", 6, "", 0, 0}}, (const mstmm_port[]){{"B", 9, "", 0, 0}, {"G", 6,
+    "", 0, 0}, {"row", 6, "", 0, 0}},
+    "5a7e227dcc8745890f10dab7bf7e0a8836eab6ddc11252158d12beaabd1986a2", 0, NULL},
+  {"tangent_rows", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_rows), 4, 4, (const
+    mstmm_port[]){{"H", 36, "", 0, 0}, {"B", 54, "", 0, 0}, {"W", 36, "", 0, 0}, {"S", 54, "", 0,
+    0}}, (const mstmm_port[]){{"K", 36, "", 0, 0}, {"right", 54, "", 0, 0}, {"D", 36, "", 0, 0},
+    {"one", 36, "", 0, 0}}, "b22001138b9003e8390964d72164e1304279c8ef46b07fdb66ffe894b5d0895e", 0,
+    NULL},
+  {"tangent_reduce", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_reduce), 4, 3, (const
+    mstmm_port[]){{"inverse", 36, "", 0, 0}, {"right", 54, "", 0, 0}, {"K", 36, "", 0, 0}, {"G", 36,
+    "", 0, 0}}, (const mstmm_port[]){{"gain", 54, "", 0, 0}, {"V", 36, "", 0, 0}, {"S", 54, "", 1,
+    0}}, "9c050ecaf54eabc2c08862450735880d9e741bbc073f92c6d3748ed147ed4129", 0, NULL},
+  {"tangent_load", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_load), 7, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"V", 36, "", 0,
+    0}, {"inverse", 36, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"y", 6, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "91defa8435c0f07d210bf698e06741fef76514a97eaaf50251b6a34ecb2dd4b1", 0, NULL},
+  {"tangent_solution", MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_solution), 9, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 54, "", 0, 0}, {"gain", 54,
+    "", 0, 0}, {"y", 6, "", 0, 0}}, (const mstmm_port[]){{"x", 6, "", 0, 0}, {"z", 9, "", 0, 0}},
+    "0de52be4a496f92a6f23e315abf25ab0661d57b187d128e71da4b1ac7eed3c63", 0, NULL},
+  {"tangent_load_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_load_with_increments), 8, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 36, "", 0, 0}, {"V", 36, "", 0,
+    0}, {"inverse", 36, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 6, "", 0, 0}, {"e_b", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 6, "", 0, 0}, {"e_I", 6, "N, N*m", 1, 0}},
+    "b32b7156b13db7ad548c4d5ab2aeb8f3681b4aaf4e8b55848abc54dd43d10e8f", 0, NULL},
+  {"tangent_solution_with_increments",
+    MSTMM_FUNCTIONS(mstmm_sweep_generic6_tangent_solution_with_increments), 10, 2, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"z_I", 9, "", 0, 0}, {"B", 54, "", 0, 0}, {"gain", 54,
+    "", 0, 0}, {"y", 6, "", 0, 0}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"x", 6, "", 0, 0},
+    {"z", 9, "", 0, 0}}, "bbc039ce9cff8b8f63a7b68e706b33c9f39c5cf3d5b98b412ea5c164c2b23f55", 0,
+    NULL},
+  {"complement", MSTMM_FUNCTIONS(mstmm_sweep_generic6_complement), 1, 1, (const mstmm_port[]){{"H",
+    36, "", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}},
+    "55cd4a539cbde1949ac2ebc1aada6c90bd8a6aa55e51d5485cb90818a0d2727e", 6, (const mstmm_guard[]){{1,
+    "pivot 1 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 4 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 5 of 6 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 6 of 6 vanishes: a motion of the hinge is undetermined"}}},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_generic6_divide), 2, 1, (const mstmm_port[]){{"F", 36, "",
+    0, 0}, {"y", 6, "", 0, 0}}, (const mstmm_port[]){{"z", 6, "", 0, 0}},
+    "e3fa1ce5bdd2f7dd21838fb6f06874bbf5c5cb58f9c4626ed2f9707e703d7af8", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_generic6_couple), 2, 1, (const mstmm_port[]){{"y", 6, "",
+    0, 0}, {"z", 6, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "7a3c1147940eef33ca34449bbf7a3d56165a07d67996207c6f009133de6c5e35", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_generic6_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 6, "", 0, 0}, {"z", 6, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "7431b0039633ae501b0318a40a90395c4c200904642d8a386891980400132c5f", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_generic6_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 6, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    6, "", 1, 0}}, "ca040ba81c2921cefc715781a2435b4b6e41c9e1f8fc9ed5aa5002fd679b9474", 0, NULL},
+  {"required_load", MSTMM_FUNCTIONS(mstmm_sweep_generic6_required_load), 3, 1, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"H", 36, "", 0, 0}, {"udot", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 0, 0}},
+    "a4bcf1bf3a46af2cf3c074fde23b3e55c3a3e3a7ba6a92d3138c9e3980d66b7c", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_generic6_ground_column_load), 3, 1, (const
+    mstmm_port[]){{"H", 36, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"tau", 6, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"y", 6, "N, N*m", 0, 0}},
+    "b366ca75744b85062874cc041fc95e48f1e39c5342d8526d5bb43baa1caadaa6", 0, NULL},
+  {"forward_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic6_forward_slope), 18, 3, (const
+    mstmm_port[]){{"Rt", 9, "", 0, 0}, {"ro", 3, "m", 0, 0}, {"R", 9, "", 0, 0}, {"d", 3, "", 0, 0},
+    {"H", 36, "", 0, 0}, {"v", 3, "", 0, 0}, {"w", 3, "", 0, 0}, {"c", 6, "", 0, 0}, {"s", 6, "", 0,
+    0}, {"motion_I", 9, "", 0, 0}, {"d_R", 9, "", 0, 0}, {"d_d", 3, "", 0, 0}, {"d_H", 36, "", 0,
+    0}, {"d_v", 3, "", 0, 0}, {"d_w", 3, "", 0, 0}, {"d_c", 6, "", 0, 0}, {"d_s", 6, "", 0, 0},
+    {"d_motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d_Rc", 9, "", 0, 0}, {"d_r", 3, "m", 0, 0},
+    {"d_motion", 9, "", 0, 0}}, "a60772909e053702c5dc38a497d1d6f52a03ab8856564c558e0509a890d911da",
+    0, NULL},
+  {"effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic6_effort_slope), 4, 1, (const
+    mstmm_port[]){{"H", 36, "", 0, 0}, {"f", 6, "N, N*m", 0, 0}, {"d_H", 36, "", 0, 0}, {"d_f", 6,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 6, "N, N*m", 0, 0}},
+    "d02817b48846e827501c4194de6eec7bc4a27a18a7accba5c26a1733d6785906", 0, NULL},
+  {"complement_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic6_complement_slope), 2, 1, (const
+    mstmm_port[]){{"H", 36, "", 0, 0}, {"d_H", 36, "", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "",
+    0, 0}}, "e7c63c58530c017cc0aa85a577421078dfba539d614f3a03c7444e86ec2a6365", 0, NULL},
+  {"add_known_part_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic6_add_known_part_slope), 4, 1, (const
+    mstmm_port[]){{"y", 6, "", 0, 0}, {"z", 6, "", 0, 0}, {"d_y", 6, "", 0, 0}, {"d_z", 6, "", 0,
+    0}}, (const mstmm_port[]){{"d_l", 1, "", 1, 0}},
+    "efa17ce9b3620bbf3b7e1cbd412a00002c96b7a2fad3bc511f3e70b9d138eb39", 0, NULL},
+  {"add_multiplier_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_generic6_add_multiplier_effort_slope),
+    4, 1, (const mstmm_port[]){{"y", 6, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_y", 6, "", 0, 0},
+    {"d_x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_y_0", 6, "", 1, 0}},
+    "c2e398605f54d560a9d1e234e8e54c0094bc3636a914167e8a9d08e2ebc39317", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_generic6 = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "generic6",
-    .hash = "a64c934bb0a8a2d433306c00d6f72e7f474431102ee87b99061d17a8f66eeac2",
+    .hash = "0a4a4c35fa90296d8eb9174ecad0b573361e54048c41f453cae2be22abdd1211",
     .nq = 0,
     .nu = 0,
     .np = 0,

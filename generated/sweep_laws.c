@@ -7,33 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_laws;
-int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict effort, real *restrict tau, real *restrict V, real *restrict P);
-int mstmm_sweep_laws_full(const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict effort, real *restrict tau, real *restrict V, real *restrict P);
-int mstmm_sweep_laws_rotation(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict B, const real *restrict effort,
-    const real *restrict twist_ref, real *restrict tau, real *restrict V, real *restrict P,
-    real *restrict twist);
-int mstmm_sweep_laws_six(const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict B, const real *restrict effort, const real *restrict twist_ref,
-    real *restrict tau, real *restrict V, real *restrict P, real *restrict twist);
-int mstmm_sweep_laws_linear_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict effort, const real *restrict d_q,
-    const real *restrict d_u, const real *restrict d_effort, real *restrict d_tau);
-int mstmm_sweep_laws_full_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict effort, const real *restrict d_q,
-    const real *restrict d_u, const real *restrict d_effort, real *restrict d_tau);
-int mstmm_sweep_laws_rotation_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict B, const real *restrict effort,
-    const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
-    const real *restrict d_effort, real *restrict d_tau);
-int mstmm_sweep_laws_six_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict B, const real *restrict effort,
-    const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
-    const real *restrict d_effort, real *restrict d_tau);
-
 /* law of one hinge coordinate
  * in  p[3] stiffness, rest, damping
  * in  q[1] (m or rad) coordinate
@@ -43,43 +16,17 @@ int mstmm_sweep_laws_six_slope(const real *restrict p, const real *restrict q,
  * out V[1] (J) stored energy
  * out P[1] (W) power of dampers, friction and given efforts
  */
-int mstmm_sweep_laws_linear(const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict effort, real *restrict tau, real *restrict V, real *restrict P)
+int mstmm_sweep_laws_linear(in_t p, in_t q, in_t u, in_t effort, out_t tau, out_t V, out_t P)
 {
-    const real t0 = q[0] - p[1];
-    const real t1 = p[0] * t0;
-    const real t2 = p[2] * u[0];
-    const real t3 = t1 + t2;
-    const real t4 = effort[0] - t3;
-    tau[0] = t4;
-    const real t5 = t0 * t0;
-    const real t6 = p[0] * t5;
-    const real t7 = t6 * 0.5;
-    V[0] = t7;
-    const real t8 = effort[0] - t2;
-    const real t9 = u[0] * t8;
-    P[0] = t9;
-    return 0;
+  real t0 = q[0] - p[1];
+  real t2 = p[2] * u[0];
+  tau[0] = effort[0] - (p[0] * t0 + t2);
+  V[0] = p[0] * (t0 * t0) * 0.5;
+  P[0] = u[0] * (effort[0] - t2);
+  return 0;
 }
 
-static int mstmm_sweep_laws_linear_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_linear(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_laws_linear_inputs[] = {
-    {"p", 3, "", 0, 0},
-    {"q", 1, "m or rad", 0, 0},
-    {"u", 1, "m/s or rad/s", 0, 0},
-    {"effort", 1, "N or N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_linear_outputs[] = {
-    {"tau", 1, "N or N*m", 0, 0},
-    {"V", 1, "J", 0, 0},
-    {"P", 1, "W", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_linear, (in[0], in[1], in[2], in[3], out[0], out[1], out[2]))
 
 /* law of one hinge coordinate with friction and limits
  * in  p[11] stiffness, rest, damping, coulomb, static, stribeck_velocity, regularisation_velocity, lower, upper, limit_stiffness, limit_damping
@@ -90,92 +37,35 @@ static const mstmm_port mstmm_sweep_laws_linear_outputs[] = {
  * out V[1] (J) stored energy
  * out P[1] (W) power of dampers, friction and given efforts
  */
-int mstmm_sweep_laws_full(const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict effort, real *restrict tau, real *restrict V, real *restrict P)
+int mstmm_sweep_laws_full(in_t p, in_t q, in_t u, in_t effort, out_t tau, out_t V, out_t P)
 {
-    const real t0 = p[8] - q[0];
-    const real t1 = t0 < 0.0;
-    const real t2 = p[9] * t0;
-    const real t3 = p[10] * u[0];
-    const real t4 = t3 - t2;
-    const real t5 = (0.0 < t4 || isnan(t4)) ? t4 : 0.0;
-    const real t6 = t2 + t5;
-    const real t7 = -t6;
-    const real t8 = t1 != 0 ? t7 : 0.0;
-    const real t9 = p[7] - q[0];
-    const real t10 = 0.0 < t9;
-    const real t11 = p[9] * t9;
-    const real t12 = t11 - t3;
-    const real t13 = (0.0 < t12 || isnan(t12)) ? t12 : 0.0;
-    const real t14 = t13 - t11;
-    const real t15 = t10 != 0 ? t14 : 0.0;
-    const real t16 = t1 != 0 ? t2 : 0.0;
-    const real t17 = t10 != 0 ? t11 : 0.0;
-    const real t18 = p[2] * u[0];
-    const real t19 = p[4] - p[3];
-    const real t20 = u[0] * u[0];
-    const real t21 = p[5] * p[5];
-    const real t22 = 1.0 / t21;
-    const real t23 = t20 * t22;
-    const real t24 = -t23;
-    const real t25 = exp(t24);
-    const real t26 = t19 * t25;
-    const real t27 = p[3] + t26;
-    const real t28 = 1.0 / p[6];
-    const real t29 = u[0] * t28;
-    const real t30 = tanh(t29);
-    const real t31 = t27 * t30;
-    const real t32 = q[0] - p[1];
-    const real t33 = p[0] * t32;
-    const real t34 = t31 + t33;
-    const real t35 = t18 + t34;
-    const real t36 = t17 - t35;
-    const real t37 = t16 + t36;
-    const real t38 = t15 + t37;
-    const real t39 = t8 + t38;
-    const real t40 = effort[0] + t39;
-    tau[0] = t40;
-    const real t41 = t0 * t0;
-    const real t42 = p[9] * t41;
-    const real t43 = 0.5 * t42;
-    const real t44 = t1 != 0 ? t43 : 0.0;
-    const real t45 = t32 * t32;
-    const real t46 = p[0] * t45;
-    const real t47 = t46 * 0.5;
-    const real t48 = t9 * t9;
-    const real t49 = p[9] * t48;
-    const real t50 = 0.5 * t49;
-    const real t51 = t10 != 0 ? t50 : 0.0;
-    const real t52 = t47 + t51;
-    const real t53 = t44 + t52;
-    V[0] = t53;
-    const real t54 = t31 + t18;
-    const real t55 = t15 - t54;
-    const real t56 = t8 + t55;
-    const real t57 = effort[0] + t56;
-    const real t58 = u[0] * t57;
-    P[0] = t58;
-    return 0;
+  real t0 = p[8] - q[0];
+  real t1 = t0 < 0.0;
+  real t2 = p[9] * t0;
+  real t3 = p[10] * u[0];
+  real t4 = t3 - t2;
+  real t7 = -(t2 + ((0.0 < t4 || isnan(t4)) ? t4 : 0.0));
+  real t8 = t1 != 0 ? t7 : 0.0;
+  real t9 = p[7] - q[0];
+  real t10 = 0.0 < t9;
+  real t11 = p[9] * t9;
+  real t12 = t11 - t3;
+  real t14 = ((0.0 < t12 || isnan(t12)) ? t12 : 0.0) - t11;
+  real t15 = t10 != 0 ? t14 : 0.0;
+  real t18 = p[2] * u[0];
+  real t31 = (p[3] + (p[4] - p[3]) * exp(-(u[0] * u[0] * (1.0 / (p[5] * p[5]))))) * tanh(u[0] * (1.0
+    / p[6]));
+  real t32 = q[0] - p[1];
+  tau[0] = effort[0] + (t8 + (t15 + ((t1 != 0 ? t2 : 0.0) + ((t10 != 0 ? t11 : 0.0) - (t18 + (t31 +
+    p[0] * t32))))));
+  real t43 = 0.5 * (p[9] * (t0 * t0));
+  real t50 = 0.5 * (p[9] * (t9 * t9));
+  V[0] = (t1 != 0 ? t43 : 0.0) + (p[0] * (t32 * t32) * 0.5 + (t10 != 0 ? t50 : 0.0));
+  P[0] = u[0] * (effort[0] + (t8 + (t15 - (t31 + t18))));
+  return 0;
 }
 
-static int mstmm_sweep_laws_full_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_full(in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_laws_full_inputs[] = {
-    {"p", 11, "", 0, 0},
-    {"q", 1, "m or rad", 0, 0},
-    {"u", 1, "m/s or rad/s", 0, 0},
-    {"effort", 1, "N or N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_full_outputs[] = {
-    {"tau", 1, "N or N*m", 0, 0},
-    {"V", 1, "J", 0, 0},
-    {"P", 1, "W", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_full, (in[0], in[1], in[2], in[3], out[0], out[1], out[2]))
 
 /* swing-twist law of a ball hinge
  * in  p[7] kx, ky, kz, rest_twist, cx, cy, cz
@@ -189,422 +79,110 @@ static const mstmm_port mstmm_sweep_laws_full_outputs[] = {
  * out P[1] (W) power of dampers, friction and given efforts
  * out twist[1] (rad) unwrapped twist
  */
-int mstmm_sweep_laws_rotation(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict B, const real *restrict effort,
-    const real *restrict twist_ref, real *restrict tau, real *restrict V, real *restrict P,
-    real *restrict twist)
+int mstmm_sweep_laws_rotation(in_t p, in_t q, in_t u, in_t B, in_t effort, in_t twist_ref,
+    out_t tau, out_t V, out_t P, out_t twist)
 {
-    const real t0 = q[3] * B[7];
-    const real t1 = q[1] * B[1];
-    const real t2 = q[2] * B[4];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = q[3] * B[6];
-    const real t6 = q[1] * B[0];
-    const real t7 = q[2] * B[3];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t9 * t9;
-    const real t11 = t4 * t4;
-    const real t12 = t10 + t11;
-    const real t13 = q[3] * B[8];
-    const real t14 = q[1] * B[2];
-    const real t15 = q[2] * B[5];
-    const real t16 = t14 + t15;
-    const real t17 = t13 + t16;
-    const real t18 = t17 * t17;
-    const real t19 = q[0] * q[0];
-    const real t20 = t10 + t19;
-    const real t21 = t11 + t20;
-    const real t22 = t18 + t21;
-    const real t23 = 1.0 / t22;
-    const real t24 = t12 * t23;
-    const real t25 = t24 < ((real)1 / (real)100);
-    const real t26 = t22 * 5120.0;
-    const real t27 = 1.0 / t26;
-    const real t28 = 143.0 * t27;
-    const real t29 = t12 * t28;
-    const real t30 = ((real)231 / (real)6656) + t29;
-    const real t31 = t12 * t30;
-    const real t32 = t23 * t31;
-    const real t33 = ((real)63 / (real)1408) + t32;
-    const real t34 = t12 * t33;
-    const real t35 = t23 * t34;
-    const real t36 = ((real)35 / (real)576) + t35;
-    const real t37 = t12 * t36;
-    const real t38 = t23 * t37;
-    const real t39 = ((real)5 / (real)56) + t38;
-    const real t40 = t12 * t39;
-    const real t41 = t23 * t40;
-    const real t42 = ((real)3 / (real)20) + t41;
-    const real t43 = t12 * t42;
-    const real t44 = t23 * t43;
-    const real t45 = ((real)1 / (real)3) + t44;
-    const real t46 = t12 * t45;
-    const real t47 = t23 * t46;
-    const real t48 = 2.0 + t47;
-    const real t49 = t19 + t18;
-    const real t50 = 1.0 / t49;
-    const real t51 = t12 * t50;
-    const real t52 = sqrt(t51);
-    const real t53 = atan(t52);
-    const real t54 = sqrt(t24);
-    const real t55 = 1.0 / t54;
-    const real t56 = 2.0 * t55;
-    const real t57 = t53 * t56;
-    const real t58 = t25 != 0 ? t48 : t57;
-    const real t59 = q[0] * t9;
-    const real t60 = t4 * t17;
-    const real t61 = t59 - t60;
-    const real t62 = t58 * t61;
-    const real t63 = sqrt(t49);
-    const real t64 = sqrt(t22);
-    const real t65 = t63 * t64;
-    const real t66 = 1.0 / t65;
-    const real t67 = t62 * t66;
-    const real t68 = p[0] * B[0];
-    const real t69 = B[0] * t68;
-    const real t70 = p[1] * B[3];
-    const real t71 = B[3] * t70;
-    const real t72 = t69 + t71;
-    const real t73 = p[2] * B[6];
-    const real t74 = B[6] * t73;
-    const real t75 = t72 + t74;
-    const real t76 = t67 * t75;
-    const real t77 = q[0] * t4;
-    const real t78 = t9 * t17;
-    const real t79 = t77 + t78;
-    const real t80 = t58 * t79;
-    const real t81 = t66 * t80;
-    const real t82 = B[1] * t68;
-    const real t83 = B[4] * t70;
-    const real t84 = t82 + t83;
-    const real t85 = B[7] * t73;
-    const real t86 = t84 + t85;
-    const real t87 = t81 * t86;
-    const real t88 = t76 + t87;
-    const real t89 = atan2(t17, q[0]);
-    const real t90 = 2.0 * t89;
-    const real t91 = twist_ref[0] - t90;
-    const real t92 = MSTMM_PI * 4.0;
-    const real t93 = 1.0 / t92;
-    const real t94 = t91 * t93;
-    const real t95 = 0.5 + t94;
-    const real t96 = floor(t95);
-    const real t97 = MSTMM_PI * t96;
-    const real t98 = 4.0 * t97;
-    const real t99 = t90 + t98;
-    const real t100 = t99 - p[3];
-    const real t101 = B[2] * t68;
-    const real t102 = B[5] * t70;
-    const real t103 = t101 + t102;
-    const real t104 = B[8] * t73;
-    const real t105 = t103 + t104;
-    const real t106 = t100 * t105;
-    const real t107 = t88 + t106;
-    const real t108 = t9 * t58;
-    const real t109 = t66 * t108;
-    const real t110 = q[0] * t62;
-    const real t111 = pow(t49, 1.5);
-    const real t112 = t64 * t111;
-    const real t113 = 1.0 / t112;
-    const real t114 = t110 * t113;
-    const real t115 = t109 - t114;
-    const real t116 = pow(t22, 1.5);
-    const real t117 = t63 * t116;
-    const real t118 = 1.0 / t117;
-    const real t119 = t118 * t110;
-    const real t120 = t115 - t119;
-    const real t121 = t27 * 1001.0;
-    const real t122 = t12 * t121;
-    const real t123 = ((real)693 / (real)3328) + t122;
-    const real t124 = t12 * t123;
-    const real t125 = t23 * t124;
-    const real t126 = ((real)315 / (real)1408) + t125;
-    const real t127 = t12 * t126;
-    const real t128 = t23 * t127;
-    const real t129 = ((real)35 / (real)144) + t128;
-    const real t130 = t12 * t129;
-    const real t131 = t23 * t130;
-    const real t132 = ((real)15 / (real)56) + t131;
-    const real t133 = t12 * t132;
-    const real t134 = t23 * t133;
-    const real t135 = ((real)3 / (real)10) + t134;
-    const real t136 = t12 * t135;
-    const real t137 = t23 * t136;
-    const real t138 = ((real)1 / (real)3) + t137;
-    const real t139 = 1.0 - t24;
-    const real t140 = pow(t139, (-0.5));
-    const real t141 = t53 * t55;
-    const real t142 = t140 - t141;
-    const real t143 = t22 * t142;
-    const real t144 = 1.0 / t12;
-    const real t145 = t143 * t144;
-    const real t146 = t25 != 0 ? t138 : t145;
-    const real t147 = t12 * t61;
-    const real t148 = t146 * t147;
-    const real t149 = q[0] * t148;
-    const real t150 = pow(t22, 2.5);
-    const real t151 = t63 * t150;
-    const real t152 = 1.0 / t151;
-    const real t153 = 2.0 * t152;
-    const real t154 = t149 * t153;
-    const real t155 = t120 - t154;
-    const real t156 = t107 * t155;
-    const real t157 = p[0] * B[1];
-    const real t158 = B[0] * t157;
-    const real t159 = p[1] * B[4];
-    const real t160 = B[3] * t159;
-    const real t161 = t158 + t160;
-    const real t162 = p[2] * B[7];
-    const real t163 = B[6] * t162;
-    const real t164 = t161 + t163;
-    const real t165 = t67 * t164;
-    const real t166 = B[1] * t157;
-    const real t167 = B[4] * t159;
-    const real t168 = t166 + t167;
-    const real t169 = B[7] * t162;
-    const real t170 = t168 + t169;
-    const real t171 = t81 * t170;
-    const real t172 = t165 + t171;
-    const real t173 = B[2] * t157;
-    const real t174 = B[5] * t159;
-    const real t175 = t173 + t174;
-    const real t176 = B[8] * t162;
-    const real t177 = t175 + t176;
-    const real t178 = t100 * t177;
-    const real t179 = t172 + t178;
-    const real t180 = t4 * t58;
-    const real t181 = t66 * t180;
-    const real t182 = q[0] * t80;
-    const real t183 = t113 * t182;
-    const real t184 = t181 - t183;
-    const real t185 = t118 * t182;
-    const real t186 = t184 - t185;
-    const real t187 = t12 * t79;
-    const real t188 = t146 * t187;
-    const real t189 = q[0] * t188;
-    const real t190 = t153 * t189;
-    const real t191 = t186 - t190;
-    const real t192 = t179 * t191;
-    const real t193 = t156 + t192;
-    const real t194 = t4 * t193;
-    const real t195 = 0.5 * t194;
-    const real t196 = q[0] * t58;
-    const real t197 = t66 * t196;
-    const real t198 = t9 * t23;
-    const real t199 = t9 * t12;
-    const real t200 = t22 * t22;
-    const real t201 = 1.0 / t200;
-    const real t202 = t199 * t201;
-    const real t203 = t198 - t202;
-    const real t204 = 2.0 * t203;
-    const real t205 = t61 * t204;
-    const real t206 = t146 * t205;
-    const real t207 = t66 * t206;
-    const real t208 = t197 + t207;
-    const real t209 = t9 * t62;
-    const real t210 = t209 * t118;
-    const real t211 = t208 - t210;
-    const real t212 = t107 * t211;
-    const real t213 = t17 * t58;
-    const real t214 = t66 * t213;
-    const real t215 = t79 * t204;
-    const real t216 = t146 * t215;
-    const real t217 = t66 * t216;
-    const real t218 = t214 + t217;
-    const real t219 = t9 * t80;
-    const real t220 = t118 * t219;
-    const real t221 = t218 - t220;
-    const real t222 = t179 * t221;
-    const real t223 = t212 + t222;
-    const real t224 = t17 * t223;
-    const real t225 = 0.5 * t224;
-    const real t226 = t4 * t23;
-    const real t227 = t4 * t12;
-    const real t228 = t201 * t227;
-    const real t229 = t226 - t228;
-    const real t230 = 2.0 * t229;
-    const real t231 = t61 * t230;
-    const real t232 = t146 * t231;
-    const real t233 = t66 * t232;
-    const real t234 = t233 - t214;
-    const real t235 = t4 * t62;
-    const real t236 = t118 * t235;
-    const real t237 = t234 - t236;
-    const real t238 = t107 * t237;
-    const real t239 = t79 * t230;
-    const real t240 = t146 * t239;
-    const real t241 = t66 * t240;
-    const real t242 = t197 + t241;
-    const real t243 = t4 * t80;
-    const real t244 = t118 * t243;
-    const real t245 = t242 - t244;
-    const real t246 = t179 * t245;
-    const real t247 = t238 + t246;
-    const real t248 = q[0] * t247;
-    const real t249 = 0.5 * t248;
-    const real t250 = t225 - t249;
-    const real t251 = t195 + t250;
-    const real t252 = t17 * t80;
-    const real t253 = t113 * t252;
-    const real t254 = t109 - t253;
-    const real t255 = t118 * t252;
-    const real t256 = t254 - t255;
-    const real t257 = t17 * t188;
-    const real t258 = t153 * t257;
-    const real t259 = t256 - t258;
-    const real t260 = t179 * t259;
-    const real t261 = t17 * t148;
-    const real t262 = t153 * t261;
-    const real t263 = t17 * t62;
-    const real t264 = t118 * t263;
-    const real t265 = t113 * t263;
-    const real t266 = t181 + t265;
-    const real t267 = t264 + t266;
-    const real t268 = t262 + t267;
-    const real t269 = t107 * t268;
-    const real t270 = t260 - t269;
-    const real t271 = t9 * t270;
-    const real t272 = 0.5 * t271;
-    const real t273 = t251 - t272;
-    const real t274 = p[0] * B[2];
-    const real t275 = B[0] * t274;
-    const real t276 = p[1] * B[5];
-    const real t277 = B[3] * t276;
-    const real t278 = t275 + t277;
-    const real t279 = p[2] * B[8];
-    const real t280 = B[6] * t279;
-    const real t281 = t278 + t280;
-    const real t282 = t67 * t281;
-    const real t283 = B[1] * t274;
-    const real t284 = B[4] * t276;
-    const real t285 = t283 + t284;
-    const real t286 = B[7] * t279;
-    const real t287 = t285 + t286;
-    const real t288 = t81 * t287;
-    const real t289 = t282 + t288;
-    const real t290 = B[2] * t274;
-    const real t291 = B[5] * t276;
-    const real t292 = t290 + t291;
-    const real t293 = B[8] * t279;
-    const real t294 = t292 + t293;
-    const real t295 = t100 * t294;
-    const real t296 = t289 + t295;
-    const real t297 = t59 * t296;
-    const real t298 = t50 * t297;
-    const real t299 = t273 - t298;
-    const real t300 = t60 * t296;
-    const real t301 = t50 * t300;
-    const real t302 = t299 - t301;
-    const real t303 = B[1] * t302;
-    const real t304 = t77 * t296;
-    const real t305 = t50 * t304;
-    const real t306 = t4 * t270;
-    const real t307 = 0.5 * t306;
-    const real t308 = t9 * t193;
-    const real t309 = 0.5 * t308;
-    const real t310 = q[0] * t223;
-    const real t311 = 0.5 * t310;
-    const real t312 = t17 * t247;
-    const real t313 = 0.5 * t312;
-    const real t314 = t311 + t313;
-    const real t315 = t309 - t314;
-    const real t316 = t307 + t315;
-    const real t317 = t305 + t316;
-    const real t318 = t78 * t296;
-    const real t319 = t50 * t318;
-    const real t320 = t317 - t319;
-    const real t321 = B[0] * t320;
-    const real t322 = t17 * t193;
-    const real t323 = 0.5 * t322;
-    const real t324 = t9 * t247;
-    const real t325 = 0.5 * t324;
-    const real t326 = t4 * t223;
-    const real t327 = 0.5 * t326;
-    const real t328 = t325 - t327;
-    const real t329 = t323 + t328;
-    const real t330 = q[0] * t270;
-    const real t331 = 0.5 * t330;
-    const real t332 = t329 - t331;
-    const real t333 = t19 * t296;
-    const real t334 = t50 * t333;
-    const real t335 = t332 - t334;
-    const real t336 = t18 * t296;
-    const real t337 = t50 * t336;
-    const real t338 = t335 - t337;
-    const real t339 = B[2] * t338;
-    const real t340 = t321 + t339;
-    const real t341 = t303 + t340;
-    const real t342 = p[4] * u[0];
-    const real t343 = t341 - t342;
-    const real t344 = effort[0] + t343;
-    tau[0] = t344;
-    const real t345 = B[4] * t302;
-    const real t346 = B[3] * t320;
-    const real t347 = B[5] * t338;
-    const real t348 = t346 + t347;
-    const real t349 = t345 + t348;
-    const real t350 = p[5] * u[1];
-    const real t351 = t349 - t350;
-    const real t352 = effort[1] + t351;
-    tau[1] = t352;
-    const real t353 = B[7] * t302;
-    const real t354 = B[6] * t320;
-    const real t355 = B[8] * t338;
-    const real t356 = t354 + t355;
-    const real t357 = t353 + t356;
-    const real t358 = p[6] * u[2];
-    const real t359 = t357 - t358;
-    const real t360 = effort[2] + t359;
-    tau[2] = t360;
-    const real t361 = t100 * t296;
-    const real t362 = t67 * t107;
-    const real t363 = t81 * t179;
-    const real t364 = t362 + t363;
-    const real t365 = t361 + t364;
-    const real t366 = 0.5 * t365;
-    V[0] = t366;
-    const real t367 = u[2] * effort[2];
-    const real t368 = u[0] * effort[0];
-    const real t369 = u[1] * effort[1];
-    const real t370 = t368 + t369;
-    const real t371 = t367 + t370;
-    const real t372 = u[0] * u[0];
-    const real t373 = p[4] * t372;
-    const real t374 = t371 - t373;
-    const real t375 = u[1] * u[1];
-    const real t376 = p[5] * t375;
-    const real t377 = t374 - t376;
-    const real t378 = u[2] * u[2];
-    const real t379 = p[6] * t378;
-    const real t380 = t377 - t379;
-    P[0] = t380;
-    twist[0] = t99;
-    return 0;
+  real t4 = q[3] * B[7] + (q[1] * B[1] + q[2] * B[4]);
+  real t9 = q[3] * B[6] + (q[1] * B[0] + q[2] * B[3]);
+  real t10 = t9 * t9;
+  real t11 = t4 * t4;
+  real t12 = t10 + t11;
+  real t17 = q[3] * B[8] + (q[1] * B[2] + q[2] * B[5]);
+  real t18 = t17 * t17;
+  real t19 = q[0] * q[0];
+  real t22 = t18 + (t11 + (t10 + t19));
+  real t23 = 1.0 / t22;
+  real t24 = t12 * t23;
+  real t25 = t24 < ((real)1 / (real)100);
+  real t27 = 1.0 / (t22 * 5120.0);
+  real t48 = 2.0 + t23 * (t12 * (((real)1 / (real)3) + t23 * (t12 * (((real)3 / (real)20) + t23 *
+    (t12 * (((real)5 / (real)56) + t23 * (t12 * (((real)35 / (real)576) + t23 * (t12 * (((real)63 /
+    (real)1408) + t23 * (t12 * (((real)231 / (real)6656) + t12 * (143.0 * t27)))))))))))));
+  real t49 = t19 + t18;
+  real t50 = 1.0 / t49;
+  real t53 = atan(sqrt(t12 * t50));
+  real t55 = 1.0 / sqrt(t24);
+  real t57 = t53 * (2.0 * t55);
+  real t58 = t25 != 0 ? t48 : t57;
+  real t59 = q[0] * t9;
+  real t60 = t4 * t17;
+  real t61 = t59 - t60;
+  real t62 = t58 * t61;
+  real t63 = sqrt(t49);
+  real t64 = sqrt(t22);
+  real t66 = 1.0 / (t63 * t64);
+  real t67 = t62 * t66;
+  real t68 = p[0] * B[0];
+  real t70 = p[1] * B[3];
+  real t73 = p[2] * B[6];
+  real t77 = q[0] * t4;
+  real t78 = t9 * t17;
+  real t79 = t77 + t78;
+  real t80 = t58 * t79;
+  real t81 = t66 * t80;
+  real t90 = 2.0 * (atan2(t17, q[0]));
+  real t99 = t90 + 4.0 * (MSTMM_PI * floor(0.5 + (twist_ref[0] - t90) * (1.0 / (MSTMM_PI * 4.0))));
+  real t100 = t99 - p[3];
+  real t107 = t67 * (B[0] * t68 + B[3] * t70 + B[6] * t73) + t81 * (B[1] * t68 + B[4] * t70 + B[7] *
+    t73) + t100 * (B[2] * t68 + B[5] * t70 + B[8] * t73);
+  real t109 = t66 * (t9 * t58);
+  real t110 = q[0] * t62;
+  real t113 = 1.0 / (t64 * (pow(t49, 1.5)));
+  real t118 = 1.0 / (t63 * (pow(t22, 1.5)));
+  real t138 = ((real)1 / (real)3) + t23 * (t12 * (((real)3 / (real)10) + t23 * (t12 * (((real)15 /
+    (real)56) + t23 * (t12 * (((real)35 / (real)144) + t23 * (t12 * (((real)315 / (real)1408) + t23
+    * (t12 * (((real)693 / (real)3328) + t12 * (t27 * 1001.0)))))))))));
+  real t139 = 1.0 - t24;
+  real t145 = t22 * ((pow(t139, (-0.5))) - t53 * t55) * (1.0 / t12);
+  real t146 = t25 != 0 ? t138 : t145;
+  real t148 = t146 * (t12 * t61);
+  real t153 = 2.0 * (1.0 / (t63 * (pow(t22, 2.5))));
+  real t157 = p[0] * B[1];
+  real t159 = p[1] * B[4];
+  real t162 = p[2] * B[7];
+  real t179 = t67 * (B[0] * t157 + B[3] * t159 + B[6] * t162) + t81 * (B[1] * t157 + B[4] * t159 +
+    B[7] * t162) + t100 * (B[2] * t157 + B[5] * t159 + B[8] * t162);
+  real t181 = t66 * (t4 * t58);
+  real t182 = q[0] * t80;
+  real t188 = t146 * (t12 * t79);
+  real t193 = t107 * (t109 - t110 * t113 - t118 * t110 - q[0] * t148 * t153) + t179 * (t181 - t113 *
+    t182 - t118 * t182 - t153 * (q[0] * t188));
+  real t197 = t66 * (q[0] * t58);
+  real t201 = 1.0 / (t22 * t22);
+  real t204 = 2.0 * (t9 * t23 - t9 * t12 * t201);
+  real t214 = t66 * (t17 * t58);
+  real t223 = t107 * (t197 + t66 * (t146 * (t61 * t204)) - t9 * t62 * t118) + t179 * (t214 + t66 *
+    (t146 * (t79 * t204)) - t118 * (t9 * t80));
+  real t230 = 2.0 * (t4 * t23 - t201 * (t4 * t12));
+  real t247 = t107 * (t66 * (t146 * (t61 * t230)) - t214 - t118 * (t4 * t62)) + t179 * (t197 + t66 *
+    (t146 * (t79 * t230)) - t118 * (t4 * t80));
+  real t252 = t17 * t80;
+  real t263 = t17 * t62;
+  real t270 = t179 * (t109 - t113 * t252 - t118 * t252 - t153 * (t17 * t188)) - t107 * (t153 * (t17
+    * t148) + (t118 * t263 + (t181 + t113 * t263)));
+  real t274 = p[0] * B[2];
+  real t276 = p[1] * B[5];
+  real t279 = p[2] * B[8];
+  real t296 = t67 * (B[0] * t274 + B[3] * t276 + B[6] * t279) + t81 * (B[1] * t274 + B[4] * t276 +
+    B[7] * t279) + t100 * (B[2] * t274 + B[5] * t276 + B[8] * t279);
+  real t302 = 0.5 * (t4 * t193) + (0.5 * (t17 * t223) - 0.5 * (q[0] * t247)) - 0.5 * (t9 * t270) -
+    t50 * (t59 * t296) - t50 * (t60 * t296);
+  real t320 = t50 * (t77 * t296) + (0.5 * (t4 * t270) + (0.5 * (t9 * t193) - (0.5 * (q[0] * t223) +
+    0.5 * (t17 * t247)))) - t50 * (t78 * t296);
+  real t338 = 0.5 * (t17 * t193) + (0.5 * (t9 * t247) - 0.5 * (t4 * t223)) - 0.5 * (q[0] * t270) -
+    t50 * (t19 * t296) - t50 * (t18 * t296);
+  tau[0] = effort[0] + (B[1] * t302 + (B[0] * t320 + B[2] * t338) - p[4] * u[0]);
+  tau[1] = effort[1] + (B[4] * t302 + (B[3] * t320 + B[5] * t338) - p[5] * u[1]);
+  tau[2] = effort[2] + (B[7] * t302 + (B[6] * t320 + B[8] * t338) - p[6] * u[2]);
+  V[0] = 0.5 * (t100 * t296 + (t67 * t107 + t81 * t179));
+  P[0] = u[2] * effort[2] + (u[0] * effort[0] + u[1] * effort[1]) - p[4] * (u[0] * u[0]) - p[5] *
+    (u[1] * u[1]) - p[6] * (u[2] * u[2]);
+  twist[0] = t99;
+  return 0;
 }
 
-static int mstmm_sweep_laws_rotation_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_rotation(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_laws_rotation_inputs[] = {
-    {"p", 7, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "rad/s", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"effort", 3, "N*m", 0, 0},
-    {"twist_ref", 1, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_rotation_outputs[] = {
-    {"tau", 3, "N*m", 0, 0},
-    {"V", 1, "J", 0, 0},
-    {"P", 1, "W", 0, 0},
-    {"twist", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_rotation, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1],
+  out[2], out[3]))
 
 /* six-direction law of a free or elastic hinge
  * source: Rui, Wang, Zhang, ch. 5, section 5.8 (elastic efforts of the acceleration hinge)
@@ -619,528 +197,145 @@ static const mstmm_port mstmm_sweep_laws_rotation_outputs[] = {
  * out P[1] (W) power of dampers, friction and given efforts
  * out twist[1] (rad) unwrapped twist
  */
-int mstmm_sweep_laws_six(const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict B, const real *restrict effort, const real *restrict twist_ref,
-    real *restrict tau, real *restrict V, real *restrict P, real *restrict twist)
+int mstmm_sweep_laws_six(in_t p, in_t q, in_t u, in_t B, in_t effort, in_t twist_ref, out_t tau,
+    out_t V, out_t P, out_t twist)
 {
-    const real t0 = q[6] * q[6];
-    const real t1 = q[5] * q[5];
-    const real t2 = q[3] * q[3];
-    const real t3 = q[4] * q[4];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = 1.0 / t6;
-    const real t8 = 2.0 * t7;
-    const real t9 = q[4] * q[6];
-    const real t10 = q[3] * q[5];
-    const real t11 = t9 - t10;
-    const real t12 = t8 * t11;
-    const real t13 = q[2] - p[5];
-    const real t14 = p[2] * t13;
-    const real t15 = t1 + t3;
-    const real t16 = t8 * t15;
-    const real t17 = 1.0 - t16;
-    const real t18 = u[2] * t17;
-    const real t19 = u[0] * t12;
-    const real t20 = q[3] * q[4];
-    const real t21 = q[5] * q[6];
-    const real t22 = t20 + t21;
-    const real t23 = t8 * t22;
-    const real t24 = u[1] * t23;
-    const real t25 = t19 + t24;
-    const real t26 = t18 + t25;
-    const real t27 = p[8] * t26;
-    const real t28 = t14 + t27;
-    const real t29 = t12 * t28;
-    const real t30 = t1 + t0;
-    const real t31 = t30 * t8;
-    const real t32 = 1.0 - t31;
-    const real t33 = q[0] - p[3];
-    const real t34 = p[0] * t33;
-    const real t35 = t10 + t9;
-    const real t36 = t8 * t35;
-    const real t37 = u[2] * t36;
-    const real t38 = u[0] * t32;
-    const real t39 = q[4] * q[5];
-    const real t40 = q[3] * q[6];
-    const real t41 = t39 - t40;
-    const real t42 = t8 * t41;
-    const real t43 = u[1] * t42;
-    const real t44 = t38 + t43;
-    const real t45 = t37 + t44;
-    const real t46 = p[6] * t45;
-    const real t47 = t34 + t46;
-    const real t48 = t32 * t47;
-    const real t49 = t40 + t39;
-    const real t50 = t8 * t49;
-    const real t51 = q[1] - p[4];
-    const real t52 = p[1] * t51;
-    const real t53 = t21 - t20;
-    const real t54 = t8 * t53;
-    const real t55 = u[2] * t54;
-    const real t56 = u[0] * t50;
-    const real t57 = t0 + t3;
-    const real t58 = t8 * t57;
-    const real t59 = 1.0 - t58;
-    const real t60 = u[1] * t59;
-    const real t61 = t56 + t60;
-    const real t62 = t55 + t61;
-    const real t63 = p[7] * t62;
-    const real t64 = t52 + t63;
-    const real t65 = t50 * t64;
-    const real t66 = t48 + t65;
-    const real t67 = t29 + t66;
-    const real t68 = effort[0] - t67;
-    tau[0] = t68;
-    const real t69 = t23 * t28;
-    const real t70 = t42 * t47;
-    const real t71 = t59 * t64;
-    const real t72 = t70 + t71;
-    const real t73 = t69 + t72;
-    const real t74 = effort[1] - t73;
-    tau[1] = t74;
-    const real t75 = t17 * t28;
-    const real t76 = t36 * t47;
-    const real t77 = t54 * t64;
-    const real t78 = t76 + t77;
-    const real t79 = t75 + t78;
-    const real t80 = effort[2] - t79;
-    tau[2] = t80;
-    const real t81 = q[6] * B[7];
-    const real t82 = q[4] * B[1];
-    const real t83 = q[5] * B[4];
-    const real t84 = t82 + t83;
-    const real t85 = t81 + t84;
-    const real t86 = q[6] * B[6];
-    const real t87 = q[4] * B[0];
-    const real t88 = q[5] * B[3];
-    const real t89 = t87 + t88;
-    const real t90 = t86 + t89;
-    const real t91 = t90 * t90;
-    const real t92 = t85 * t85;
-    const real t93 = t91 + t92;
-    const real t94 = q[6] * B[8];
-    const real t95 = q[4] * B[2];
-    const real t96 = q[5] * B[5];
-    const real t97 = t95 + t96;
-    const real t98 = t94 + t97;
-    const real t99 = t98 * t98;
-    const real t100 = t91 + t2;
-    const real t101 = t92 + t100;
-    const real t102 = t99 + t101;
-    const real t103 = 1.0 / t102;
-    const real t104 = t93 * t103;
-    const real t105 = t104 < ((real)1 / (real)100);
-    const real t106 = t102 * 5120.0;
-    const real t107 = 1.0 / t106;
-    const real t108 = 143.0 * t107;
-    const real t109 = t93 * t108;
-    const real t110 = ((real)231 / (real)6656) + t109;
-    const real t111 = t93 * t110;
-    const real t112 = t103 * t111;
-    const real t113 = ((real)63 / (real)1408) + t112;
-    const real t114 = t93 * t113;
-    const real t115 = t103 * t114;
-    const real t116 = ((real)35 / (real)576) + t115;
-    const real t117 = t93 * t116;
-    const real t118 = t103 * t117;
-    const real t119 = ((real)5 / (real)56) + t118;
-    const real t120 = t93 * t119;
-    const real t121 = t103 * t120;
-    const real t122 = ((real)3 / (real)20) + t121;
-    const real t123 = t93 * t122;
-    const real t124 = t103 * t123;
-    const real t125 = ((real)1 / (real)3) + t124;
-    const real t126 = t93 * t125;
-    const real t127 = t103 * t126;
-    const real t128 = 2.0 + t127;
-    const real t129 = t2 + t99;
-    const real t130 = 1.0 / t129;
-    const real t131 = t93 * t130;
-    const real t132 = sqrt(t131);
-    const real t133 = atan(t132);
-    const real t134 = sqrt(t104);
-    const real t135 = 1.0 / t134;
-    const real t136 = 2.0 * t135;
-    const real t137 = t133 * t136;
-    const real t138 = t105 != 0 ? t128 : t137;
-    const real t139 = q[3] * t90;
-    const real t140 = t85 * t98;
-    const real t141 = t139 - t140;
-    const real t142 = t138 * t141;
-    const real t143 = sqrt(t129);
-    const real t144 = sqrt(t102);
-    const real t145 = t143 * t144;
-    const real t146 = 1.0 / t145;
-    const real t147 = t142 * t146;
-    const real t148 = p[9] * B[0];
-    const real t149 = B[0] * t148;
-    const real t150 = p[10] * B[3];
-    const real t151 = B[3] * t150;
-    const real t152 = t149 + t151;
-    const real t153 = p[11] * B[6];
-    const real t154 = B[6] * t153;
-    const real t155 = t152 + t154;
-    const real t156 = t147 * t155;
-    const real t157 = q[3] * t85;
-    const real t158 = t90 * t98;
-    const real t159 = t157 + t158;
-    const real t160 = t138 * t159;
-    const real t161 = t146 * t160;
-    const real t162 = B[1] * t148;
-    const real t163 = B[4] * t150;
-    const real t164 = t162 + t163;
-    const real t165 = B[7] * t153;
-    const real t166 = t164 + t165;
-    const real t167 = t161 * t166;
-    const real t168 = t156 + t167;
-    const real t169 = atan2(t98, q[3]);
-    const real t170 = 2.0 * t169;
-    const real t171 = twist_ref[0] - t170;
-    const real t172 = MSTMM_PI * 4.0;
-    const real t173 = 1.0 / t172;
-    const real t174 = t171 * t173;
-    const real t175 = 0.5 + t174;
-    const real t176 = floor(t175);
-    const real t177 = MSTMM_PI * t176;
-    const real t178 = 4.0 * t177;
-    const real t179 = t170 + t178;
-    const real t180 = t179 - p[12];
-    const real t181 = B[2] * t148;
-    const real t182 = B[5] * t150;
-    const real t183 = t181 + t182;
-    const real t184 = B[8] * t153;
-    const real t185 = t183 + t184;
-    const real t186 = t180 * t185;
-    const real t187 = t168 + t186;
-    const real t188 = t90 * t138;
-    const real t189 = t146 * t188;
-    const real t190 = q[3] * t142;
-    const real t191 = pow(t129, 1.5);
-    const real t192 = t144 * t191;
-    const real t193 = 1.0 / t192;
-    const real t194 = t190 * t193;
-    const real t195 = t189 - t194;
-    const real t196 = pow(t102, 1.5);
-    const real t197 = t143 * t196;
-    const real t198 = 1.0 / t197;
-    const real t199 = t198 * t190;
-    const real t200 = t195 - t199;
-    const real t201 = t107 * 1001.0;
-    const real t202 = t93 * t201;
-    const real t203 = ((real)693 / (real)3328) + t202;
-    const real t204 = t93 * t203;
-    const real t205 = t103 * t204;
-    const real t206 = ((real)315 / (real)1408) + t205;
-    const real t207 = t93 * t206;
-    const real t208 = t103 * t207;
-    const real t209 = ((real)35 / (real)144) + t208;
-    const real t210 = t93 * t209;
-    const real t211 = t103 * t210;
-    const real t212 = ((real)15 / (real)56) + t211;
-    const real t213 = t93 * t212;
-    const real t214 = t103 * t213;
-    const real t215 = ((real)3 / (real)10) + t214;
-    const real t216 = t93 * t215;
-    const real t217 = t103 * t216;
-    const real t218 = ((real)1 / (real)3) + t217;
-    const real t219 = 1.0 - t104;
-    const real t220 = pow(t219, (-0.5));
-    const real t221 = t133 * t135;
-    const real t222 = t220 - t221;
-    const real t223 = t102 * t222;
-    const real t224 = 1.0 / t93;
-    const real t225 = t223 * t224;
-    const real t226 = t105 != 0 ? t218 : t225;
-    const real t227 = t93 * t141;
-    const real t228 = t226 * t227;
-    const real t229 = q[3] * t228;
-    const real t230 = pow(t102, 2.5);
-    const real t231 = t143 * t230;
-    const real t232 = 1.0 / t231;
-    const real t233 = 2.0 * t232;
-    const real t234 = t229 * t233;
-    const real t235 = t200 - t234;
-    const real t236 = t187 * t235;
-    const real t237 = p[9] * B[1];
-    const real t238 = B[0] * t237;
-    const real t239 = p[10] * B[4];
-    const real t240 = B[3] * t239;
-    const real t241 = t238 + t240;
-    const real t242 = p[11] * B[7];
-    const real t243 = B[6] * t242;
-    const real t244 = t241 + t243;
-    const real t245 = t147 * t244;
-    const real t246 = B[1] * t237;
-    const real t247 = B[4] * t239;
-    const real t248 = t246 + t247;
-    const real t249 = B[7] * t242;
-    const real t250 = t248 + t249;
-    const real t251 = t161 * t250;
-    const real t252 = t245 + t251;
-    const real t253 = B[2] * t237;
-    const real t254 = B[5] * t239;
-    const real t255 = t253 + t254;
-    const real t256 = B[8] * t242;
-    const real t257 = t255 + t256;
-    const real t258 = t180 * t257;
-    const real t259 = t252 + t258;
-    const real t260 = t85 * t138;
-    const real t261 = t146 * t260;
-    const real t262 = q[3] * t160;
-    const real t263 = t193 * t262;
-    const real t264 = t261 - t263;
-    const real t265 = t198 * t262;
-    const real t266 = t264 - t265;
-    const real t267 = t93 * t159;
-    const real t268 = t226 * t267;
-    const real t269 = q[3] * t268;
-    const real t270 = t233 * t269;
-    const real t271 = t266 - t270;
-    const real t272 = t259 * t271;
-    const real t273 = t236 + t272;
-    const real t274 = t85 * t273;
-    const real t275 = 0.5 * t274;
-    const real t276 = q[3] * t138;
-    const real t277 = t146 * t276;
-    const real t278 = t90 * t103;
-    const real t279 = t90 * t93;
-    const real t280 = t102 * t102;
-    const real t281 = 1.0 / t280;
-    const real t282 = t279 * t281;
-    const real t283 = t278 - t282;
-    const real t284 = 2.0 * t283;
-    const real t285 = t141 * t284;
-    const real t286 = t226 * t285;
-    const real t287 = t146 * t286;
-    const real t288 = t277 + t287;
-    const real t289 = t90 * t142;
-    const real t290 = t289 * t198;
-    const real t291 = t288 - t290;
-    const real t292 = t187 * t291;
-    const real t293 = t98 * t138;
-    const real t294 = t146 * t293;
-    const real t295 = t159 * t284;
-    const real t296 = t226 * t295;
-    const real t297 = t146 * t296;
-    const real t298 = t294 + t297;
-    const real t299 = t90 * t160;
-    const real t300 = t198 * t299;
-    const real t301 = t298 - t300;
-    const real t302 = t259 * t301;
-    const real t303 = t292 + t302;
-    const real t304 = t98 * t303;
-    const real t305 = 0.5 * t304;
-    const real t306 = t85 * t103;
-    const real t307 = t85 * t93;
-    const real t308 = t281 * t307;
-    const real t309 = t306 - t308;
-    const real t310 = 2.0 * t309;
-    const real t311 = t141 * t310;
-    const real t312 = t226 * t311;
-    const real t313 = t146 * t312;
-    const real t314 = t313 - t294;
-    const real t315 = t85 * t142;
-    const real t316 = t198 * t315;
-    const real t317 = t314 - t316;
-    const real t318 = t187 * t317;
-    const real t319 = t159 * t310;
-    const real t320 = t226 * t319;
-    const real t321 = t146 * t320;
-    const real t322 = t277 + t321;
-    const real t323 = t85 * t160;
-    const real t324 = t198 * t323;
-    const real t325 = t322 - t324;
-    const real t326 = t259 * t325;
-    const real t327 = t318 + t326;
-    const real t328 = q[3] * t327;
-    const real t329 = 0.5 * t328;
-    const real t330 = t305 - t329;
-    const real t331 = t275 + t330;
-    const real t332 = t98 * t160;
-    const real t333 = t193 * t332;
-    const real t334 = t189 - t333;
-    const real t335 = t198 * t332;
-    const real t336 = t334 - t335;
-    const real t337 = t98 * t268;
-    const real t338 = t233 * t337;
-    const real t339 = t336 - t338;
-    const real t340 = t259 * t339;
-    const real t341 = t98 * t228;
-    const real t342 = t233 * t341;
-    const real t343 = t98 * t142;
-    const real t344 = t198 * t343;
-    const real t345 = t193 * t343;
-    const real t346 = t261 + t345;
-    const real t347 = t344 + t346;
-    const real t348 = t342 + t347;
-    const real t349 = t187 * t348;
-    const real t350 = t340 - t349;
-    const real t351 = t90 * t350;
-    const real t352 = 0.5 * t351;
-    const real t353 = t331 - t352;
-    const real t354 = p[9] * B[2];
-    const real t355 = B[0] * t354;
-    const real t356 = p[10] * B[5];
-    const real t357 = B[3] * t356;
-    const real t358 = t355 + t357;
-    const real t359 = p[11] * B[8];
-    const real t360 = B[6] * t359;
-    const real t361 = t358 + t360;
-    const real t362 = t147 * t361;
-    const real t363 = B[1] * t354;
-    const real t364 = B[4] * t356;
-    const real t365 = t363 + t364;
-    const real t366 = B[7] * t359;
-    const real t367 = t365 + t366;
-    const real t368 = t161 * t367;
-    const real t369 = t362 + t368;
-    const real t370 = B[2] * t354;
-    const real t371 = B[5] * t356;
-    const real t372 = t370 + t371;
-    const real t373 = B[8] * t359;
-    const real t374 = t372 + t373;
-    const real t375 = t180 * t374;
-    const real t376 = t369 + t375;
-    const real t377 = t139 * t376;
-    const real t378 = t130 * t377;
-    const real t379 = t353 - t378;
-    const real t380 = t140 * t376;
-    const real t381 = t130 * t380;
-    const real t382 = t379 - t381;
-    const real t383 = B[1] * t382;
-    const real t384 = t157 * t376;
-    const real t385 = t130 * t384;
-    const real t386 = t85 * t350;
-    const real t387 = 0.5 * t386;
-    const real t388 = t90 * t273;
-    const real t389 = 0.5 * t388;
-    const real t390 = q[3] * t303;
-    const real t391 = 0.5 * t390;
-    const real t392 = t98 * t327;
-    const real t393 = 0.5 * t392;
-    const real t394 = t391 + t393;
-    const real t395 = t389 - t394;
-    const real t396 = t387 + t395;
-    const real t397 = t385 + t396;
-    const real t398 = t158 * t376;
-    const real t399 = t130 * t398;
-    const real t400 = t397 - t399;
-    const real t401 = B[0] * t400;
-    const real t402 = t98 * t273;
-    const real t403 = 0.5 * t402;
-    const real t404 = t90 * t327;
-    const real t405 = 0.5 * t404;
-    const real t406 = t85 * t303;
-    const real t407 = 0.5 * t406;
-    const real t408 = t405 - t407;
-    const real t409 = t403 + t408;
-    const real t410 = q[3] * t350;
-    const real t411 = 0.5 * t410;
-    const real t412 = t409 - t411;
-    const real t413 = t2 * t376;
-    const real t414 = t130 * t413;
-    const real t415 = t412 - t414;
-    const real t416 = t99 * t376;
-    const real t417 = t130 * t416;
-    const real t418 = t415 - t417;
-    const real t419 = B[2] * t418;
-    const real t420 = t401 + t419;
-    const real t421 = t383 + t420;
-    const real t422 = p[13] * u[3];
-    const real t423 = t421 - t422;
-    const real t424 = effort[3] + t423;
-    tau[3] = t424;
-    const real t425 = B[4] * t382;
-    const real t426 = B[3] * t400;
-    const real t427 = B[5] * t418;
-    const real t428 = t426 + t427;
-    const real t429 = t425 + t428;
-    const real t430 = p[14] * u[4];
-    const real t431 = t429 - t430;
-    const real t432 = effort[4] + t431;
-    tau[4] = t432;
-    const real t433 = B[7] * t382;
-    const real t434 = B[6] * t400;
-    const real t435 = B[8] * t418;
-    const real t436 = t434 + t435;
-    const real t437 = t433 + t436;
-    const real t438 = p[15] * u[5];
-    const real t439 = t437 - t438;
-    const real t440 = effort[5] + t439;
-    tau[5] = t440;
-    const real t441 = t180 * t376;
-    const real t442 = t161 * t259;
-    const real t443 = t147 * t187;
-    const real t444 = t13 * t13;
-    const real t445 = p[2] * t444;
-    const real t446 = t33 * t33;
-    const real t447 = p[0] * t446;
-    const real t448 = t51 * t51;
-    const real t449 = p[1] * t448;
-    const real t450 = t447 + t449;
-    const real t451 = t445 + t450;
-    const real t452 = t443 + t451;
-    const real t453 = t442 + t452;
-    const real t454 = t441 + t453;
-    const real t455 = 0.5 * t454;
-    V[0] = t455;
-    const real t456 = u[5] * effort[5];
-    const real t457 = u[4] * effort[4];
-    const real t458 = u[3] * effort[3];
-    const real t459 = u[2] * effort[2];
-    const real t460 = u[0] * effort[0];
-    const real t461 = u[1] * effort[1];
-    const real t462 = t460 + t461;
-    const real t463 = t459 + t462;
-    const real t464 = t458 + t463;
-    const real t465 = t457 + t464;
-    const real t466 = t456 + t465;
-    const real t467 = t45 * t45;
-    const real t468 = p[6] * t467;
-    const real t469 = t466 - t468;
-    const real t470 = t62 * t62;
-    const real t471 = p[7] * t470;
-    const real t472 = t469 - t471;
-    const real t473 = t26 * t26;
-    const real t474 = p[8] * t473;
-    const real t475 = t472 - t474;
-    const real t476 = u[3] * u[3];
-    const real t477 = p[13] * t476;
-    const real t478 = t475 - t477;
-    const real t479 = u[4] * u[4];
-    const real t480 = p[14] * t479;
-    const real t481 = t478 - t480;
-    const real t482 = u[5] * u[5];
-    const real t483 = p[15] * t482;
-    const real t484 = t481 - t483;
-    P[0] = t484;
-    twist[0] = t179;
-    return 0;
+  real t0 = q[6] * q[6];
+  real t1 = q[5] * q[5];
+  real t2 = q[3] * q[3];
+  real t3 = q[4] * q[4];
+  real t8 = 2.0 * (1.0 / (t0 + (t1 + (t2 + t3))));
+  real t9 = q[4] * q[6];
+  real t10 = q[3] * q[5];
+  real t12 = t8 * (t9 - t10);
+  real t13 = q[2] - p[5];
+  real t17 = 1.0 - t8 * (t1 + t3);
+  real t20 = q[3] * q[4];
+  real t21 = q[5] * q[6];
+  real t23 = t8 * (t20 + t21);
+  real t26 = u[2] * t17 + (u[0] * t12 + u[1] * t23);
+  real t28 = p[2] * t13 + p[8] * t26;
+  real t32 = 1.0 - (t1 + t0) * t8;
+  real t33 = q[0] - p[3];
+  real t36 = t8 * (t10 + t9);
+  real t39 = q[4] * q[5];
+  real t40 = q[3] * q[6];
+  real t42 = t8 * (t39 - t40);
+  real t45 = u[2] * t36 + (u[0] * t32 + u[1] * t42);
+  real t47 = p[0] * t33 + p[6] * t45;
+  real t50 = t8 * (t40 + t39);
+  real t51 = q[1] - p[4];
+  real t54 = t8 * (t21 - t20);
+  real t59 = 1.0 - t8 * (t0 + t3);
+  real t62 = u[2] * t54 + (u[0] * t50 + u[1] * t59);
+  real t64 = p[1] * t51 + p[7] * t62;
+  tau[0] = effort[0] - (t12 * t28 + (t32 * t47 + t50 * t64));
+  tau[1] = effort[1] - (t23 * t28 + (t42 * t47 + t59 * t64));
+  tau[2] = effort[2] - (t17 * t28 + (t36 * t47 + t54 * t64));
+  real t85 = q[6] * B[7] + (q[4] * B[1] + q[5] * B[4]);
+  real t90 = q[6] * B[6] + (q[4] * B[0] + q[5] * B[3]);
+  real t91 = t90 * t90;
+  real t92 = t85 * t85;
+  real t93 = t91 + t92;
+  real t98 = q[6] * B[8] + (q[4] * B[2] + q[5] * B[5]);
+  real t99 = t98 * t98;
+  real t102 = t99 + (t92 + (t91 + t2));
+  real t103 = 1.0 / t102;
+  real t104 = t93 * t103;
+  real t105 = t104 < ((real)1 / (real)100);
+  real t107 = 1.0 / (t102 * 5120.0);
+  real t128 = 2.0 + t103 * (t93 * (((real)1 / (real)3) + t103 * (t93 * (((real)3 / (real)20) + t103
+    * (t93 * (((real)5 / (real)56) + t103 * (t93 * (((real)35 / (real)576) + t103 * (t93 *
+    (((real)63 / (real)1408) + t103 * (t93 * (((real)231 / (real)6656) + t93 * (143.0 *
+    t107)))))))))))));
+  real t129 = t2 + t99;
+  real t130 = 1.0 / t129;
+  real t133 = atan(sqrt(t93 * t130));
+  real t135 = 1.0 / sqrt(t104);
+  real t137 = t133 * (2.0 * t135);
+  real t138 = t105 != 0 ? t128 : t137;
+  real t139 = q[3] * t90;
+  real t140 = t85 * t98;
+  real t141 = t139 - t140;
+  real t142 = t138 * t141;
+  real t143 = sqrt(t129);
+  real t144 = sqrt(t102);
+  real t146 = 1.0 / (t143 * t144);
+  real t147 = t142 * t146;
+  real t148 = p[9] * B[0];
+  real t150 = p[10] * B[3];
+  real t153 = p[11] * B[6];
+  real t157 = q[3] * t85;
+  real t158 = t90 * t98;
+  real t159 = t157 + t158;
+  real t160 = t138 * t159;
+  real t161 = t146 * t160;
+  real t170 = 2.0 * (atan2(t98, q[3]));
+  real t179 = t170 + 4.0 * (MSTMM_PI * floor(0.5 + (twist_ref[0] - t170) * (1.0 / (MSTMM_PI *
+    4.0))));
+  real t180 = t179 - p[12];
+  real t187 = t147 * (B[0] * t148 + B[3] * t150 + B[6] * t153) + t161 * (B[1] * t148 + B[4] * t150 +
+    B[7] * t153) + t180 * (B[2] * t148 + B[5] * t150 + B[8] * t153);
+  real t189 = t146 * (t90 * t138);
+  real t190 = q[3] * t142;
+  real t193 = 1.0 / (t144 * (pow(t129, 1.5)));
+  real t198 = 1.0 / (t143 * (pow(t102, 1.5)));
+  real t218 = ((real)1 / (real)3) + t103 * (t93 * (((real)3 / (real)10) + t103 * (t93 * (((real)15 /
+    (real)56) + t103 * (t93 * (((real)35 / (real)144) + t103 * (t93 * (((real)315 / (real)1408) +
+    t103 * (t93 * (((real)693 / (real)3328) + t93 * (t107 * 1001.0)))))))))));
+  real t219 = 1.0 - t104;
+  real t225 = t102 * ((pow(t219, (-0.5))) - t133 * t135) * (1.0 / t93);
+  real t226 = t105 != 0 ? t218 : t225;
+  real t228 = t226 * (t93 * t141);
+  real t233 = 2.0 * (1.0 / (t143 * (pow(t102, 2.5))));
+  real t237 = p[9] * B[1];
+  real t239 = p[10] * B[4];
+  real t242 = p[11] * B[7];
+  real t259 = t147 * (B[0] * t237 + B[3] * t239 + B[6] * t242) + t161 * (B[1] * t237 + B[4] * t239 +
+    B[7] * t242) + t180 * (B[2] * t237 + B[5] * t239 + B[8] * t242);
+  real t261 = t146 * (t85 * t138);
+  real t262 = q[3] * t160;
+  real t268 = t226 * (t93 * t159);
+  real t273 = t187 * (t189 - t190 * t193 - t198 * t190 - q[3] * t228 * t233) + t259 * (t261 - t193 *
+    t262 - t198 * t262 - t233 * (q[3] * t268));
+  real t277 = t146 * (q[3] * t138);
+  real t281 = 1.0 / (t102 * t102);
+  real t284 = 2.0 * (t90 * t103 - t90 * t93 * t281);
+  real t294 = t146 * (t98 * t138);
+  real t303 = t187 * (t277 + t146 * (t226 * (t141 * t284)) - t90 * t142 * t198) + t259 * (t294 +
+    t146 * (t226 * (t159 * t284)) - t198 * (t90 * t160));
+  real t310 = 2.0 * (t85 * t103 - t281 * (t85 * t93));
+  real t327 = t187 * (t146 * (t226 * (t141 * t310)) - t294 - t198 * (t85 * t142)) + t259 * (t277 +
+    t146 * (t226 * (t159 * t310)) - t198 * (t85 * t160));
+  real t332 = t98 * t160;
+  real t343 = t98 * t142;
+  real t350 = t259 * (t189 - t193 * t332 - t198 * t332 - t233 * (t98 * t268)) - t187 * (t233 * (t98
+    * t228) + (t198 * t343 + (t261 + t193 * t343)));
+  real t354 = p[9] * B[2];
+  real t356 = p[10] * B[5];
+  real t359 = p[11] * B[8];
+  real t376 = t147 * (B[0] * t354 + B[3] * t356 + B[6] * t359) + t161 * (B[1] * t354 + B[4] * t356 +
+    B[7] * t359) + t180 * (B[2] * t354 + B[5] * t356 + B[8] * t359);
+  real t382 = 0.5 * (t85 * t273) + (0.5 * (t98 * t303) - 0.5 * (q[3] * t327)) - 0.5 * (t90 * t350) -
+    t130 * (t139 * t376) - t130 * (t140 * t376);
+  real t400 = t130 * (t157 * t376) + (0.5 * (t85 * t350) + (0.5 * (t90 * t273) - (0.5 * (q[3] *
+    t303) + 0.5 * (t98 * t327)))) - t130 * (t158 * t376);
+  real t418 = 0.5 * (t98 * t273) + (0.5 * (t90 * t327) - 0.5 * (t85 * t303)) - 0.5 * (q[3] * t350) -
+    t130 * (t2 * t376) - t130 * (t99 * t376);
+  tau[3] = effort[3] + (B[1] * t382 + (B[0] * t400 + B[2] * t418) - p[13] * u[3]);
+  tau[4] = effort[4] + (B[4] * t382 + (B[3] * t400 + B[5] * t418) - p[14] * u[4]);
+  tau[5] = effort[5] + (B[7] * t382 + (B[6] * t400 + B[8] * t418) - p[15] * u[5]);
+  V[0] = 0.5 * (t180 * t376 + (t161 * t259 + (t147 * t187 + (p[2] * (t13 * t13) + (p[0] * (t33 *
+    t33) + p[1] * (t51 * t51))))));
+  P[0] = u[5] * effort[5] + (u[4] * effort[4] + (u[3] * effort[3] + (u[2] * effort[2] + (u[0] *
+    effort[0] + u[1] * effort[1])))) - p[6] * (t45 * t45) - p[7] * (t62 * t62) - p[8] * (t26 * t26)
+    - p[13] * (u[3] * u[3]) - p[14] * (u[4] * u[4]) - p[15] * (u[5] * u[5]);
+  twist[0] = t179;
+  return 0;
 }
 
-static int mstmm_sweep_laws_six_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_six(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_laws_six_inputs[] = {
-    {"p", 16, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"effort", 6, "N, N*m", 0, 0},
-    {"twist_ref", 1, "rad", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_six_outputs[] = {
-    {"tau", 6, "N, N*m", 0, 0},
-    {"V", 1, "J", 0, 0},
-    {"P", 1, "W", 0, 0},
-    {"twist", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_six, (in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2],
+  out[3]))
 
 /* linear and its derivative along a direction
  * in  p[3] stiffness, rest, damping
@@ -1152,40 +347,17 @@ static const mstmm_port mstmm_sweep_laws_six_outputs[] = {
  * in  d_effort[1] (N or N*m) derivative of effort
  * out d_tau[1] (N or N*m) derivative of tau
  */
-int mstmm_sweep_laws_linear_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict effort, const real *restrict d_q,
-    const real *restrict d_u, const real *restrict d_effort, real *restrict d_tau)
+int mstmm_sweep_laws_linear_slope(in_t p, in_t q, in_t u, in_t effort, in_t d_q, in_t d_u,
+    in_t d_effort, out_t d_tau)
 {
-    (void)q;
-    (void)u;
-    (void)effort;
-    const real t0 = p[2] * d_u[0];
-    const real t1 = p[0] * d_q[0];
-    const real t2 = t0 + t1;
-    const real t3 = d_effort[0] - t2;
-    d_tau[0] = t3;
-    return 0;
+  (void)q;
+  (void)u;
+  (void)effort;
+  d_tau[0] = d_effort[0] - (p[2] * d_u[0] + p[0] * d_q[0]);
+  return 0;
 }
 
-static int mstmm_sweep_laws_linear_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_linear_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_laws_linear_slope_inputs[] = {
-    {"p", 3, "", 0, 0},
-    {"q", 1, "m or rad", 0, 0},
-    {"u", 1, "m/s or rad/s", 0, 0},
-    {"effort", 1, "N or N*m", 0, 0},
-    {"d_q", 1, "m or rad", 0, 0},
-    {"d_u", 1, "m/s or rad/s", 0, 0},
-    {"d_effort", 1, "N or N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_linear_slope_outputs[] = {
-    {"d_tau", 1, "N or N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_linear_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]))
 
 /* full and its derivative along a direction
  * in  p[11] stiffness, rest, damping, coulomb, static, stribeck_velocity, regularisation_velocity, lower, upper, limit_stiffness, limit_damping
@@ -1197,91 +369,34 @@ static const mstmm_port mstmm_sweep_laws_linear_slope_outputs[] = {
  * in  d_effort[1] (N or N*m) derivative of effort
  * out d_tau[1] (N or N*m) derivative of tau
  */
-int mstmm_sweep_laws_full_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict effort, const real *restrict d_q,
-    const real *restrict d_u, const real *restrict d_effort, real *restrict d_tau)
+int mstmm_sweep_laws_full_slope(in_t p, in_t q, in_t u, in_t effort, in_t d_q, in_t d_u,
+    in_t d_effort, out_t d_tau)
 {
-    (void)effort;
-    const real t0 = p[7] - q[0];
-    const real t1 = 0.0 < t0;
-    const real t2 = p[9] * d_q[0];
-    const real t3 = -t2;
-    const real t4 = t1 != 0 ? t3 : 0.0;
-    const real t5 = p[0] * d_q[0];
-    const real t6 = p[4] - p[3];
-    const real t7 = u[0] * u[0];
-    const real t8 = p[5] * p[5];
-    const real t9 = 1.0 / t8;
-    const real t10 = t7 * t9;
-    const real t11 = -t10;
-    const real t12 = exp(t11);
-    const real t13 = t6 * t12;
-    const real t14 = p[3] + t13;
-    const real t15 = 1.0 / p[6];
-    const real t16 = t15 * d_u[0];
-    const real t17 = u[0] * t15;
-    const real t18 = tanh(t17);
-    const real t19 = t18 * t18;
-    const real t20 = 1.0 - t19;
-    const real t21 = t16 * t20;
-    const real t22 = t14 * t21;
-    const real t23 = u[0] * d_u[0];
-    const real t24 = t23 + t23;
-    const real t25 = t9 * t24;
-    const real t26 = t12 * t25;
-    const real t27 = t6 * t26;
-    const real t28 = t18 * t27;
-    const real t29 = t22 - t28;
-    const real t30 = t5 + t29;
-    const real t31 = p[2] * d_u[0];
-    const real t32 = t30 + t31;
-    const real t33 = t4 - t32;
-    const real t34 = p[8] - q[0];
-    const real t35 = t34 < 0.0;
-    const real t36 = t35 != 0 ? t3 : 0.0;
-    const real t37 = t33 + t36;
-    const real t38 = p[9] * t0;
-    const real t39 = p[10] * u[0];
-    const real t40 = t38 - t39;
-    const real t41 = 0.0 < t40;
-    const real t42 = p[10] * d_u[0];
-    const real t43 = t2 + t42;
-    const real t44 = -t43;
-    const real t45 = t41 != 0 ? t44 : 0.0;
-    const real t46 = t2 + t45;
-    const real t47 = t1 != 0 ? t46 : 0.0;
-    const real t48 = t37 + t47;
-    const real t49 = t34 * p[9];
-    const real t50 = t39 - t49;
-    const real t51 = 0.0 < t50;
-    const real t52 = t51 != 0 ? t43 : 0.0;
-    const real t53 = t2 - t52;
-    const real t54 = t35 != 0 ? t53 : 0.0;
-    const real t55 = t48 + t54;
-    const real t56 = d_effort[0] + t55;
-    d_tau[0] = t56;
-    return 0;
+  (void)effort;
+  real t0 = p[7] - q[0];
+  real t1 = 0.0 < t0;
+  real t2 = p[9] * d_q[0];
+  real t3 = -t2;
+  real t6 = p[4] - p[3];
+  real t9 = 1.0 / (p[5] * p[5]);
+  real t12 = exp(-(u[0] * u[0] * t9));
+  real t15 = 1.0 / p[6];
+  real t18 = tanh(u[0] * t15);
+  real t23 = u[0] * d_u[0];
+  real t34 = p[8] - q[0];
+  real t35 = t34 < 0.0;
+  real t39 = p[10] * u[0];
+  real t43 = t2 + p[10] * d_u[0];
+  real t44 = -t43;
+  real t46 = t2 + ((0.0 < p[9] * t0 - t39) ? t44 : 0.0);
+  real t53 = t2 - ((0.0 < t39 - t34 * p[9]) ? t43 : 0.0);
+  d_tau[0] = d_effort[0] + ((t1 != 0 ? t3 : 0.0) - (p[0] * d_q[0] + ((p[3] + t6 * t12) * (t15 *
+    d_u[0] * (1.0 - t18 * t18)) - t18 * (t6 * (t12 * (t9 * (t23 + t23))))) + p[2] * d_u[0]) + (t35
+    != 0 ? t3 : 0.0) + (t1 != 0 ? t46 : 0.0) + (t35 != 0 ? t53 : 0.0));
+  return 0;
 }
 
-static int mstmm_sweep_laws_full_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_full_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_laws_full_slope_inputs[] = {
-    {"p", 11, "", 0, 0},
-    {"q", 1, "m or rad", 0, 0},
-    {"u", 1, "m/s or rad/s", 0, 0},
-    {"effort", 1, "N or N*m", 0, 0},
-    {"d_q", 1, "m or rad", 0, 0},
-    {"d_u", 1, "m/s or rad/s", 0, 0},
-    {"d_effort", 1, "N or N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_full_slope_outputs[] = {
-    {"d_tau", 1, "N or N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_full_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]))
 
 /* rotation and its derivative along a direction
  * in  p[7] kx, ky, kz, rest_twist, cx, cy, cz
@@ -1295,908 +410,264 @@ static const mstmm_port mstmm_sweep_laws_full_slope_outputs[] = {
  * in  d_effort[3] (N*m) derivative of effort
  * out d_tau[3] (N*m) derivative of tau
  */
-int mstmm_sweep_laws_rotation_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict B, const real *restrict effort,
-    const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
-    const real *restrict d_effort, real *restrict d_tau)
+int mstmm_sweep_laws_rotation_slope(in_t p, in_t q, in_t u, in_t B, in_t effort, in_t twist_ref,
+    in_t d_q, in_t d_u, in_t d_effort, out_t d_tau)
 {
-    (void)u;
-    (void)effort;
-    const real t0 = q[3] * B[6];
-    const real t1 = q[1] * B[0];
-    const real t2 = q[2] * B[3];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = t4 * t4;
-    const real t6 = q[3] * B[7];
-    const real t7 = q[1] * B[1];
-    const real t8 = q[2] * B[4];
-    const real t9 = t7 + t8;
-    const real t10 = t6 + t9;
-    const real t11 = t10 * t10;
-    const real t12 = t5 + t11;
-    const real t13 = q[3] * B[8];
-    const real t14 = q[1] * B[2];
-    const real t15 = q[2] * B[5];
-    const real t16 = t14 + t15;
-    const real t17 = t13 + t16;
-    const real t18 = t17 * t17;
-    const real t19 = q[0] * q[0];
-    const real t20 = t5 + t19;
-    const real t21 = t11 + t20;
-    const real t22 = t18 + t21;
-    const real t23 = 1.0 / t22;
-    const real t24 = t12 * t23;
-    const real t25 = t24 < ((real)1 / (real)100);
-    const real t26 = t22 * 5120.0;
-    const real t27 = 1.0 / t26;
-    const real t28 = t27 * 143.0;
-    const real t29 = t12 * t28;
-    const real t30 = t29 + ((real)231 / (real)6656);
-    const real t31 = t12 * t30;
-    const real t32 = t23 * t31;
-    const real t33 = t32 + ((real)63 / (real)1408);
-    const real t34 = t12 * t33;
-    const real t35 = t23 * t34;
-    const real t36 = t35 + ((real)35 / (real)576);
-    const real t37 = t12 * t36;
-    const real t38 = t23 * t37;
-    const real t39 = t38 + ((real)5 / (real)56);
-    const real t40 = t12 * t39;
-    const real t41 = t23 * t40;
-    const real t42 = t41 + ((real)3 / (real)20);
-    const real t43 = t12 * t42;
-    const real t44 = t23 * t43;
-    const real t45 = t44 + ((real)1 / (real)3);
-    const real t46 = t12 * t45;
-    const real t47 = t23 * t46;
-    const real t48 = t47 + 2.0;
-    const real t49 = t18 + t19;
-    const real t50 = 1.0 / t49;
-    const real t51 = t12 * t50;
-    const real t52 = sqrt(t51);
-    const real t53 = atan(t52);
-    const real t54 = sqrt(t24);
-    const real t55 = 1.0 / t54;
-    const real t56 = 2.0 * t55;
-    const real t57 = t53 * t56;
-    const real t58 = t25 != 0 ? t48 : t57;
-    const real t59 = t4 * q[0];
-    const real t60 = t10 * t17;
-    const real t61 = t59 - t60;
-    const real t62 = t58 * t61;
-    const real t63 = sqrt(t49);
-    const real t64 = sqrt(t22);
-    const real t65 = t63 * t64;
-    const real t66 = 1.0 / t65;
-    const real t67 = t62 * t66;
-    const real t68 = B[0] * p[0];
-    const real t69 = B[0] * t68;
-    const real t70 = B[3] * p[1];
-    const real t71 = B[3] * t70;
-    const real t72 = t69 + t71;
-    const real t73 = B[6] * p[2];
-    const real t74 = B[6] * t73;
-    const real t75 = t72 + t74;
-    const real t76 = t67 * t75;
-    const real t77 = t10 * q[0];
-    const real t78 = t4 * t17;
-    const real t79 = t77 + t78;
-    const real t80 = t58 * t79;
-    const real t81 = t66 * t80;
-    const real t82 = B[1] * t68;
-    const real t83 = B[4] * t70;
-    const real t84 = t82 + t83;
-    const real t85 = B[7] * t73;
-    const real t86 = t84 + t85;
-    const real t87 = t81 * t86;
-    const real t88 = t76 + t87;
-    const real t89 = atan2(t17, q[0]);
-    const real t90 = 2.0 * t89;
-    const real t91 = twist_ref[0] - t90;
-    const real t92 = MSTMM_PI * 4.0;
-    const real t93 = 1.0 / t92;
-    const real t94 = t91 * t93;
-    const real t95 = t94 + 0.5;
-    const real t96 = floor(t95);
-    const real t97 = MSTMM_PI * t96;
-    const real t98 = 4.0 * t97;
-    const real t99 = t90 + t98;
-    const real t100 = t99 - p[3];
-    const real t101 = B[2] * t68;
-    const real t102 = B[5] * t70;
-    const real t103 = t101 + t102;
-    const real t104 = B[8] * t73;
-    const real t105 = t103 + t104;
-    const real t106 = t100 * t105;
-    const real t107 = t88 + t106;
-    const real t108 = t27 * 1001.0;
-    const real t109 = t12 * t108;
-    const real t110 = t109 + ((real)693 / (real)3328);
-    const real t111 = t12 * t110;
-    const real t112 = t23 * t111;
-    const real t113 = t112 + ((real)315 / (real)1408);
-    const real t114 = t12 * t113;
-    const real t115 = t23 * t114;
-    const real t116 = t115 + ((real)35 / (real)144);
-    const real t117 = t12 * t116;
-    const real t118 = t23 * t117;
-    const real t119 = t118 + ((real)15 / (real)56);
-    const real t120 = t12 * t119;
-    const real t121 = t23 * t120;
-    const real t122 = t121 + ((real)3 / (real)10);
-    const real t123 = t12 * t122;
-    const real t124 = t23 * t123;
-    const real t125 = ((real)1 / (real)3) + t124;
-    const real t126 = 1.0 - t24;
-    const real t127 = pow(t126, (-0.5));
-    const real t128 = t53 * t55;
-    const real t129 = t127 - t128;
-    const real t130 = t22 * t129;
-    const real t131 = 1.0 / t12;
-    const real t132 = t130 * t131;
-    const real t133 = t25 != 0 ? t125 : t132;
-    const real t134 = t10 * t23;
-    const real t135 = t22 * t22;
-    const real t136 = 1.0 / t135;
-    const real t137 = t10 * t12;
-    const real t138 = t136 * t137;
-    const real t139 = t134 - t138;
-    const real t140 = 2.0 * t139;
-    const real t141 = t61 * t140;
-    const real t142 = t133 * t141;
-    const real t143 = t66 * t142;
-    const real t144 = t17 * t58;
-    const real t145 = t66 * t144;
-    const real t146 = t143 - t145;
-    const real t147 = pow(t22, 1.5);
-    const real t148 = t63 * t147;
-    const real t149 = 1.0 / t148;
-    const real t150 = t10 * t62;
-    const real t151 = t149 * t150;
-    const real t152 = t146 - t151;
-    const real t153 = t107 * t152;
-    const real t154 = B[1] * p[0];
-    const real t155 = B[0] * t154;
-    const real t156 = B[4] * p[1];
-    const real t157 = B[3] * t156;
-    const real t158 = t155 + t157;
-    const real t159 = B[7] * p[2];
-    const real t160 = B[6] * t159;
-    const real t161 = t158 + t160;
-    const real t162 = t67 * t161;
-    const real t163 = B[1] * t154;
-    const real t164 = B[4] * t156;
-    const real t165 = t163 + t164;
-    const real t166 = B[7] * t159;
-    const real t167 = t165 + t166;
-    const real t168 = t81 * t167;
-    const real t169 = t162 + t168;
-    const real t170 = B[2] * t154;
-    const real t171 = B[5] * t156;
-    const real t172 = t170 + t171;
-    const real t173 = B[8] * t159;
-    const real t174 = t172 + t173;
-    const real t175 = t100 * t174;
-    const real t176 = t169 + t175;
-    const real t177 = q[0] * t58;
-    const real t178 = t66 * t177;
-    const real t179 = t79 * t140;
-    const real t180 = t133 * t179;
-    const real t181 = t66 * t180;
-    const real t182 = t178 + t181;
-    const real t183 = t10 * t80;
-    const real t184 = t149 * t183;
-    const real t185 = t182 - t184;
-    const real t186 = t176 * t185;
-    const real t187 = t153 + t186;
-    const real t188 = B[3] * d_q[2];
-    const real t189 = B[0] * d_q[1];
-    const real t190 = t188 + t189;
-    const real t191 = B[6] * d_q[3];
-    const real t192 = t190 + t191;
-    const real t193 = t187 * t192;
-    const real t194 = B[5] * d_q[2];
-    const real t195 = B[2] * d_q[1];
-    const real t196 = t194 + t195;
-    const real t197 = B[8] * d_q[3];
-    const real t198 = t196 + t197;
-    const real t199 = q[0] * t198;
-    const real t200 = t17 * d_q[0];
-    const real t201 = t199 - t200;
-    const real t202 = t201 / t49;
-    const real t203 = 2.0 * t202;
-    const real t204 = t174 * t203;
-    const real t205 = t4 * t192;
-    const real t206 = t205 + t205;
-    const real t207 = B[4] * d_q[2];
-    const real t208 = B[1] * d_q[1];
-    const real t209 = t207 + t208;
-    const real t210 = B[7] * d_q[3];
-    const real t211 = t209 + t210;
-    const real t212 = t10 * t211;
-    const real t213 = t212 + t212;
-    const real t214 = t206 + t213;
-    const real t215 = t45 * t214;
-    const real t216 = t42 * t214;
-    const real t217 = t39 * t214;
-    const real t218 = t36 * t214;
-    const real t219 = t33 * t214;
-    const real t220 = t30 * t214;
-    const real t221 = t28 * t214;
-    const real t222 = q[0] * d_q[0];
-    const real t223 = t222 + t222;
-    const real t224 = t223 + t206;
-    const real t225 = t224 + t213;
-    const real t226 = t17 * t198;
-    const real t227 = t226 + t226;
-    const real t228 = t225 + t227;
-    const real t229 = 5120.0 * t228;
-    const real t230 = t27 * t229;
-    const real t231 = t230 / t26;
-    const real t232 = 143.0 * t231;
-    const real t233 = t12 * t232;
-    const real t234 = t221 - t233;
-    const real t235 = t12 * t234;
-    const real t236 = t220 + t235;
-    const real t237 = t23 * t236;
-    const real t238 = t23 * t228;
-    const real t239 = t238 / t22;
-    const real t240 = t31 * t239;
-    const real t241 = t237 - t240;
-    const real t242 = t12 * t241;
-    const real t243 = t219 + t242;
-    const real t244 = t23 * t243;
-    const real t245 = t34 * t239;
-    const real t246 = t244 - t245;
-    const real t247 = t12 * t246;
-    const real t248 = t218 + t247;
-    const real t249 = t23 * t248;
-    const real t250 = t37 * t239;
-    const real t251 = t249 - t250;
-    const real t252 = t12 * t251;
-    const real t253 = t217 + t252;
-    const real t254 = t23 * t253;
-    const real t255 = t40 * t239;
-    const real t256 = t254 - t255;
-    const real t257 = t12 * t256;
-    const real t258 = t216 + t257;
-    const real t259 = t23 * t258;
-    const real t260 = t43 * t239;
-    const real t261 = t259 - t260;
-    const real t262 = t12 * t261;
-    const real t263 = t215 + t262;
-    const real t264 = t23 * t263;
-    const real t265 = t46 * t239;
-    const real t266 = t264 - t265;
-    const real t267 = t50 * t214;
-    const real t268 = t223 + t227;
-    const real t269 = t50 * t268;
-    const real t270 = t269 / t49;
-    const real t271 = t12 * t270;
-    const real t272 = t267 - t271;
-    const real t273 = 2.0 * t52;
-    const real t274 = t272 / t273;
-    const real t275 = t52 * t52;
-    const real t276 = 1.0 + t275;
-    const real t277 = t274 / t276;
-    const real t278 = t56 * t277;
-    const real t279 = t23 * t214;
-    const real t280 = t12 * t239;
-    const real t281 = t279 - t280;
-    const real t282 = 2.0 * t54;
-    const real t283 = t281 / t282;
-    const real t284 = t55 * t283;
-    const real t285 = t284 / t54;
-    const real t286 = 2.0 * t285;
-    const real t287 = t53 * t286;
-    const real t288 = t278 - t287;
-    const real t289 = t25 != 0 ? t266 : t288;
-    const real t290 = t79 * t289;
-    const real t291 = t17 * t192;
-    const real t292 = t4 * t198;
-    const real t293 = t291 + t292;
-    const real t294 = q[0] * t211;
-    const real t295 = t10 * d_q[0];
-    const real t296 = t294 + t295;
-    const real t297 = t293 + t296;
-    const real t298 = t58 * t297;
-    const real t299 = t290 + t298;
-    const real t300 = t66 * t299;
-    const real t301 = 2.0 * t63;
-    const real t302 = t268 / t301;
-    const real t303 = t64 * t302;
-    const real t304 = 2.0 * t64;
-    const real t305 = t228 / t304;
-    const real t306 = t63 * t305;
-    const real t307 = t303 + t306;
-    const real t308 = t66 * t307;
-    const real t309 = t308 / t65;
-    const real t310 = t80 * t309;
-    const real t311 = t300 - t310;
-    const real t312 = t167 * t311;
-    const real t313 = t61 * t289;
-    const real t314 = q[0] * t192;
-    const real t315 = t4 * d_q[0];
-    const real t316 = t314 + t315;
-    const real t317 = t17 * t211;
-    const real t318 = t10 * t198;
-    const real t319 = t317 + t318;
-    const real t320 = t316 - t319;
-    const real t321 = t58 * t320;
-    const real t322 = t313 + t321;
-    const real t323 = t66 * t322;
-    const real t324 = t62 * t309;
-    const real t325 = t323 - t324;
-    const real t326 = t161 * t325;
-    const real t327 = t312 + t326;
-    const real t328 = t204 + t327;
-    const real t329 = t185 * t328;
-    const real t330 = t58 * d_q[0];
-    const real t331 = q[0] * t289;
-    const real t332 = t330 + t331;
-    const real t333 = t66 * t332;
-    const real t334 = t177 * t309;
-    const real t335 = t333 - t334;
-    const real t336 = t122 * t214;
-    const real t337 = t119 * t214;
-    const real t338 = t116 * t214;
-    const real t339 = t113 * t214;
-    const real t340 = t110 * t214;
-    const real t341 = t108 * t214;
-    const real t342 = 1001.0 * t231;
-    const real t343 = t12 * t342;
-    const real t344 = t341 - t343;
-    const real t345 = t12 * t344;
-    const real t346 = t340 + t345;
-    const real t347 = t23 * t346;
-    const real t348 = t111 * t239;
-    const real t349 = t347 - t348;
-    const real t350 = t12 * t349;
-    const real t351 = t339 + t350;
-    const real t352 = t23 * t351;
-    const real t353 = t114 * t239;
-    const real t354 = t352 - t353;
-    const real t355 = t12 * t354;
-    const real t356 = t338 + t355;
-    const real t357 = t23 * t356;
-    const real t358 = t117 * t239;
-    const real t359 = t357 - t358;
-    const real t360 = t12 * t359;
-    const real t361 = t337 + t360;
-    const real t362 = t23 * t361;
-    const real t363 = t120 * t239;
-    const real t364 = t362 - t363;
-    const real t365 = t12 * t364;
-    const real t366 = t336 + t365;
-    const real t367 = t23 * t366;
-    const real t368 = t123 * t239;
-    const real t369 = t367 - t368;
-    const real t370 = t129 * t228;
-    const real t371 = t55 * t277;
-    const real t372 = t53 * t285;
-    const real t373 = t371 - t372;
-    const real t374 = t280 - t279;
-    const real t375 = pow(t126, (-1.5));
-    const real t376 = 0.5 * t375;
-    const real t377 = t374 * t376;
-    const real t378 = t373 + t377;
-    const real t379 = t22 * t378;
-    const real t380 = t370 - t379;
-    const real t381 = t131 * t380;
-    const real t382 = t131 * t214;
-    const real t383 = t382 / t12;
-    const real t384 = t130 * t383;
-    const real t385 = t381 - t384;
-    const real t386 = t25 != 0 ? t369 : t385;
-    const real t387 = t179 * t386;
-    const real t388 = t140 * t297;
-    const real t389 = t23 * t211;
-    const real t390 = t10 * t239;
-    const real t391 = t389 - t390;
-    const real t392 = t12 * t211;
-    const real t393 = t10 * t214;
-    const real t394 = t392 + t393;
-    const real t395 = t136 * t394;
-    const real t396 = t22 * t228;
-    const real t397 = t396 + t396;
-    const real t398 = t136 * t397;
-    const real t399 = t398 / t135;
-    const real t400 = t137 * t399;
-    const real t401 = t395 - t400;
-    const real t402 = t391 - t401;
-    const real t403 = 2.0 * t402;
-    const real t404 = t79 * t403;
-    const real t405 = t388 + t404;
-    const real t406 = t133 * t405;
-    const real t407 = t387 + t406;
-    const real t408 = t66 * t407;
-    const real t409 = t180 * t309;
-    const real t410 = t408 - t409;
-    const real t411 = t335 + t410;
-    const real t412 = t80 * t211;
-    const real t413 = t10 * t299;
-    const real t414 = t412 + t413;
-    const real t415 = t149 * t414;
-    const real t416 = t147 * t302;
-    const real t417 = t64 * 1.5;
-    const real t418 = t228 * t417;
-    const real t419 = t63 * t418;
-    const real t420 = t416 + t419;
-    const real t421 = t149 * t420;
-    const real t422 = t421 / t148;
-    const real t423 = t183 * t422;
-    const real t424 = t415 - t423;
-    const real t425 = t411 - t424;
-    const real t426 = t176 * t425;
-    const real t427 = t329 + t426;
-    const real t428 = t105 * t203;
-    const real t429 = t86 * t311;
-    const real t430 = t75 * t325;
-    const real t431 = t429 + t430;
-    const real t432 = t428 + t431;
-    const real t433 = t152 * t432;
-    const real t434 = t141 * t386;
-    const real t435 = t140 * t320;
-    const real t436 = t61 * t403;
-    const real t437 = t435 + t436;
-    const real t438 = t133 * t437;
-    const real t439 = t434 + t438;
-    const real t440 = t66 * t439;
-    const real t441 = t142 * t309;
-    const real t442 = t440 - t441;
-    const real t443 = t58 * t198;
-    const real t444 = t17 * t289;
-    const real t445 = t443 + t444;
-    const real t446 = t66 * t445;
-    const real t447 = t144 * t309;
-    const real t448 = t446 - t447;
-    const real t449 = t442 - t448;
-    const real t450 = t62 * t211;
-    const real t451 = t10 * t322;
-    const real t452 = t450 + t451;
-    const real t453 = t149 * t452;
-    const real t454 = t150 * t422;
-    const real t455 = t453 - t454;
-    const real t456 = t449 - t455;
-    const real t457 = t107 * t456;
-    const real t458 = t433 + t457;
-    const real t459 = t427 + t458;
-    const real t460 = t4 * t459;
-    const real t461 = t193 + t460;
-    const real t462 = 0.5 * t461;
-    const real t463 = t4 * t23;
-    const real t464 = t4 * t12;
-    const real t465 = t464 * t136;
-    const real t466 = t463 - t465;
-    const real t467 = 2.0 * t466;
-    const real t468 = t61 * t467;
-    const real t469 = t133 * t468;
-    const real t470 = t66 * t469;
-    const real t471 = t178 + t470;
-    const real t472 = t4 * t62;
-    const real t473 = t149 * t472;
-    const real t474 = t471 - t473;
-    const real t475 = t107 * t474;
-    const real t476 = t79 * t467;
-    const real t477 = t133 * t476;
-    const real t478 = t66 * t477;
-    const real t479 = t145 + t478;
-    const real t480 = t4 * t80;
-    const real t481 = t149 * t480;
-    const real t482 = t479 - t481;
-    const real t483 = t176 * t482;
-    const real t484 = t475 + t483;
-    const real t485 = t484 * t211;
-    const real t486 = t482 * t328;
-    const real t487 = t476 * t386;
-    const real t488 = t467 * t297;
-    const real t489 = t23 * t192;
-    const real t490 = t4 * t239;
-    const real t491 = t489 - t490;
-    const real t492 = t12 * t192;
-    const real t493 = t4 * t214;
-    const real t494 = t492 + t493;
-    const real t495 = t136 * t494;
-    const real t496 = t464 * t399;
-    const real t497 = t495 - t496;
-    const real t498 = t491 - t497;
-    const real t499 = 2.0 * t498;
-    const real t500 = t79 * t499;
-    const real t501 = t488 + t500;
-    const real t502 = t133 * t501;
-    const real t503 = t487 + t502;
-    const real t504 = t66 * t503;
-    const real t505 = t477 * t309;
-    const real t506 = t504 - t505;
-    const real t507 = t506 + t448;
-    const real t508 = t80 * t192;
-    const real t509 = t4 * t299;
-    const real t510 = t508 + t509;
-    const real t511 = t149 * t510;
-    const real t512 = t480 * t422;
-    const real t513 = t511 - t512;
-    const real t514 = t507 - t513;
-    const real t515 = t176 * t514;
-    const real t516 = t486 + t515;
-    const real t517 = t474 * t432;
-    const real t518 = t468 * t386;
-    const real t519 = t467 * t320;
-    const real t520 = t61 * t499;
-    const real t521 = t519 + t520;
-    const real t522 = t133 * t521;
-    const real t523 = t518 + t522;
-    const real t524 = t66 * t523;
-    const real t525 = t469 * t309;
-    const real t526 = t524 - t525;
-    const real t527 = t526 + t335;
-    const real t528 = t62 * t192;
-    const real t529 = t4 * t322;
-    const real t530 = t528 + t529;
-    const real t531 = t149 * t530;
-    const real t532 = t472 * t422;
-    const real t533 = t531 - t532;
-    const real t534 = t527 - t533;
-    const real t535 = t107 * t534;
-    const real t536 = t517 + t535;
-    const real t537 = t516 + t536;
-    const real t538 = t10 * t537;
-    const real t539 = t485 + t538;
-    const real t540 = 0.5 * t539;
-    const real t541 = t462 - t540;
-    const real t542 = t4 * t58;
-    const real t543 = t66 * t542;
-    const real t544 = q[0] * t62;
-    const real t545 = pow(t49, 1.5);
-    const real t546 = t64 * t545;
-    const real t547 = 1.0 / t546;
-    const real t548 = t544 * t547;
-    const real t549 = t543 - t548;
-    const real t550 = t544 * t149;
-    const real t551 = t549 - t550;
-    const real t552 = t12 * t61;
-    const real t553 = t133 * t552;
-    const real t554 = q[0] * t553;
-    const real t555 = pow(t22, 2.5);
-    const real t556 = t63 * t555;
-    const real t557 = 1.0 / t556;
-    const real t558 = 2.0 * t557;
-    const real t559 = t554 * t558;
-    const real t560 = t551 - t559;
-    const real t561 = t107 * t560;
-    const real t562 = t10 * t58;
-    const real t563 = t66 * t562;
-    const real t564 = q[0] * t80;
-    const real t565 = t547 * t564;
-    const real t566 = t563 - t565;
-    const real t567 = t149 * t564;
-    const real t568 = t566 - t567;
-    const real t569 = t12 * t79;
-    const real t570 = t133 * t569;
-    const real t571 = q[0] * t570;
-    const real t572 = t558 * t571;
-    const real t573 = t568 - t572;
-    const real t574 = t176 * t573;
-    const real t575 = t561 + t574;
-    const real t576 = t575 * t198;
-    const real t577 = t573 * t328;
-    const real t578 = t58 * t211;
-    const real t579 = t10 * t289;
-    const real t580 = t578 + t579;
-    const real t581 = t66 * t580;
-    const real t582 = t562 * t309;
-    const real t583 = t581 - t582;
-    const real t584 = t80 * d_q[0];
-    const real t585 = q[0] * t299;
-    const real t586 = t584 + t585;
-    const real t587 = t547 * t586;
-    const real t588 = t545 * t305;
-    const real t589 = t63 * 1.5;
-    const real t590 = t268 * t589;
-    const real t591 = t64 * t590;
-    const real t592 = t588 + t591;
-    const real t593 = t547 * t592;
-    const real t594 = t593 / t546;
-    const real t595 = t564 * t594;
-    const real t596 = t587 - t595;
-    const real t597 = t583 - t596;
-    const real t598 = t149 * t586;
-    const real t599 = t564 * t422;
-    const real t600 = t598 - t599;
-    const real t601 = t597 - t600;
-    const real t602 = t570 * d_q[0];
-    const real t603 = t569 * t386;
-    const real t604 = t79 * t214;
-    const real t605 = t12 * t297;
-    const real t606 = t604 + t605;
-    const real t607 = t133 * t606;
-    const real t608 = t603 + t607;
-    const real t609 = q[0] * t608;
-    const real t610 = t602 + t609;
-    const real t611 = t558 * t610;
-    const real t612 = t555 * t302;
-    const real t613 = t147 * 2.5;
-    const real t614 = t228 * t613;
-    const real t615 = t63 * t614;
-    const real t616 = t612 + t615;
-    const real t617 = t557 * t616;
-    const real t618 = t617 / t556;
-    const real t619 = 2.0 * t618;
-    const real t620 = t571 * t619;
-    const real t621 = t611 - t620;
-    const real t622 = t601 - t621;
-    const real t623 = t176 * t622;
-    const real t624 = t577 + t623;
-    const real t625 = t560 * t432;
-    const real t626 = t58 * t192;
-    const real t627 = t4 * t289;
-    const real t628 = t626 + t627;
-    const real t629 = t66 * t628;
-    const real t630 = t542 * t309;
-    const real t631 = t629 - t630;
-    const real t632 = t62 * d_q[0];
-    const real t633 = q[0] * t322;
-    const real t634 = t632 + t633;
-    const real t635 = t547 * t634;
-    const real t636 = t544 * t594;
-    const real t637 = t635 - t636;
-    const real t638 = t631 - t637;
-    const real t639 = t149 * t634;
-    const real t640 = t544 * t422;
-    const real t641 = t639 - t640;
-    const real t642 = t638 - t641;
-    const real t643 = t553 * d_q[0];
-    const real t644 = t552 * t386;
-    const real t645 = t61 * t214;
-    const real t646 = t12 * t320;
-    const real t647 = t645 + t646;
-    const real t648 = t133 * t647;
-    const real t649 = t644 + t648;
-    const real t650 = q[0] * t649;
-    const real t651 = t643 + t650;
-    const real t652 = t558 * t651;
-    const real t653 = t554 * t619;
-    const real t654 = t652 - t653;
-    const real t655 = t642 - t654;
-    const real t656 = t107 * t655;
-    const real t657 = t625 + t656;
-    const real t658 = t624 + t657;
-    const real t659 = t17 * t658;
-    const real t660 = t576 + t659;
-    const real t661 = 0.5 * t660;
-    const real t662 = t541 + t661;
-    const real t663 = t17 * t80;
-    const real t664 = t547 * t663;
-    const real t665 = t543 - t664;
-    const real t666 = t149 * t663;
-    const real t667 = t665 - t666;
-    const real t668 = t17 * t570;
-    const real t669 = t558 * t668;
-    const real t670 = t667 - t669;
-    const real t671 = t176 * t670;
-    const real t672 = t17 * t553;
-    const real t673 = t558 * t672;
-    const real t674 = t17 * t62;
-    const real t675 = t149 * t674;
-    const real t676 = t547 * t674;
-    const real t677 = t563 + t676;
-    const real t678 = t675 + t677;
-    const real t679 = t673 + t678;
-    const real t680 = t107 * t679;
-    const real t681 = t671 - t680;
-    const real t682 = t681 * d_q[0];
-    const real t683 = t670 * t328;
-    const real t684 = t80 * t198;
-    const real t685 = t17 * t299;
-    const real t686 = t684 + t685;
-    const real t687 = t547 * t686;
-    const real t688 = t663 * t594;
-    const real t689 = t687 - t688;
-    const real t690 = t631 - t689;
-    const real t691 = t149 * t686;
-    const real t692 = t663 * t422;
-    const real t693 = t691 - t692;
-    const real t694 = t690 - t693;
-    const real t695 = t570 * t198;
-    const real t696 = t17 * t608;
-    const real t697 = t695 + t696;
-    const real t698 = t558 * t697;
-    const real t699 = t668 * t619;
-    const real t700 = t698 - t699;
-    const real t701 = t694 - t700;
-    const real t702 = t176 * t701;
-    const real t703 = t683 + t702;
-    const real t704 = t679 * t432;
-    const real t705 = t62 * t198;
-    const real t706 = t17 * t322;
-    const real t707 = t705 + t706;
-    const real t708 = t547 * t707;
-    const real t709 = t674 * t594;
-    const real t710 = t708 - t709;
-    const real t711 = t710 + t583;
-    const real t712 = t149 * t707;
-    const real t713 = t674 * t422;
-    const real t714 = t712 - t713;
-    const real t715 = t711 + t714;
-    const real t716 = t553 * t198;
-    const real t717 = t17 * t649;
-    const real t718 = t716 + t717;
-    const real t719 = t558 * t718;
-    const real t720 = t672 * t619;
-    const real t721 = t719 - t720;
-    const real t722 = t715 + t721;
-    const real t723 = t107 * t722;
-    const real t724 = t704 + t723;
-    const real t725 = t703 - t724;
-    const real t726 = q[0] * t725;
-    const real t727 = t682 + t726;
-    const real t728 = 0.5 * t727;
-    const real t729 = t662 - t728;
-    const real t730 = B[2] * p[0];
-    const real t731 = B[0] * t730;
-    const real t732 = B[5] * p[1];
-    const real t733 = B[3] * t732;
-    const real t734 = t731 + t733;
-    const real t735 = B[8] * p[2];
-    const real t736 = B[6] * t735;
-    const real t737 = t734 + t736;
-    const real t738 = t67 * t737;
-    const real t739 = B[1] * t730;
-    const real t740 = B[4] * t732;
-    const real t741 = t739 + t740;
-    const real t742 = B[7] * t735;
-    const real t743 = t741 + t742;
-    const real t744 = t81 * t743;
-    const real t745 = t738 + t744;
-    const real t746 = B[2] * t730;
-    const real t747 = B[5] * t732;
-    const real t748 = t746 + t747;
-    const real t749 = B[8] * t735;
-    const real t750 = t748 + t749;
-    const real t751 = t100 * t750;
-    const real t752 = t745 + t751;
-    const real t753 = t752 * t223;
-    const real t754 = t750 * t203;
-    const real t755 = t743 * t311;
-    const real t756 = t737 * t325;
-    const real t757 = t755 + t756;
-    const real t758 = t754 + t757;
-    const real t759 = t19 * t758;
-    const real t760 = t753 + t759;
-    const real t761 = t50 * t760;
-    const real t762 = t19 * t752;
-    const real t763 = t762 * t270;
-    const real t764 = t761 - t763;
-    const real t765 = t729 - t764;
-    const real t766 = t752 * t227;
-    const real t767 = t18 * t758;
-    const real t768 = t766 + t767;
-    const real t769 = t50 * t768;
-    const real t770 = t18 * t752;
-    const real t771 = t770 * t270;
-    const real t772 = t769 - t771;
-    const real t773 = t765 - t772;
-    const real t774 = B[2] * t773;
-    const real t775 = t575 * t192;
-    const real t776 = t4 * t658;
-    const real t777 = t775 + t776;
-    const real t778 = 0.5 * t777;
-    const real t779 = t187 * t198;
-    const real t780 = t17 * t459;
-    const real t781 = t779 + t780;
-    const real t782 = 0.5 * t781;
-    const real t783 = t484 * d_q[0];
-    const real t784 = q[0] * t537;
-    const real t785 = t783 + t784;
-    const real t786 = 0.5 * t785;
-    const real t787 = t782 + t786;
-    const real t788 = t778 - t787;
-    const real t789 = t681 * t211;
-    const real t790 = t10 * t725;
-    const real t791 = t789 + t790;
-    const real t792 = 0.5 * t791;
-    const real t793 = t788 + t792;
-    const real t794 = t752 * t296;
-    const real t795 = t77 * t758;
-    const real t796 = t794 + t795;
-    const real t797 = t50 * t796;
-    const real t798 = t77 * t752;
-    const real t799 = t798 * t270;
-    const real t800 = t797 - t799;
-    const real t801 = t793 + t800;
-    const real t802 = t752 * t293;
-    const real t803 = t78 * t758;
-    const real t804 = t802 + t803;
-    const real t805 = t50 * t804;
-    const real t806 = t78 * t752;
-    const real t807 = t806 * t270;
-    const real t808 = t805 - t807;
-    const real t809 = t801 - t808;
-    const real t810 = B[0] * t809;
-    const real t811 = t774 + t810;
-    const real t812 = t484 * t198;
-    const real t813 = t17 * t537;
-    const real t814 = t812 + t813;
-    const real t815 = 0.5 * t814;
-    const real t816 = t187 * d_q[0];
-    const real t817 = q[0] * t459;
-    const real t818 = t816 + t817;
-    const real t819 = 0.5 * t818;
-    const real t820 = t815 - t819;
-    const real t821 = t575 * t211;
-    const real t822 = t10 * t658;
-    const real t823 = t821 + t822;
-    const real t824 = 0.5 * t823;
-    const real t825 = t820 + t824;
-    const real t826 = t681 * t192;
-    const real t827 = t4 * t725;
-    const real t828 = t826 + t827;
-    const real t829 = 0.5 * t828;
-    const real t830 = t825 - t829;
-    const real t831 = t752 * t316;
-    const real t832 = t59 * t758;
-    const real t833 = t831 + t832;
-    const real t834 = t50 * t833;
-    const real t835 = t59 * t752;
-    const real t836 = t835 * t270;
-    const real t837 = t834 - t836;
-    const real t838 = t830 - t837;
-    const real t839 = t752 * t319;
-    const real t840 = t60 * t758;
-    const real t841 = t839 + t840;
-    const real t842 = t50 * t841;
-    const real t843 = t60 * t752;
-    const real t844 = t843 * t270;
-    const real t845 = t842 - t844;
-    const real t846 = t838 - t845;
-    const real t847 = B[1] * t846;
-    const real t848 = t811 + t847;
-    const real t849 = p[4] * d_u[0];
-    const real t850 = t848 - t849;
-    const real t851 = d_effort[0] + t850;
-    d_tau[0] = t851;
-    const real t852 = B[5] * t773;
-    const real t853 = B[3] * t809;
-    const real t854 = t852 + t853;
-    const real t855 = B[4] * t846;
-    const real t856 = t854 + t855;
-    const real t857 = p[5] * d_u[1];
-    const real t858 = t856 - t857;
-    const real t859 = d_effort[1] + t858;
-    d_tau[1] = t859;
-    const real t860 = B[8] * t773;
-    const real t861 = B[6] * t809;
-    const real t862 = t860 + t861;
-    const real t863 = B[7] * t846;
-    const real t864 = t862 + t863;
-    const real t865 = p[6] * d_u[2];
-    const real t866 = t864 - t865;
-    const real t867 = d_effort[2] + t866;
-    d_tau[2] = t867;
-    return 0;
+  (void)u;
+  (void)effort;
+  real t4 = q[3] * B[6] + (q[1] * B[0] + q[2] * B[3]);
+  real t5 = t4 * t4;
+  real t10 = q[3] * B[7] + (q[1] * B[1] + q[2] * B[4]);
+  real t11 = t10 * t10;
+  real t12 = t5 + t11;
+  real t17 = q[3] * B[8] + (q[1] * B[2] + q[2] * B[5]);
+  real t18 = t17 * t17;
+  real t19 = q[0] * q[0];
+  real t22 = t18 + (t11 + (t5 + t19));
+  real t23 = 1.0 / t22;
+  real t24 = t12 * t23;
+  real t25 = t24 < ((real)1 / (real)100);
+  real t26 = t22 * 5120.0;
+  real t27 = 1.0 / t26;
+  real t28 = t27 * 143.0;
+  real t30 = t12 * t28 + ((real)231 / (real)6656);
+  real t31 = t12 * t30;
+  real t33 = t23 * t31 + ((real)63 / (real)1408);
+  real t34 = t12 * t33;
+  real t36 = t23 * t34 + ((real)35 / (real)576);
+  real t37 = t12 * t36;
+  real t39 = t23 * t37 + ((real)5 / (real)56);
+  real t40 = t12 * t39;
+  real t42 = t23 * t40 + ((real)3 / (real)20);
+  real t43 = t12 * t42;
+  real t45 = t23 * t43 + ((real)1 / (real)3);
+  real t46 = t12 * t45;
+  real t48 = t23 * t46 + 2.0;
+  real t49 = t18 + t19;
+  real t50 = 1.0 / t49;
+  real t52 = sqrt(t12 * t50);
+  real t53 = atan(t52);
+  real t54 = sqrt(t24);
+  real t55 = 1.0 / t54;
+  real t56 = 2.0 * t55;
+  real t57 = t53 * t56;
+  real t58 = t25 != 0 ? t48 : t57;
+  real t59 = t4 * q[0];
+  real t60 = t10 * t17;
+  real t61 = t59 - t60;
+  real t62 = t58 * t61;
+  real t63 = sqrt(t49);
+  real t64 = sqrt(t22);
+  real t65 = t63 * t64;
+  real t66 = 1.0 / t65;
+  real t67 = t62 * t66;
+  real t68 = B[0] * p[0];
+  real t70 = B[3] * p[1];
+  real t73 = B[6] * p[2];
+  real t75 = B[0] * t68 + B[3] * t70 + B[6] * t73;
+  real t77 = t10 * q[0];
+  real t78 = t4 * t17;
+  real t79 = t77 + t78;
+  real t80 = t58 * t79;
+  real t81 = t66 * t80;
+  real t86 = B[1] * t68 + B[4] * t70 + B[7] * t73;
+  real t90 = 2.0 * (atan2(t17, q[0]));
+  real t100 = t90 + 4.0 * (MSTMM_PI * floor((twist_ref[0] - t90) * (1.0 / (MSTMM_PI * 4.0)) + 0.5))
+    - p[3];
+  real t105 = B[2] * t68 + B[5] * t70 + B[8] * t73;
+  real t107 = t67 * t75 + t81 * t86 + t100 * t105;
+  real t108 = t27 * 1001.0;
+  real t110 = t12 * t108 + ((real)693 / (real)3328);
+  real t111 = t12 * t110;
+  real t113 = t23 * t111 + ((real)315 / (real)1408);
+  real t114 = t12 * t113;
+  real t116 = t23 * t114 + ((real)35 / (real)144);
+  real t117 = t12 * t116;
+  real t119 = t23 * t117 + ((real)15 / (real)56);
+  real t120 = t12 * t119;
+  real t122 = t23 * t120 + ((real)3 / (real)10);
+  real t123 = t12 * t122;
+  real t125 = ((real)1 / (real)3) + t23 * t123;
+  real t126 = 1.0 - t24;
+  real t129 = (pow(t126, (-0.5))) - t53 * t55;
+  real t130 = t22 * t129;
+  real t131 = 1.0 / t12;
+  real t132 = t130 * t131;
+  real t133 = t25 != 0 ? t125 : t132;
+  real t135 = t22 * t22;
+  real t136 = 1.0 / t135;
+  real t137 = t10 * t12;
+  real t140 = 2.0 * (t10 * t23 - t136 * t137);
+  real t141 = t61 * t140;
+  real t142 = t133 * t141;
+  real t144 = t17 * t58;
+  real t145 = t66 * t144;
+  real t147 = pow(t22, 1.5);
+  real t148 = t63 * t147;
+  real t149 = 1.0 / t148;
+  real t150 = t10 * t62;
+  real t152 = t66 * t142 - t145 - t149 * t150;
+  real t154 = B[1] * p[0];
+  real t156 = B[4] * p[1];
+  real t159 = B[7] * p[2];
+  real t161 = B[0] * t154 + B[3] * t156 + B[6] * t159;
+  real t167 = B[1] * t154 + B[4] * t156 + B[7] * t159;
+  real t174 = B[2] * t154 + B[5] * t156 + B[8] * t159;
+  real t176 = t67 * t161 + t81 * t167 + t100 * t174;
+  real t177 = q[0] * t58;
+  real t178 = t66 * t177;
+  real t179 = t79 * t140;
+  real t180 = t133 * t179;
+  real t183 = t10 * t80;
+  real t185 = t178 + t66 * t180 - t149 * t183;
+  real t187 = t107 * t152 + t176 * t185;
+  real t192 = B[3] * d_q[2] + B[0] * d_q[1] + B[6] * d_q[3];
+  real t198 = B[5] * d_q[2] + B[2] * d_q[1] + B[8] * d_q[3];
+  real t203 = 2.0 * ((q[0] * t198 - t17 * d_q[0]) / t49);
+  real t205 = t4 * t192;
+  real t206 = t205 + t205;
+  real t211 = B[4] * d_q[2] + B[1] * d_q[1] + B[7] * d_q[3];
+  real t212 = t10 * t211;
+  real t213 = t212 + t212;
+  real t214 = t206 + t213;
+  real t222 = q[0] * d_q[0];
+  real t223 = t222 + t222;
+  real t226 = t17 * t198;
+  real t227 = t226 + t226;
+  real t228 = t223 + t206 + t213 + t227;
+  real t231 = t27 * (5120.0 * t228) / t26;
+  real t239 = t23 * t228 / t22;
+  real t266 = t23 * (t45 * t214 + t12 * (t23 * (t42 * t214 + t12 * (t23 * (t39 * t214 + t12 * (t23 *
+    (t36 * t214 + t12 * (t23 * (t33 * t214 + t12 * (t23 * (t30 * t214 + t12 * (t28 * t214 - t12 *
+    (143.0 * t231))) - t31 * t239)) - t34 * t239)) - t37 * t239)) - t40 * t239)) - t43 * t239)) -
+    t46 * t239;
+  real t268 = t223 + t227;
+  real t270 = t50 * t268 / t49;
+  real t277 = (t50 * t214 - t12 * t270) / (2.0 * t52) / (1.0 + t52 * t52);
+  real t279 = t23 * t214;
+  real t280 = t12 * t239;
+  real t285 = t55 * ((t279 - t280) / (2.0 * t54)) / t54;
+  real t288 = t56 * t277 - t53 * (2.0 * t285);
+  real t289 = t25 != 0 ? t266 : t288;
+  real t293 = t17 * t192 + t4 * t198;
+  real t296 = q[0] * t211 + t10 * d_q[0];
+  real t297 = t293 + t296;
+  real t299 = t79 * t289 + t58 * t297;
+  real t302 = t268 / (2.0 * t63);
+  real t305 = t228 / (2.0 * t64);
+  real t309 = t66 * (t64 * t302 + t63 * t305) / t65;
+  real t311 = t66 * t299 - t80 * t309;
+  real t316 = q[0] * t192 + t4 * d_q[0];
+  real t319 = t17 * t211 + t10 * t198;
+  real t320 = t316 - t319;
+  real t322 = t61 * t289 + t58 * t320;
+  real t325 = t66 * t322 - t62 * t309;
+  real t328 = t174 * t203 + (t167 * t311 + t161 * t325);
+  real t335 = t66 * (t58 * d_q[0] + q[0] * t289) - t177 * t309;
+  real t369 = t23 * (t122 * t214 + t12 * (t23 * (t119 * t214 + t12 * (t23 * (t116 * t214 + t12 *
+    (t23 * (t113 * t214 + t12 * (t23 * (t110 * t214 + t12 * (t108 * t214 - t12 * (1001.0 * t231))) -
+    t111 * t239)) - t114 * t239)) - t117 * t239)) - t120 * t239)) - t123 * t239;
+  real t385 = t131 * (t129 * t228 - t22 * (t55 * t277 - t53 * t285 + (t280 - t279) * (0.5 *
+    (pow(t126, (-1.5)))))) - t130 * (t131 * t214 / t12);
+  real t386 = t25 != 0 ? t369 : t385;
+  real t396 = t22 * t228;
+  real t399 = t136 * (t396 + t396) / t135;
+  real t403 = 2.0 * (t23 * t211 - t10 * t239 - (t136 * (t12 * t211 + t10 * t214) - t137 * t399));
+  real t422 = t149 * (t147 * t302 + t63 * (t228 * (t64 * 1.5))) / t148;
+  real t432 = t105 * t203 + (t86 * t311 + t75 * t325);
+  real t448 = t66 * (t58 * t198 + t17 * t289) - t144 * t309;
+  real t459 = t185 * t328 + t176 * (t335 + (t66 * (t179 * t386 + t133 * (t140 * t297 + t79 * t403))
+    - t180 * t309) - (t149 * (t80 * t211 + t10 * t299) - t183 * t422)) + (t152 * t432 + t107 * (t66
+    * (t141 * t386 + t133 * (t140 * t320 + t61 * t403)) - t142 * t309 - t448 - (t149 * (t62 * t211 +
+    t10 * t322) - t150 * t422)));
+  real t464 = t4 * t12;
+  real t467 = 2.0 * (t4 * t23 - t464 * t136);
+  real t468 = t61 * t467;
+  real t469 = t133 * t468;
+  real t472 = t4 * t62;
+  real t474 = t178 + t66 * t469 - t149 * t472;
+  real t476 = t79 * t467;
+  real t477 = t133 * t476;
+  real t480 = t4 * t80;
+  real t482 = t145 + t66 * t477 - t149 * t480;
+  real t484 = t107 * t474 + t176 * t482;
+  real t499 = 2.0 * (t23 * t192 - t4 * t239 - (t136 * (t12 * t192 + t4 * t214) - t464 * t399));
+  real t537 = t482 * t328 + t176 * (t66 * (t476 * t386 + t133 * (t467 * t297 + t79 * t499)) - t477 *
+    t309 + t448 - (t149 * (t80 * t192 + t4 * t299) - t480 * t422)) + (t474 * t432 + t107 * (t66 *
+    (t468 * t386 + t133 * (t467 * t320 + t61 * t499)) - t469 * t309 + t335 - (t149 * (t62 * t192 +
+    t4 * t322) - t472 * t422)));
+  real t542 = t4 * t58;
+  real t543 = t66 * t542;
+  real t544 = q[0] * t62;
+  real t545 = pow(t49, 1.5);
+  real t546 = t64 * t545;
+  real t547 = 1.0 / t546;
+  real t552 = t12 * t61;
+  real t553 = t133 * t552;
+  real t554 = q[0] * t553;
+  real t555 = pow(t22, 2.5);
+  real t556 = t63 * t555;
+  real t557 = 1.0 / t556;
+  real t558 = 2.0 * t557;
+  real t560 = t543 - t544 * t547 - t544 * t149 - t554 * t558;
+  real t562 = t10 * t58;
+  real t563 = t66 * t562;
+  real t564 = q[0] * t80;
+  real t569 = t12 * t79;
+  real t570 = t133 * t569;
+  real t571 = q[0] * t570;
+  real t573 = t563 - t547 * t564 - t149 * t564 - t558 * t571;
+  real t575 = t107 * t560 + t176 * t573;
+  real t583 = t66 * (t58 * t211 + t10 * t289) - t562 * t309;
+  real t586 = t80 * d_q[0] + q[0] * t299;
+  real t594 = t547 * (t545 * t305 + t64 * (t268 * (t63 * 1.5))) / t546;
+  real t608 = t569 * t386 + t133 * (t79 * t214 + t12 * t297);
+  real t619 = 2.0 * (t557 * (t555 * t302 + t63 * (t228 * (t147 * 2.5))) / t556);
+  real t631 = t66 * (t58 * t192 + t4 * t289) - t542 * t309;
+  real t634 = t62 * d_q[0] + q[0] * t322;
+  real t649 = t552 * t386 + t133 * (t61 * t214 + t12 * t320);
+  real t658 = t573 * t328 + t176 * (t583 - (t547 * t586 - t564 * t594) - (t149 * t586 - t564 * t422)
+    - (t558 * (t570 * d_q[0] + q[0] * t608) - t571 * t619)) + (t560 * t432 + t107 * (t631 - (t547 *
+    t634 - t544 * t594) - (t149 * t634 - t544 * t422) - (t558 * (t553 * d_q[0] + q[0] * t649) - t554
+    * t619)));
+  real t663 = t17 * t80;
+  real t668 = t17 * t570;
+  real t670 = t543 - t547 * t663 - t149 * t663 - t558 * t668;
+  real t672 = t17 * t553;
+  real t674 = t17 * t62;
+  real t679 = t558 * t672 + (t149 * t674 + (t563 + t547 * t674));
+  real t681 = t176 * t670 - t107 * t679;
+  real t686 = t80 * t198 + t17 * t299;
+  real t707 = t62 * t198 + t17 * t322;
+  real t725 = t670 * t328 + t176 * (t631 - (t547 * t686 - t663 * t594) - (t149 * t686 - t663 * t422)
+    - (t558 * (t570 * t198 + t17 * t608) - t668 * t619)) - (t679 * t432 + t107 * (t547 * t707 - t674
+    * t594 + t583 + (t149 * t707 - t674 * t422) + (t558 * (t553 * t198 + t17 * t649) - t672 *
+    t619)));
+  real t730 = B[2] * p[0];
+  real t732 = B[5] * p[1];
+  real t735 = B[8] * p[2];
+  real t737 = B[0] * t730 + B[3] * t732 + B[6] * t735;
+  real t743 = B[1] * t730 + B[4] * t732 + B[7] * t735;
+  real t750 = B[2] * t730 + B[5] * t732 + B[8] * t735;
+  real t752 = t67 * t737 + t81 * t743 + t100 * t750;
+  real t758 = t750 * t203 + (t743 * t311 + t737 * t325);
+  real t773 = 0.5 * (t187 * t192 + t4 * t459) - 0.5 * (t484 * t211 + t10 * t537) + 0.5 * (t575 *
+    t198 + t17 * t658) - 0.5 * (t681 * d_q[0] + q[0] * t725) - (t50 * (t752 * t223 + t19 * t758) -
+    t19 * t752 * t270) - (t50 * (t752 * t227 + t18 * t758) - t18 * t752 * t270);
+  real t809 = 0.5 * (t575 * t192 + t4 * t658) - (0.5 * (t187 * t198 + t17 * t459) + 0.5 * (t484 *
+    d_q[0] + q[0] * t537)) + 0.5 * (t681 * t211 + t10 * t725) + (t50 * (t752 * t296 + t77 * t758) -
+    t77 * t752 * t270) - (t50 * (t752 * t293 + t78 * t758) - t78 * t752 * t270);
+  real t846 = 0.5 * (t484 * t198 + t17 * t537) - 0.5 * (t187 * d_q[0] + q[0] * t459) + 0.5 * (t575 *
+    t211 + t10 * t658) - 0.5 * (t681 * t192 + t4 * t725) - (t50 * (t752 * t316 + t59 * t758) - t59 *
+    t752 * t270) - (t50 * (t752 * t319 + t60 * t758) - t60 * t752 * t270);
+  d_tau[0] = d_effort[0] + (B[2] * t773 + B[0] * t809 + B[1] * t846 - p[4] * d_u[0]);
+  d_tau[1] = d_effort[1] + (B[5] * t773 + B[3] * t809 + B[4] * t846 - p[5] * d_u[1]);
+  d_tau[2] = d_effort[2] + (B[8] * t773 + B[6] * t809 + B[7] * t846 - p[6] * d_u[2]);
+  return 0;
 }
 
-static int mstmm_sweep_laws_rotation_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_rotation_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_laws_rotation_slope_inputs[] = {
-    {"p", 7, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "rad/s", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"effort", 3, "N*m", 0, 0},
-    {"twist_ref", 1, "rad", 0, 0},
-    {"d_q", 4, "", 0, 0},
-    {"d_u", 3, "rad/s", 0, 0},
-    {"d_effort", 3, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_rotation_slope_outputs[] = {
-    {"d_tau", 3, "N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_rotation_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], out[0]))
 
 /* six and its derivative along a direction
  * source: Rui, Wang, Zhang, ch. 5, section 5.8 (elastic efforts of the acceleration hinge)
@@ -2211,1221 +682,379 @@ static const mstmm_port mstmm_sweep_laws_rotation_slope_outputs[] = {
  * in  d_effort[6] (N, N*m) derivative of effort
  * out d_tau[6] (N, N*m) derivative of tau
  */
-int mstmm_sweep_laws_six_slope(const real *restrict p, const real *restrict q,
-    const real *restrict u, const real *restrict B, const real *restrict effort,
-    const real *restrict twist_ref, const real *restrict d_q, const real *restrict d_u,
-    const real *restrict d_effort, real *restrict d_tau)
+int mstmm_sweep_laws_six_slope(in_t p, in_t q, in_t u, in_t B, in_t effort, in_t twist_ref,
+    in_t d_q, in_t d_u, in_t d_effort, out_t d_tau)
 {
-    (void)effort;
-    const real t0 = q[1] - p[4];
-    const real t1 = t0 * p[1];
-    const real t2 = q[6] * q[6];
-    const real t3 = q[5] * q[5];
-    const real t4 = q[3] * q[3];
-    const real t5 = q[4] * q[4];
-    const real t6 = t4 + t5;
-    const real t7 = t3 + t6;
-    const real t8 = t2 + t7;
-    const real t9 = 1.0 / t8;
-    const real t10 = t9 * 2.0;
-    const real t11 = q[6] * q[5];
-    const real t12 = q[3] * q[4];
-    const real t13 = t11 - t12;
-    const real t14 = t10 * t13;
-    const real t15 = u[2] * t14;
-    const real t16 = q[5] * q[4];
-    const real t17 = q[6] * q[3];
-    const real t18 = t16 + t17;
-    const real t19 = t10 * t18;
-    const real t20 = u[0] * t19;
-    const real t21 = t2 + t5;
-    const real t22 = t10 * t21;
-    const real t23 = 1.0 - t22;
-    const real t24 = u[1] * t23;
-    const real t25 = t20 + t24;
-    const real t26 = t15 + t25;
-    const real t27 = t26 * p[7];
-    const real t28 = t1 + t27;
-    const real t29 = q[3] * d_q[6];
-    const real t30 = q[6] * d_q[3];
-    const real t31 = t29 + t30;
-    const real t32 = q[4] * d_q[5];
-    const real t33 = q[5] * d_q[4];
-    const real t34 = t32 + t33;
-    const real t35 = t31 + t34;
-    const real t36 = t10 * t35;
-    const real t37 = q[6] * d_q[6];
-    const real t38 = t37 + t37;
-    const real t39 = q[4] * d_q[4];
-    const real t40 = t39 + t39;
-    const real t41 = q[3] * d_q[3];
-    const real t42 = t41 + t41;
-    const real t43 = t40 + t42;
-    const real t44 = q[5] * d_q[5];
-    const real t45 = t44 + t44;
-    const real t46 = t43 + t45;
-    const real t47 = t38 + t46;
-    const real t48 = t9 * t47;
-    const real t49 = t48 / t8;
-    const real t50 = 2.0 * t49;
-    const real t51 = t18 * t50;
-    const real t52 = t36 - t51;
-    const real t53 = t28 * t52;
-    const real t54 = t23 * d_u[1];
-    const real t55 = t21 * t50;
-    const real t56 = t40 + t38;
-    const real t57 = t10 * t56;
-    const real t58 = t55 - t57;
-    const real t59 = u[1] * t58;
-    const real t60 = t54 + t59;
-    const real t61 = t19 * d_u[0];
-    const real t62 = u[0] * t52;
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t14 * d_u[2];
-    const real t66 = q[5] * d_q[6];
-    const real t67 = q[6] * d_q[5];
-    const real t68 = t66 + t67;
-    const real t69 = q[4] * d_q[3];
-    const real t70 = q[3] * d_q[4];
-    const real t71 = t69 + t70;
-    const real t72 = t68 - t71;
-    const real t73 = t10 * t72;
-    const real t74 = t13 * t50;
-    const real t75 = t73 - t74;
-    const real t76 = u[2] * t75;
-    const real t77 = t65 + t76;
-    const real t78 = t64 + t77;
-    const real t79 = p[7] * t78;
-    const real t80 = p[1] * d_q[1];
-    const real t81 = t79 + t80;
-    const real t82 = t19 * t81;
-    const real t83 = t53 + t82;
-    const real t84 = q[0] - p[3];
-    const real t85 = t84 * p[0];
-    const real t86 = q[6] * q[4];
-    const real t87 = q[5] * q[3];
-    const real t88 = t86 + t87;
-    const real t89 = t10 * t88;
-    const real t90 = u[2] * t89;
-    const real t91 = t2 + t3;
-    const real t92 = t10 * t91;
-    const real t93 = 1.0 - t92;
-    const real t94 = u[0] * t93;
-    const real t95 = t16 - t17;
-    const real t96 = t10 * t95;
-    const real t97 = u[1] * t96;
-    const real t98 = t94 + t97;
-    const real t99 = t90 + t98;
-    const real t100 = t99 * p[6];
-    const real t101 = t85 + t100;
-    const real t102 = t91 * t50;
-    const real t103 = t38 + t45;
-    const real t104 = t10 * t103;
-    const real t105 = t102 - t104;
-    const real t106 = t101 * t105;
-    const real t107 = t96 * d_u[1];
-    const real t108 = t34 - t31;
-    const real t109 = t10 * t108;
-    const real t110 = t95 * t50;
-    const real t111 = t109 - t110;
-    const real t112 = u[1] * t111;
-    const real t113 = t107 + t112;
-    const real t114 = t93 * d_u[0];
-    const real t115 = u[0] * t105;
-    const real t116 = t114 + t115;
-    const real t117 = t113 + t116;
-    const real t118 = t89 * d_u[2];
-    const real t119 = q[3] * d_q[5];
-    const real t120 = q[5] * d_q[3];
-    const real t121 = t119 + t120;
-    const real t122 = q[4] * d_q[6];
-    const real t123 = q[6] * d_q[4];
-    const real t124 = t122 + t123;
-    const real t125 = t121 + t124;
-    const real t126 = t10 * t125;
-    const real t127 = t88 * t50;
-    const real t128 = t126 - t127;
-    const real t129 = u[2] * t128;
-    const real t130 = t118 + t129;
-    const real t131 = t117 + t130;
-    const real t132 = p[6] * t131;
-    const real t133 = p[0] * d_q[0];
-    const real t134 = t132 + t133;
-    const real t135 = t93 * t134;
-    const real t136 = t106 + t135;
-    const real t137 = t83 + t136;
-    const real t138 = q[2] - p[5];
-    const real t139 = t138 * p[2];
-    const real t140 = t3 + t5;
-    const real t141 = t10 * t140;
-    const real t142 = 1.0 - t141;
-    const real t143 = t142 * u[2];
-    const real t144 = t86 - t87;
-    const real t145 = t10 * t144;
-    const real t146 = t145 * u[0];
-    const real t147 = t12 + t11;
-    const real t148 = t10 * t147;
-    const real t149 = t148 * u[1];
-    const real t150 = t146 + t149;
-    const real t151 = t143 + t150;
-    const real t152 = t151 * p[8];
-    const real t153 = t139 + t152;
-    const real t154 = t124 - t121;
-    const real t155 = t10 * t154;
-    const real t156 = t144 * t50;
-    const real t157 = t155 - t156;
-    const real t158 = t153 * t157;
-    const real t159 = t71 + t68;
-    const real t160 = t10 * t159;
-    const real t161 = t147 * t50;
-    const real t162 = t160 - t161;
-    const real t163 = u[1] * t162;
-    const real t164 = t148 * d_u[1];
-    const real t165 = t163 + t164;
-    const real t166 = u[0] * t157;
-    const real t167 = t145 * d_u[0];
-    const real t168 = t166 + t167;
-    const real t169 = t165 + t168;
-    const real t170 = t140 * t50;
-    const real t171 = t40 + t45;
-    const real t172 = t10 * t171;
-    const real t173 = t170 - t172;
-    const real t174 = u[2] * t173;
-    const real t175 = t142 * d_u[2];
-    const real t176 = t174 + t175;
-    const real t177 = t169 + t176;
-    const real t178 = p[8] * t177;
-    const real t179 = p[2] * d_q[2];
-    const real t180 = t178 + t179;
-    const real t181 = t145 * t180;
-    const real t182 = t158 + t181;
-    const real t183 = t137 + t182;
-    const real t184 = d_effort[0] - t183;
-    d_tau[0] = t184;
-    const real t185 = t28 * t58;
-    const real t186 = t23 * t81;
-    const real t187 = t185 + t186;
-    const real t188 = t101 * t111;
-    const real t189 = t96 * t134;
-    const real t190 = t188 + t189;
-    const real t191 = t187 + t190;
-    const real t192 = t153 * t162;
-    const real t193 = t148 * t180;
-    const real t194 = t192 + t193;
-    const real t195 = t191 + t194;
-    const real t196 = d_effort[1] - t195;
-    d_tau[1] = t196;
-    const real t197 = t28 * t75;
-    const real t198 = t14 * t81;
-    const real t199 = t197 + t198;
-    const real t200 = t101 * t128;
-    const real t201 = t89 * t134;
-    const real t202 = t200 + t201;
-    const real t203 = t199 + t202;
-    const real t204 = t153 * t173;
-    const real t205 = t142 * t180;
-    const real t206 = t204 + t205;
-    const real t207 = t203 + t206;
-    const real t208 = d_effort[2] - t207;
-    d_tau[2] = t208;
-    const real t209 = q[6] * B[6];
-    const real t210 = q[4] * B[0];
-    const real t211 = q[5] * B[3];
-    const real t212 = t210 + t211;
-    const real t213 = t209 + t212;
-    const real t214 = t213 * t213;
-    const real t215 = q[6] * B[7];
-    const real t216 = q[4] * B[1];
-    const real t217 = q[5] * B[4];
-    const real t218 = t216 + t217;
-    const real t219 = t215 + t218;
-    const real t220 = t219 * t219;
-    const real t221 = t214 + t220;
-    const real t222 = q[6] * B[8];
-    const real t223 = q[4] * B[2];
-    const real t224 = q[5] * B[5];
-    const real t225 = t223 + t224;
-    const real t226 = t222 + t225;
-    const real t227 = t226 * t226;
-    const real t228 = t4 + t214;
-    const real t229 = t220 + t228;
-    const real t230 = t227 + t229;
-    const real t231 = 1.0 / t230;
-    const real t232 = t221 * t231;
-    const real t233 = t232 < ((real)1 / (real)100);
-    const real t234 = t230 * 5120.0;
-    const real t235 = 1.0 / t234;
-    const real t236 = t235 * 143.0;
-    const real t237 = t221 * t236;
-    const real t238 = t237 + ((real)231 / (real)6656);
-    const real t239 = t221 * t238;
-    const real t240 = t231 * t239;
-    const real t241 = t240 + ((real)63 / (real)1408);
-    const real t242 = t221 * t241;
-    const real t243 = t231 * t242;
-    const real t244 = t243 + ((real)35 / (real)576);
-    const real t245 = t221 * t244;
-    const real t246 = t231 * t245;
-    const real t247 = t246 + ((real)5 / (real)56);
-    const real t248 = t221 * t247;
-    const real t249 = t231 * t248;
-    const real t250 = t249 + ((real)3 / (real)20);
-    const real t251 = t221 * t250;
-    const real t252 = t231 * t251;
-    const real t253 = t252 + ((real)1 / (real)3);
-    const real t254 = t221 * t253;
-    const real t255 = t231 * t254;
-    const real t256 = 2.0 + t255;
-    const real t257 = t4 + t227;
-    const real t258 = 1.0 / t257;
-    const real t259 = t221 * t258;
-    const real t260 = sqrt(t259);
-    const real t261 = atan(t260);
-    const real t262 = sqrt(t232);
-    const real t263 = 1.0 / t262;
-    const real t264 = 2.0 * t263;
-    const real t265 = t261 * t264;
-    const real t266 = t233 != 0 ? t256 : t265;
-    const real t267 = q[3] * t213;
-    const real t268 = t219 * t226;
-    const real t269 = t267 - t268;
-    const real t270 = t266 * t269;
-    const real t271 = sqrt(t257);
-    const real t272 = sqrt(t230);
-    const real t273 = t271 * t272;
-    const real t274 = 1.0 / t273;
-    const real t275 = t270 * t274;
-    const real t276 = B[0] * p[9];
-    const real t277 = B[0] * t276;
-    const real t278 = B[3] * p[10];
-    const real t279 = B[3] * t278;
-    const real t280 = t277 + t279;
-    const real t281 = B[6] * p[11];
-    const real t282 = B[6] * t281;
-    const real t283 = t280 + t282;
-    const real t284 = t275 * t283;
-    const real t285 = q[3] * t219;
-    const real t286 = t213 * t226;
-    const real t287 = t285 + t286;
-    const real t288 = t266 * t287;
-    const real t289 = t274 * t288;
-    const real t290 = B[1] * t276;
-    const real t291 = B[4] * t278;
-    const real t292 = t290 + t291;
-    const real t293 = B[7] * t281;
-    const real t294 = t292 + t293;
-    const real t295 = t289 * t294;
-    const real t296 = t284 + t295;
-    const real t297 = atan2(t226, q[3]);
-    const real t298 = 2.0 * t297;
-    const real t299 = twist_ref[0] - t298;
-    const real t300 = MSTMM_PI * 4.0;
-    const real t301 = 1.0 / t300;
-    const real t302 = t299 * t301;
-    const real t303 = t302 + 0.5;
-    const real t304 = floor(t303);
-    const real t305 = MSTMM_PI * t304;
-    const real t306 = 4.0 * t305;
-    const real t307 = t298 + t306;
-    const real t308 = t307 - p[12];
-    const real t309 = B[2] * t276;
-    const real t310 = B[5] * t278;
-    const real t311 = t309 + t310;
-    const real t312 = B[8] * t281;
-    const real t313 = t311 + t312;
-    const real t314 = t308 * t313;
-    const real t315 = t296 + t314;
-    const real t316 = t235 * 1001.0;
-    const real t317 = t221 * t316;
-    const real t318 = t317 + ((real)693 / (real)3328);
-    const real t319 = t221 * t318;
-    const real t320 = t231 * t319;
-    const real t321 = t320 + ((real)315 / (real)1408);
-    const real t322 = t221 * t321;
-    const real t323 = t231 * t322;
-    const real t324 = t323 + ((real)35 / (real)144);
-    const real t325 = t221 * t324;
-    const real t326 = t231 * t325;
-    const real t327 = t326 + ((real)15 / (real)56);
-    const real t328 = t221 * t327;
-    const real t329 = t231 * t328;
-    const real t330 = t329 + ((real)3 / (real)10);
-    const real t331 = t221 * t330;
-    const real t332 = t231 * t331;
-    const real t333 = ((real)1 / (real)3) + t332;
-    const real t334 = 1.0 - t232;
-    const real t335 = pow(t334, (-0.5));
-    const real t336 = t261 * t263;
-    const real t337 = t335 - t336;
-    const real t338 = t230 * t337;
-    const real t339 = 1.0 / t221;
-    const real t340 = t338 * t339;
-    const real t341 = t233 != 0 ? t333 : t340;
-    const real t342 = t219 * t231;
-    const real t343 = t230 * t230;
-    const real t344 = 1.0 / t343;
-    const real t345 = t219 * t221;
-    const real t346 = t344 * t345;
-    const real t347 = t342 - t346;
-    const real t348 = 2.0 * t347;
-    const real t349 = t269 * t348;
-    const real t350 = t341 * t349;
-    const real t351 = t274 * t350;
-    const real t352 = t226 * t266;
-    const real t353 = t274 * t352;
-    const real t354 = t351 - t353;
-    const real t355 = pow(t230, 1.5);
-    const real t356 = t271 * t355;
-    const real t357 = 1.0 / t356;
-    const real t358 = t219 * t270;
-    const real t359 = t357 * t358;
-    const real t360 = t354 - t359;
-    const real t361 = t315 * t360;
-    const real t362 = B[1] * p[9];
-    const real t363 = B[0] * t362;
-    const real t364 = B[4] * p[10];
-    const real t365 = B[3] * t364;
-    const real t366 = t363 + t365;
-    const real t367 = B[7] * p[11];
-    const real t368 = B[6] * t367;
-    const real t369 = t366 + t368;
-    const real t370 = t275 * t369;
-    const real t371 = B[1] * t362;
-    const real t372 = B[4] * t364;
-    const real t373 = t371 + t372;
-    const real t374 = B[7] * t367;
-    const real t375 = t373 + t374;
-    const real t376 = t289 * t375;
-    const real t377 = t370 + t376;
-    const real t378 = B[2] * t362;
-    const real t379 = B[5] * t364;
-    const real t380 = t378 + t379;
-    const real t381 = B[8] * t367;
-    const real t382 = t380 + t381;
-    const real t383 = t308 * t382;
-    const real t384 = t377 + t383;
-    const real t385 = q[3] * t266;
-    const real t386 = t274 * t385;
-    const real t387 = t287 * t348;
-    const real t388 = t341 * t387;
-    const real t389 = t274 * t388;
-    const real t390 = t386 + t389;
-    const real t391 = t219 * t288;
-    const real t392 = t357 * t391;
-    const real t393 = t390 - t392;
-    const real t394 = t384 * t393;
-    const real t395 = t361 + t394;
-    const real t396 = B[3] * d_q[5];
-    const real t397 = B[0] * d_q[4];
-    const real t398 = t396 + t397;
-    const real t399 = B[6] * d_q[6];
-    const real t400 = t398 + t399;
-    const real t401 = t395 * t400;
-    const real t402 = B[5] * d_q[5];
-    const real t403 = B[2] * d_q[4];
-    const real t404 = t402 + t403;
-    const real t405 = B[8] * d_q[6];
-    const real t406 = t404 + t405;
-    const real t407 = q[3] * t406;
-    const real t408 = t226 * d_q[3];
-    const real t409 = t407 - t408;
-    const real t410 = t409 / t257;
-    const real t411 = 2.0 * t410;
-    const real t412 = t382 * t411;
-    const real t413 = t213 * t400;
-    const real t414 = t413 + t413;
-    const real t415 = B[4] * d_q[5];
-    const real t416 = B[1] * d_q[4];
-    const real t417 = t415 + t416;
-    const real t418 = B[7] * d_q[6];
-    const real t419 = t417 + t418;
-    const real t420 = t219 * t419;
-    const real t421 = t420 + t420;
-    const real t422 = t414 + t421;
-    const real t423 = t253 * t422;
-    const real t424 = t250 * t422;
-    const real t425 = t247 * t422;
-    const real t426 = t244 * t422;
-    const real t427 = t241 * t422;
-    const real t428 = t238 * t422;
-    const real t429 = t236 * t422;
-    const real t430 = t42 + t414;
-    const real t431 = t430 + t421;
-    const real t432 = t226 * t406;
-    const real t433 = t432 + t432;
-    const real t434 = t431 + t433;
-    const real t435 = 5120.0 * t434;
-    const real t436 = t235 * t435;
-    const real t437 = t436 / t234;
-    const real t438 = 143.0 * t437;
-    const real t439 = t221 * t438;
-    const real t440 = t429 - t439;
-    const real t441 = t221 * t440;
-    const real t442 = t428 + t441;
-    const real t443 = t231 * t442;
-    const real t444 = t231 * t434;
-    const real t445 = t444 / t230;
-    const real t446 = t239 * t445;
-    const real t447 = t443 - t446;
-    const real t448 = t221 * t447;
-    const real t449 = t427 + t448;
-    const real t450 = t231 * t449;
-    const real t451 = t242 * t445;
-    const real t452 = t450 - t451;
-    const real t453 = t221 * t452;
-    const real t454 = t426 + t453;
-    const real t455 = t231 * t454;
-    const real t456 = t245 * t445;
-    const real t457 = t455 - t456;
-    const real t458 = t221 * t457;
-    const real t459 = t425 + t458;
-    const real t460 = t231 * t459;
-    const real t461 = t248 * t445;
-    const real t462 = t460 - t461;
-    const real t463 = t221 * t462;
-    const real t464 = t424 + t463;
-    const real t465 = t231 * t464;
-    const real t466 = t251 * t445;
-    const real t467 = t465 - t466;
-    const real t468 = t221 * t467;
-    const real t469 = t423 + t468;
-    const real t470 = t231 * t469;
-    const real t471 = t254 * t445;
-    const real t472 = t470 - t471;
-    const real t473 = t258 * t422;
-    const real t474 = t42 + t433;
-    const real t475 = t258 * t474;
-    const real t476 = t475 / t257;
-    const real t477 = t221 * t476;
-    const real t478 = t473 - t477;
-    const real t479 = 2.0 * t260;
-    const real t480 = t478 / t479;
-    const real t481 = t260 * t260;
-    const real t482 = 1.0 + t481;
-    const real t483 = t480 / t482;
-    const real t484 = t264 * t483;
-    const real t485 = t231 * t422;
-    const real t486 = t221 * t445;
-    const real t487 = t485 - t486;
-    const real t488 = 2.0 * t262;
-    const real t489 = t487 / t488;
-    const real t490 = t263 * t489;
-    const real t491 = t490 / t262;
-    const real t492 = 2.0 * t491;
-    const real t493 = t261 * t492;
-    const real t494 = t484 - t493;
-    const real t495 = t233 != 0 ? t472 : t494;
-    const real t496 = t287 * t495;
-    const real t497 = t226 * t400;
-    const real t498 = t213 * t406;
-    const real t499 = t497 + t498;
-    const real t500 = t219 * d_q[3];
-    const real t501 = q[3] * t419;
-    const real t502 = t500 + t501;
-    const real t503 = t499 + t502;
-    const real t504 = t266 * t503;
-    const real t505 = t496 + t504;
-    const real t506 = t274 * t505;
-    const real t507 = 2.0 * t271;
-    const real t508 = t474 / t507;
-    const real t509 = t272 * t508;
-    const real t510 = 2.0 * t272;
-    const real t511 = t434 / t510;
-    const real t512 = t271 * t511;
-    const real t513 = t509 + t512;
-    const real t514 = t274 * t513;
-    const real t515 = t514 / t273;
-    const real t516 = t288 * t515;
-    const real t517 = t506 - t516;
-    const real t518 = t375 * t517;
-    const real t519 = t269 * t495;
-    const real t520 = t213 * d_q[3];
-    const real t521 = q[3] * t400;
-    const real t522 = t520 + t521;
-    const real t523 = t226 * t419;
-    const real t524 = t219 * t406;
-    const real t525 = t523 + t524;
-    const real t526 = t522 - t525;
-    const real t527 = t266 * t526;
-    const real t528 = t519 + t527;
-    const real t529 = t274 * t528;
-    const real t530 = t270 * t515;
-    const real t531 = t529 - t530;
-    const real t532 = t369 * t531;
-    const real t533 = t518 + t532;
-    const real t534 = t412 + t533;
-    const real t535 = t393 * t534;
-    const real t536 = t266 * d_q[3];
-    const real t537 = q[3] * t495;
-    const real t538 = t536 + t537;
-    const real t539 = t274 * t538;
-    const real t540 = t385 * t515;
-    const real t541 = t539 - t540;
-    const real t542 = t330 * t422;
-    const real t543 = t327 * t422;
-    const real t544 = t324 * t422;
-    const real t545 = t321 * t422;
-    const real t546 = t318 * t422;
-    const real t547 = t316 * t422;
-    const real t548 = 1001.0 * t437;
-    const real t549 = t221 * t548;
-    const real t550 = t547 - t549;
-    const real t551 = t221 * t550;
-    const real t552 = t546 + t551;
-    const real t553 = t231 * t552;
-    const real t554 = t319 * t445;
-    const real t555 = t553 - t554;
-    const real t556 = t221 * t555;
-    const real t557 = t545 + t556;
-    const real t558 = t231 * t557;
-    const real t559 = t322 * t445;
-    const real t560 = t558 - t559;
-    const real t561 = t221 * t560;
-    const real t562 = t544 + t561;
-    const real t563 = t231 * t562;
-    const real t564 = t325 * t445;
-    const real t565 = t563 - t564;
-    const real t566 = t221 * t565;
-    const real t567 = t543 + t566;
-    const real t568 = t231 * t567;
-    const real t569 = t328 * t445;
-    const real t570 = t568 - t569;
-    const real t571 = t221 * t570;
-    const real t572 = t542 + t571;
-    const real t573 = t231 * t572;
-    const real t574 = t331 * t445;
-    const real t575 = t573 - t574;
-    const real t576 = t337 * t434;
-    const real t577 = t263 * t483;
-    const real t578 = t261 * t491;
-    const real t579 = t577 - t578;
-    const real t580 = t486 - t485;
-    const real t581 = pow(t334, (-1.5));
-    const real t582 = 0.5 * t581;
-    const real t583 = t580 * t582;
-    const real t584 = t579 + t583;
-    const real t585 = t230 * t584;
-    const real t586 = t576 - t585;
-    const real t587 = t339 * t586;
-    const real t588 = t339 * t422;
-    const real t589 = t588 / t221;
-    const real t590 = t338 * t589;
-    const real t591 = t587 - t590;
-    const real t592 = t233 != 0 ? t575 : t591;
-    const real t593 = t387 * t592;
-    const real t594 = t348 * t503;
-    const real t595 = t231 * t419;
-    const real t596 = t219 * t445;
-    const real t597 = t595 - t596;
-    const real t598 = t221 * t419;
-    const real t599 = t219 * t422;
-    const real t600 = t598 + t599;
-    const real t601 = t344 * t600;
-    const real t602 = t230 * t434;
-    const real t603 = t602 + t602;
-    const real t604 = t344 * t603;
-    const real t605 = t604 / t343;
-    const real t606 = t345 * t605;
-    const real t607 = t601 - t606;
-    const real t608 = t597 - t607;
-    const real t609 = 2.0 * t608;
-    const real t610 = t287 * t609;
-    const real t611 = t594 + t610;
-    const real t612 = t341 * t611;
-    const real t613 = t593 + t612;
-    const real t614 = t274 * t613;
-    const real t615 = t388 * t515;
-    const real t616 = t614 - t615;
-    const real t617 = t541 + t616;
-    const real t618 = t288 * t419;
-    const real t619 = t219 * t505;
-    const real t620 = t618 + t619;
-    const real t621 = t357 * t620;
-    const real t622 = t355 * t508;
-    const real t623 = t272 * 1.5;
-    const real t624 = t434 * t623;
-    const real t625 = t271 * t624;
-    const real t626 = t622 + t625;
-    const real t627 = t357 * t626;
-    const real t628 = t627 / t356;
-    const real t629 = t391 * t628;
-    const real t630 = t621 - t629;
-    const real t631 = t617 - t630;
-    const real t632 = t384 * t631;
-    const real t633 = t535 + t632;
-    const real t634 = t313 * t411;
-    const real t635 = t294 * t517;
-    const real t636 = t283 * t531;
-    const real t637 = t635 + t636;
-    const real t638 = t634 + t637;
-    const real t639 = t360 * t638;
-    const real t640 = t349 * t592;
-    const real t641 = t348 * t526;
-    const real t642 = t269 * t609;
-    const real t643 = t641 + t642;
-    const real t644 = t341 * t643;
-    const real t645 = t640 + t644;
-    const real t646 = t274 * t645;
-    const real t647 = t350 * t515;
-    const real t648 = t646 - t647;
-    const real t649 = t266 * t406;
-    const real t650 = t226 * t495;
-    const real t651 = t649 + t650;
-    const real t652 = t274 * t651;
-    const real t653 = t352 * t515;
-    const real t654 = t652 - t653;
-    const real t655 = t648 - t654;
-    const real t656 = t270 * t419;
-    const real t657 = t219 * t528;
-    const real t658 = t656 + t657;
-    const real t659 = t357 * t658;
-    const real t660 = t358 * t628;
-    const real t661 = t659 - t660;
-    const real t662 = t655 - t661;
-    const real t663 = t315 * t662;
-    const real t664 = t639 + t663;
-    const real t665 = t633 + t664;
-    const real t666 = t213 * t665;
-    const real t667 = t401 + t666;
-    const real t668 = 0.5 * t667;
-    const real t669 = t213 * t231;
-    const real t670 = t213 * t221;
-    const real t671 = t670 * t344;
-    const real t672 = t669 - t671;
-    const real t673 = 2.0 * t672;
-    const real t674 = t269 * t673;
-    const real t675 = t341 * t674;
-    const real t676 = t274 * t675;
-    const real t677 = t386 + t676;
-    const real t678 = t213 * t270;
-    const real t679 = t357 * t678;
-    const real t680 = t677 - t679;
-    const real t681 = t315 * t680;
-    const real t682 = t287 * t673;
-    const real t683 = t341 * t682;
-    const real t684 = t274 * t683;
-    const real t685 = t353 + t684;
-    const real t686 = t213 * t288;
-    const real t687 = t357 * t686;
-    const real t688 = t685 - t687;
-    const real t689 = t384 * t688;
-    const real t690 = t681 + t689;
-    const real t691 = t690 * t419;
-    const real t692 = t688 * t534;
-    const real t693 = t682 * t592;
-    const real t694 = t673 * t503;
-    const real t695 = t231 * t400;
-    const real t696 = t213 * t445;
-    const real t697 = t695 - t696;
-    const real t698 = t221 * t400;
-    const real t699 = t213 * t422;
-    const real t700 = t698 + t699;
-    const real t701 = t344 * t700;
-    const real t702 = t670 * t605;
-    const real t703 = t701 - t702;
-    const real t704 = t697 - t703;
-    const real t705 = 2.0 * t704;
-    const real t706 = t287 * t705;
-    const real t707 = t694 + t706;
-    const real t708 = t341 * t707;
-    const real t709 = t693 + t708;
-    const real t710 = t274 * t709;
-    const real t711 = t683 * t515;
-    const real t712 = t710 - t711;
-    const real t713 = t712 + t654;
-    const real t714 = t288 * t400;
-    const real t715 = t213 * t505;
-    const real t716 = t714 + t715;
-    const real t717 = t357 * t716;
-    const real t718 = t686 * t628;
-    const real t719 = t717 - t718;
-    const real t720 = t713 - t719;
-    const real t721 = t384 * t720;
-    const real t722 = t692 + t721;
-    const real t723 = t680 * t638;
-    const real t724 = t674 * t592;
-    const real t725 = t673 * t526;
-    const real t726 = t269 * t705;
-    const real t727 = t725 + t726;
-    const real t728 = t341 * t727;
-    const real t729 = t724 + t728;
-    const real t730 = t274 * t729;
-    const real t731 = t675 * t515;
-    const real t732 = t730 - t731;
-    const real t733 = t732 + t541;
-    const real t734 = t270 * t400;
-    const real t735 = t213 * t528;
-    const real t736 = t734 + t735;
-    const real t737 = t357 * t736;
-    const real t738 = t678 * t628;
-    const real t739 = t737 - t738;
-    const real t740 = t733 - t739;
-    const real t741 = t315 * t740;
-    const real t742 = t723 + t741;
-    const real t743 = t722 + t742;
-    const real t744 = t219 * t743;
-    const real t745 = t691 + t744;
-    const real t746 = 0.5 * t745;
-    const real t747 = t668 - t746;
-    const real t748 = t213 * t266;
-    const real t749 = t274 * t748;
-    const real t750 = q[3] * t270;
-    const real t751 = pow(t257, 1.5);
-    const real t752 = t272 * t751;
-    const real t753 = 1.0 / t752;
-    const real t754 = t750 * t753;
-    const real t755 = t749 - t754;
-    const real t756 = t750 * t357;
-    const real t757 = t755 - t756;
-    const real t758 = t221 * t269;
-    const real t759 = t341 * t758;
-    const real t760 = q[3] * t759;
-    const real t761 = pow(t230, 2.5);
-    const real t762 = t271 * t761;
-    const real t763 = 1.0 / t762;
-    const real t764 = 2.0 * t763;
-    const real t765 = t760 * t764;
-    const real t766 = t757 - t765;
-    const real t767 = t315 * t766;
-    const real t768 = t219 * t266;
-    const real t769 = t274 * t768;
-    const real t770 = q[3] * t288;
-    const real t771 = t753 * t770;
-    const real t772 = t769 - t771;
-    const real t773 = t357 * t770;
-    const real t774 = t772 - t773;
-    const real t775 = t221 * t287;
-    const real t776 = t341 * t775;
-    const real t777 = q[3] * t776;
-    const real t778 = t764 * t777;
-    const real t779 = t774 - t778;
-    const real t780 = t384 * t779;
-    const real t781 = t767 + t780;
-    const real t782 = t781 * t406;
-    const real t783 = t779 * t534;
-    const real t784 = t266 * t419;
-    const real t785 = t219 * t495;
-    const real t786 = t784 + t785;
-    const real t787 = t274 * t786;
-    const real t788 = t768 * t515;
-    const real t789 = t787 - t788;
-    const real t790 = t288 * d_q[3];
-    const real t791 = q[3] * t505;
-    const real t792 = t790 + t791;
-    const real t793 = t753 * t792;
-    const real t794 = t751 * t511;
-    const real t795 = t271 * 1.5;
-    const real t796 = t474 * t795;
-    const real t797 = t272 * t796;
-    const real t798 = t794 + t797;
-    const real t799 = t753 * t798;
-    const real t800 = t799 / t752;
-    const real t801 = t770 * t800;
-    const real t802 = t793 - t801;
-    const real t803 = t789 - t802;
-    const real t804 = t357 * t792;
-    const real t805 = t770 * t628;
-    const real t806 = t804 - t805;
-    const real t807 = t803 - t806;
-    const real t808 = t776 * d_q[3];
-    const real t809 = t775 * t592;
-    const real t810 = t287 * t422;
-    const real t811 = t221 * t503;
-    const real t812 = t810 + t811;
-    const real t813 = t341 * t812;
-    const real t814 = t809 + t813;
-    const real t815 = q[3] * t814;
-    const real t816 = t808 + t815;
-    const real t817 = t764 * t816;
-    const real t818 = t761 * t508;
-    const real t819 = t355 * 2.5;
-    const real t820 = t434 * t819;
-    const real t821 = t271 * t820;
-    const real t822 = t818 + t821;
-    const real t823 = t763 * t822;
-    const real t824 = t823 / t762;
-    const real t825 = 2.0 * t824;
-    const real t826 = t777 * t825;
-    const real t827 = t817 - t826;
-    const real t828 = t807 - t827;
-    const real t829 = t384 * t828;
-    const real t830 = t783 + t829;
-    const real t831 = t766 * t638;
-    const real t832 = t266 * t400;
-    const real t833 = t213 * t495;
-    const real t834 = t832 + t833;
-    const real t835 = t274 * t834;
-    const real t836 = t748 * t515;
-    const real t837 = t835 - t836;
-    const real t838 = t270 * d_q[3];
-    const real t839 = q[3] * t528;
-    const real t840 = t838 + t839;
-    const real t841 = t753 * t840;
-    const real t842 = t750 * t800;
-    const real t843 = t841 - t842;
-    const real t844 = t837 - t843;
-    const real t845 = t357 * t840;
-    const real t846 = t750 * t628;
-    const real t847 = t845 - t846;
-    const real t848 = t844 - t847;
-    const real t849 = t759 * d_q[3];
-    const real t850 = t758 * t592;
-    const real t851 = t269 * t422;
-    const real t852 = t221 * t526;
-    const real t853 = t851 + t852;
-    const real t854 = t341 * t853;
-    const real t855 = t850 + t854;
-    const real t856 = q[3] * t855;
-    const real t857 = t849 + t856;
-    const real t858 = t764 * t857;
-    const real t859 = t760 * t825;
-    const real t860 = t858 - t859;
-    const real t861 = t848 - t860;
-    const real t862 = t315 * t861;
-    const real t863 = t831 + t862;
-    const real t864 = t830 + t863;
-    const real t865 = t226 * t864;
-    const real t866 = t782 + t865;
-    const real t867 = 0.5 * t866;
-    const real t868 = t747 + t867;
-    const real t869 = t226 * t288;
-    const real t870 = t753 * t869;
-    const real t871 = t749 - t870;
-    const real t872 = t357 * t869;
-    const real t873 = t871 - t872;
-    const real t874 = t226 * t776;
-    const real t875 = t764 * t874;
-    const real t876 = t873 - t875;
-    const real t877 = t384 * t876;
-    const real t878 = t226 * t759;
-    const real t879 = t764 * t878;
-    const real t880 = t226 * t270;
-    const real t881 = t357 * t880;
-    const real t882 = t753 * t880;
-    const real t883 = t769 + t882;
-    const real t884 = t881 + t883;
-    const real t885 = t879 + t884;
-    const real t886 = t315 * t885;
-    const real t887 = t877 - t886;
-    const real t888 = t887 * d_q[3];
-    const real t889 = t876 * t534;
-    const real t890 = t288 * t406;
-    const real t891 = t226 * t505;
-    const real t892 = t890 + t891;
-    const real t893 = t753 * t892;
-    const real t894 = t869 * t800;
-    const real t895 = t893 - t894;
-    const real t896 = t837 - t895;
-    const real t897 = t357 * t892;
-    const real t898 = t869 * t628;
-    const real t899 = t897 - t898;
-    const real t900 = t896 - t899;
-    const real t901 = t776 * t406;
-    const real t902 = t226 * t814;
-    const real t903 = t901 + t902;
-    const real t904 = t764 * t903;
-    const real t905 = t874 * t825;
-    const real t906 = t904 - t905;
-    const real t907 = t900 - t906;
-    const real t908 = t384 * t907;
-    const real t909 = t889 + t908;
-    const real t910 = t885 * t638;
-    const real t911 = t270 * t406;
-    const real t912 = t226 * t528;
-    const real t913 = t911 + t912;
-    const real t914 = t753 * t913;
-    const real t915 = t880 * t800;
-    const real t916 = t914 - t915;
-    const real t917 = t916 + t789;
-    const real t918 = t357 * t913;
-    const real t919 = t880 * t628;
-    const real t920 = t918 - t919;
-    const real t921 = t917 + t920;
-    const real t922 = t759 * t406;
-    const real t923 = t226 * t855;
-    const real t924 = t922 + t923;
-    const real t925 = t764 * t924;
-    const real t926 = t878 * t825;
-    const real t927 = t925 - t926;
-    const real t928 = t921 + t927;
-    const real t929 = t315 * t928;
-    const real t930 = t910 + t929;
-    const real t931 = t909 - t930;
-    const real t932 = q[3] * t931;
-    const real t933 = t888 + t932;
-    const real t934 = 0.5 * t933;
-    const real t935 = t868 - t934;
-    const real t936 = B[2] * p[9];
-    const real t937 = B[0] * t936;
-    const real t938 = B[5] * p[10];
-    const real t939 = B[3] * t938;
-    const real t940 = t937 + t939;
-    const real t941 = B[8] * p[11];
-    const real t942 = B[6] * t941;
-    const real t943 = t940 + t942;
-    const real t944 = t275 * t943;
-    const real t945 = B[1] * t936;
-    const real t946 = B[4] * t938;
-    const real t947 = t945 + t946;
-    const real t948 = B[7] * t941;
-    const real t949 = t947 + t948;
-    const real t950 = t289 * t949;
-    const real t951 = t944 + t950;
-    const real t952 = B[2] * t936;
-    const real t953 = B[5] * t938;
-    const real t954 = t952 + t953;
-    const real t955 = B[8] * t941;
-    const real t956 = t954 + t955;
-    const real t957 = t308 * t956;
-    const real t958 = t951 + t957;
-    const real t959 = t958 * t42;
-    const real t960 = t956 * t411;
-    const real t961 = t949 * t517;
-    const real t962 = t943 * t531;
-    const real t963 = t961 + t962;
-    const real t964 = t960 + t963;
-    const real t965 = t4 * t964;
-    const real t966 = t959 + t965;
-    const real t967 = t258 * t966;
-    const real t968 = t4 * t958;
-    const real t969 = t968 * t476;
-    const real t970 = t967 - t969;
-    const real t971 = t935 - t970;
-    const real t972 = t958 * t433;
-    const real t973 = t227 * t964;
-    const real t974 = t972 + t973;
-    const real t975 = t258 * t974;
-    const real t976 = t227 * t958;
-    const real t977 = t976 * t476;
-    const real t978 = t975 - t977;
-    const real t979 = t971 - t978;
-    const real t980 = B[2] * t979;
-    const real t981 = t781 * t400;
-    const real t982 = t213 * t864;
-    const real t983 = t981 + t982;
-    const real t984 = 0.5 * t983;
-    const real t985 = t395 * t406;
-    const real t986 = t226 * t665;
-    const real t987 = t985 + t986;
-    const real t988 = 0.5 * t987;
-    const real t989 = t690 * d_q[3];
-    const real t990 = q[3] * t743;
-    const real t991 = t989 + t990;
-    const real t992 = 0.5 * t991;
-    const real t993 = t988 + t992;
-    const real t994 = t984 - t993;
-    const real t995 = t887 * t419;
-    const real t996 = t219 * t931;
-    const real t997 = t995 + t996;
-    const real t998 = 0.5 * t997;
-    const real t999 = t994 + t998;
-    const real t1000 = t958 * t502;
-    const real t1001 = t285 * t964;
-    const real t1002 = t1000 + t1001;
-    const real t1003 = t258 * t1002;
-    const real t1004 = t285 * t958;
-    const real t1005 = t1004 * t476;
-    const real t1006 = t1003 - t1005;
-    const real t1007 = t999 + t1006;
-    const real t1008 = t958 * t499;
-    const real t1009 = t286 * t964;
-    const real t1010 = t1008 + t1009;
-    const real t1011 = t258 * t1010;
-    const real t1012 = t286 * t958;
-    const real t1013 = t1012 * t476;
-    const real t1014 = t1011 - t1013;
-    const real t1015 = t1007 - t1014;
-    const real t1016 = B[0] * t1015;
-    const real t1017 = t980 + t1016;
-    const real t1018 = t690 * t406;
-    const real t1019 = t226 * t743;
-    const real t1020 = t1018 + t1019;
-    const real t1021 = 0.5 * t1020;
-    const real t1022 = t395 * d_q[3];
-    const real t1023 = q[3] * t665;
-    const real t1024 = t1022 + t1023;
-    const real t1025 = 0.5 * t1024;
-    const real t1026 = t1021 - t1025;
-    const real t1027 = t781 * t419;
-    const real t1028 = t219 * t864;
-    const real t1029 = t1027 + t1028;
-    const real t1030 = 0.5 * t1029;
-    const real t1031 = t1026 + t1030;
-    const real t1032 = t887 * t400;
-    const real t1033 = t213 * t931;
-    const real t1034 = t1032 + t1033;
-    const real t1035 = 0.5 * t1034;
-    const real t1036 = t1031 - t1035;
-    const real t1037 = t958 * t522;
-    const real t1038 = t267 * t964;
-    const real t1039 = t1037 + t1038;
-    const real t1040 = t258 * t1039;
-    const real t1041 = t267 * t958;
-    const real t1042 = t1041 * t476;
-    const real t1043 = t1040 - t1042;
-    const real t1044 = t1036 - t1043;
-    const real t1045 = t958 * t525;
-    const real t1046 = t268 * t964;
-    const real t1047 = t1045 + t1046;
-    const real t1048 = t258 * t1047;
-    const real t1049 = t268 * t958;
-    const real t1050 = t1049 * t476;
-    const real t1051 = t1048 - t1050;
-    const real t1052 = t1044 - t1051;
-    const real t1053 = B[1] * t1052;
-    const real t1054 = t1017 + t1053;
-    const real t1055 = p[13] * d_u[3];
-    const real t1056 = t1054 - t1055;
-    const real t1057 = d_effort[3] + t1056;
-    d_tau[3] = t1057;
-    const real t1058 = B[5] * t979;
-    const real t1059 = B[3] * t1015;
-    const real t1060 = t1058 + t1059;
-    const real t1061 = B[4] * t1052;
-    const real t1062 = t1060 + t1061;
-    const real t1063 = p[14] * d_u[4];
-    const real t1064 = t1062 - t1063;
-    const real t1065 = d_effort[4] + t1064;
-    d_tau[4] = t1065;
-    const real t1066 = B[8] * t979;
-    const real t1067 = B[6] * t1015;
-    const real t1068 = t1066 + t1067;
-    const real t1069 = B[7] * t1052;
-    const real t1070 = t1068 + t1069;
-    const real t1071 = p[15] * d_u[5];
-    const real t1072 = t1070 - t1071;
-    const real t1073 = d_effort[5] + t1072;
-    d_tau[5] = t1073;
-    return 0;
+  (void)effort;
+  real t2 = q[6] * q[6];
+  real t3 = q[5] * q[5];
+  real t4 = q[3] * q[3];
+  real t5 = q[4] * q[4];
+  real t8 = t2 + (t3 + (t4 + t5));
+  real t9 = 1.0 / t8;
+  real t10 = t9 * 2.0;
+  real t11 = q[6] * q[5];
+  real t12 = q[3] * q[4];
+  real t13 = t11 - t12;
+  real t14 = t10 * t13;
+  real t16 = q[5] * q[4];
+  real t17 = q[6] * q[3];
+  real t18 = t16 + t17;
+  real t19 = t10 * t18;
+  real t21 = t2 + t5;
+  real t23 = 1.0 - t10 * t21;
+  real t28 = (q[1] - p[4]) * p[1] + (u[2] * t14 + (u[0] * t19 + u[1] * t23)) * p[7];
+  real t31 = q[3] * d_q[6] + q[6] * d_q[3];
+  real t34 = q[4] * d_q[5] + q[5] * d_q[4];
+  real t37 = q[6] * d_q[6];
+  real t38 = t37 + t37;
+  real t39 = q[4] * d_q[4];
+  real t40 = t39 + t39;
+  real t41 = q[3] * d_q[3];
+  real t42 = t41 + t41;
+  real t44 = q[5] * d_q[5];
+  real t45 = t44 + t44;
+  real t50 = 2.0 * (t9 * (t38 + (t40 + t42 + t45)) / t8);
+  real t52 = t10 * (t31 + t34) - t18 * t50;
+  real t58 = t21 * t50 - t10 * (t40 + t38);
+  real t68 = q[5] * d_q[6] + q[6] * d_q[5];
+  real t71 = q[4] * d_q[3] + q[3] * d_q[4];
+  real t75 = t10 * (t68 - t71) - t13 * t50;
+  real t81 = p[7] * (t23 * d_u[1] + u[1] * t58 + (t19 * d_u[0] + u[0] * t52) + (t14 * d_u[2] + u[2]
+    * t75)) + p[1] * d_q[1];
+  real t86 = q[6] * q[4];
+  real t87 = q[5] * q[3];
+  real t88 = t86 + t87;
+  real t89 = t10 * t88;
+  real t91 = t2 + t3;
+  real t93 = 1.0 - t10 * t91;
+  real t95 = t16 - t17;
+  real t96 = t10 * t95;
+  real t101 = (q[0] - p[3]) * p[0] + (u[2] * t89 + (u[0] * t93 + u[1] * t96)) * p[6];
+  real t105 = t91 * t50 - t10 * (t38 + t45);
+  real t111 = t10 * (t34 - t31) - t95 * t50;
+  real t121 = q[3] * d_q[5] + q[5] * d_q[3];
+  real t124 = q[4] * d_q[6] + q[6] * d_q[4];
+  real t128 = t10 * (t121 + t124) - t88 * t50;
+  real t134 = p[6] * (t96 * d_u[1] + u[1] * t111 + (t93 * d_u[0] + u[0] * t105) + (t89 * d_u[2] +
+    u[2] * t128)) + p[0] * d_q[0];
+  real t140 = t3 + t5;
+  real t142 = 1.0 - t10 * t140;
+  real t144 = t86 - t87;
+  real t145 = t10 * t144;
+  real t147 = t12 + t11;
+  real t148 = t10 * t147;
+  real t153 = (q[2] - p[5]) * p[2] + (t142 * u[2] + (t145 * u[0] + t148 * u[1])) * p[8];
+  real t157 = t10 * (t124 - t121) - t144 * t50;
+  real t162 = t10 * (t71 + t68) - t147 * t50;
+  real t173 = t140 * t50 - t10 * (t40 + t45);
+  real t180 = p[8] * (u[1] * t162 + t148 * d_u[1] + (u[0] * t157 + t145 * d_u[0]) + (u[2] * t173 +
+    t142 * d_u[2])) + p[2] * d_q[2];
+  d_tau[0] = d_effort[0] - (t28 * t52 + t19 * t81 + (t101 * t105 + t93 * t134) + (t153 * t157 + t145
+    * t180));
+  d_tau[1] = d_effort[1] - (t28 * t58 + t23 * t81 + (t101 * t111 + t96 * t134) + (t153 * t162 + t148
+    * t180));
+  d_tau[2] = d_effort[2] - (t28 * t75 + t14 * t81 + (t101 * t128 + t89 * t134) + (t153 * t173 + t142
+    * t180));
+  real t213 = q[6] * B[6] + (q[4] * B[0] + q[5] * B[3]);
+  real t214 = t213 * t213;
+  real t219 = q[6] * B[7] + (q[4] * B[1] + q[5] * B[4]);
+  real t220 = t219 * t219;
+  real t221 = t214 + t220;
+  real t226 = q[6] * B[8] + (q[4] * B[2] + q[5] * B[5]);
+  real t227 = t226 * t226;
+  real t230 = t227 + (t220 + (t4 + t214));
+  real t231 = 1.0 / t230;
+  real t232 = t221 * t231;
+  real t233 = t232 < ((real)1 / (real)100);
+  real t234 = t230 * 5120.0;
+  real t235 = 1.0 / t234;
+  real t236 = t235 * 143.0;
+  real t238 = t221 * t236 + ((real)231 / (real)6656);
+  real t239 = t221 * t238;
+  real t241 = t231 * t239 + ((real)63 / (real)1408);
+  real t242 = t221 * t241;
+  real t244 = t231 * t242 + ((real)35 / (real)576);
+  real t245 = t221 * t244;
+  real t247 = t231 * t245 + ((real)5 / (real)56);
+  real t248 = t221 * t247;
+  real t250 = t231 * t248 + ((real)3 / (real)20);
+  real t251 = t221 * t250;
+  real t253 = t231 * t251 + ((real)1 / (real)3);
+  real t254 = t221 * t253;
+  real t256 = 2.0 + t231 * t254;
+  real t257 = t4 + t227;
+  real t258 = 1.0 / t257;
+  real t260 = sqrt(t221 * t258);
+  real t261 = atan(t260);
+  real t262 = sqrt(t232);
+  real t263 = 1.0 / t262;
+  real t264 = 2.0 * t263;
+  real t265 = t261 * t264;
+  real t266 = t233 != 0 ? t256 : t265;
+  real t267 = q[3] * t213;
+  real t268 = t219 * t226;
+  real t269 = t267 - t268;
+  real t270 = t266 * t269;
+  real t271 = sqrt(t257);
+  real t272 = sqrt(t230);
+  real t273 = t271 * t272;
+  real t274 = 1.0 / t273;
+  real t275 = t270 * t274;
+  real t276 = B[0] * p[9];
+  real t278 = B[3] * p[10];
+  real t281 = B[6] * p[11];
+  real t283 = B[0] * t276 + B[3] * t278 + B[6] * t281;
+  real t285 = q[3] * t219;
+  real t286 = t213 * t226;
+  real t287 = t285 + t286;
+  real t288 = t266 * t287;
+  real t289 = t274 * t288;
+  real t294 = B[1] * t276 + B[4] * t278 + B[7] * t281;
+  real t298 = 2.0 * (atan2(t226, q[3]));
+  real t308 = t298 + 4.0 * (MSTMM_PI * floor((twist_ref[0] - t298) * (1.0 / (MSTMM_PI * 4.0)) +
+    0.5)) - p[12];
+  real t313 = B[2] * t276 + B[5] * t278 + B[8] * t281;
+  real t315 = t275 * t283 + t289 * t294 + t308 * t313;
+  real t316 = t235 * 1001.0;
+  real t318 = t221 * t316 + ((real)693 / (real)3328);
+  real t319 = t221 * t318;
+  real t321 = t231 * t319 + ((real)315 / (real)1408);
+  real t322 = t221 * t321;
+  real t324 = t231 * t322 + ((real)35 / (real)144);
+  real t325 = t221 * t324;
+  real t327 = t231 * t325 + ((real)15 / (real)56);
+  real t328 = t221 * t327;
+  real t330 = t231 * t328 + ((real)3 / (real)10);
+  real t331 = t221 * t330;
+  real t333 = ((real)1 / (real)3) + t231 * t331;
+  real t334 = 1.0 - t232;
+  real t337 = (pow(t334, (-0.5))) - t261 * t263;
+  real t338 = t230 * t337;
+  real t339 = 1.0 / t221;
+  real t340 = t338 * t339;
+  real t341 = t233 != 0 ? t333 : t340;
+  real t343 = t230 * t230;
+  real t344 = 1.0 / t343;
+  real t345 = t219 * t221;
+  real t348 = 2.0 * (t219 * t231 - t344 * t345);
+  real t349 = t269 * t348;
+  real t350 = t341 * t349;
+  real t352 = t226 * t266;
+  real t353 = t274 * t352;
+  real t355 = pow(t230, 1.5);
+  real t356 = t271 * t355;
+  real t357 = 1.0 / t356;
+  real t358 = t219 * t270;
+  real t360 = t274 * t350 - t353 - t357 * t358;
+  real t362 = B[1] * p[9];
+  real t364 = B[4] * p[10];
+  real t367 = B[7] * p[11];
+  real t369 = B[0] * t362 + B[3] * t364 + B[6] * t367;
+  real t375 = B[1] * t362 + B[4] * t364 + B[7] * t367;
+  real t382 = B[2] * t362 + B[5] * t364 + B[8] * t367;
+  real t384 = t275 * t369 + t289 * t375 + t308 * t382;
+  real t385 = q[3] * t266;
+  real t386 = t274 * t385;
+  real t387 = t287 * t348;
+  real t388 = t341 * t387;
+  real t391 = t219 * t288;
+  real t393 = t386 + t274 * t388 - t357 * t391;
+  real t395 = t315 * t360 + t384 * t393;
+  real t400 = B[3] * d_q[5] + B[0] * d_q[4] + B[6] * d_q[6];
+  real t406 = B[5] * d_q[5] + B[2] * d_q[4] + B[8] * d_q[6];
+  real t411 = 2.0 * ((q[3] * t406 - t226 * d_q[3]) / t257);
+  real t413 = t213 * t400;
+  real t414 = t413 + t413;
+  real t419 = B[4] * d_q[5] + B[1] * d_q[4] + B[7] * d_q[6];
+  real t420 = t219 * t419;
+  real t421 = t420 + t420;
+  real t422 = t414 + t421;
+  real t432 = t226 * t406;
+  real t433 = t432 + t432;
+  real t434 = t42 + t414 + t421 + t433;
+  real t437 = t235 * (5120.0 * t434) / t234;
+  real t445 = t231 * t434 / t230;
+  real t472 = t231 * (t253 * t422 + t221 * (t231 * (t250 * t422 + t221 * (t231 * (t247 * t422 + t221
+    * (t231 * (t244 * t422 + t221 * (t231 * (t241 * t422 + t221 * (t231 * (t238 * t422 + t221 *
+    (t236 * t422 - t221 * (143.0 * t437))) - t239 * t445)) - t242 * t445)) - t245 * t445)) - t248 *
+    t445)) - t251 * t445)) - t254 * t445;
+  real t474 = t42 + t433;
+  real t476 = t258 * t474 / t257;
+  real t483 = (t258 * t422 - t221 * t476) / (2.0 * t260) / (1.0 + t260 * t260);
+  real t485 = t231 * t422;
+  real t486 = t221 * t445;
+  real t491 = t263 * ((t485 - t486) / (2.0 * t262)) / t262;
+  real t494 = t264 * t483 - t261 * (2.0 * t491);
+  real t495 = t233 != 0 ? t472 : t494;
+  real t499 = t226 * t400 + t213 * t406;
+  real t502 = t219 * d_q[3] + q[3] * t419;
+  real t503 = t499 + t502;
+  real t505 = t287 * t495 + t266 * t503;
+  real t508 = t474 / (2.0 * t271);
+  real t511 = t434 / (2.0 * t272);
+  real t515 = t274 * (t272 * t508 + t271 * t511) / t273;
+  real t517 = t274 * t505 - t288 * t515;
+  real t522 = t213 * d_q[3] + q[3] * t400;
+  real t525 = t226 * t419 + t219 * t406;
+  real t526 = t522 - t525;
+  real t528 = t269 * t495 + t266 * t526;
+  real t531 = t274 * t528 - t270 * t515;
+  real t534 = t382 * t411 + (t375 * t517 + t369 * t531);
+  real t541 = t274 * (t266 * d_q[3] + q[3] * t495) - t385 * t515;
+  real t575 = t231 * (t330 * t422 + t221 * (t231 * (t327 * t422 + t221 * (t231 * (t324 * t422 + t221
+    * (t231 * (t321 * t422 + t221 * (t231 * (t318 * t422 + t221 * (t316 * t422 - t221 * (1001.0 *
+    t437))) - t319 * t445)) - t322 * t445)) - t325 * t445)) - t328 * t445)) - t331 * t445;
+  real t591 = t339 * (t337 * t434 - t230 * (t263 * t483 - t261 * t491 + (t486 - t485) * (0.5 *
+    (pow(t334, (-1.5)))))) - t338 * (t339 * t422 / t221);
+  real t592 = t233 != 0 ? t575 : t591;
+  real t602 = t230 * t434;
+  real t605 = t344 * (t602 + t602) / t343;
+  real t609 = 2.0 * (t231 * t419 - t219 * t445 - (t344 * (t221 * t419 + t219 * t422) - t345 *
+    t605));
+  real t628 = t357 * (t355 * t508 + t271 * (t434 * (t272 * 1.5))) / t356;
+  real t638 = t313 * t411 + (t294 * t517 + t283 * t531);
+  real t654 = t274 * (t266 * t406 + t226 * t495) - t352 * t515;
+  real t665 = t393 * t534 + t384 * (t541 + (t274 * (t387 * t592 + t341 * (t348 * t503 + t287 *
+    t609)) - t388 * t515) - (t357 * (t288 * t419 + t219 * t505) - t391 * t628)) + (t360 * t638 +
+    t315 * (t274 * (t349 * t592 + t341 * (t348 * t526 + t269 * t609)) - t350 * t515 - t654 - (t357 *
+    (t270 * t419 + t219 * t528) - t358 * t628)));
+  real t670 = t213 * t221;
+  real t673 = 2.0 * (t213 * t231 - t670 * t344);
+  real t674 = t269 * t673;
+  real t675 = t341 * t674;
+  real t678 = t213 * t270;
+  real t680 = t386 + t274 * t675 - t357 * t678;
+  real t682 = t287 * t673;
+  real t683 = t341 * t682;
+  real t686 = t213 * t288;
+  real t688 = t353 + t274 * t683 - t357 * t686;
+  real t690 = t315 * t680 + t384 * t688;
+  real t705 = 2.0 * (t231 * t400 - t213 * t445 - (t344 * (t221 * t400 + t213 * t422) - t670 *
+    t605));
+  real t743 = t688 * t534 + t384 * (t274 * (t682 * t592 + t341 * (t673 * t503 + t287 * t705)) - t683
+    * t515 + t654 - (t357 * (t288 * t400 + t213 * t505) - t686 * t628)) + (t680 * t638 + t315 *
+    (t274 * (t674 * t592 + t341 * (t673 * t526 + t269 * t705)) - t675 * t515 + t541 - (t357 * (t270
+    * t400 + t213 * t528) - t678 * t628)));
+  real t748 = t213 * t266;
+  real t749 = t274 * t748;
+  real t750 = q[3] * t270;
+  real t751 = pow(t257, 1.5);
+  real t752 = t272 * t751;
+  real t753 = 1.0 / t752;
+  real t758 = t221 * t269;
+  real t759 = t341 * t758;
+  real t760 = q[3] * t759;
+  real t761 = pow(t230, 2.5);
+  real t762 = t271 * t761;
+  real t763 = 1.0 / t762;
+  real t764 = 2.0 * t763;
+  real t766 = t749 - t750 * t753 - t750 * t357 - t760 * t764;
+  real t768 = t219 * t266;
+  real t769 = t274 * t768;
+  real t770 = q[3] * t288;
+  real t775 = t221 * t287;
+  real t776 = t341 * t775;
+  real t777 = q[3] * t776;
+  real t779 = t769 - t753 * t770 - t357 * t770 - t764 * t777;
+  real t781 = t315 * t766 + t384 * t779;
+  real t789 = t274 * (t266 * t419 + t219 * t495) - t768 * t515;
+  real t792 = t288 * d_q[3] + q[3] * t505;
+  real t800 = t753 * (t751 * t511 + t272 * (t474 * (t271 * 1.5))) / t752;
+  real t814 = t775 * t592 + t341 * (t287 * t422 + t221 * t503);
+  real t825 = 2.0 * (t763 * (t761 * t508 + t271 * (t434 * (t355 * 2.5))) / t762);
+  real t837 = t274 * (t266 * t400 + t213 * t495) - t748 * t515;
+  real t840 = t270 * d_q[3] + q[3] * t528;
+  real t855 = t758 * t592 + t341 * (t269 * t422 + t221 * t526);
+  real t864 = t779 * t534 + t384 * (t789 - (t753 * t792 - t770 * t800) - (t357 * t792 - t770 * t628)
+    - (t764 * (t776 * d_q[3] + q[3] * t814) - t777 * t825)) + (t766 * t638 + t315 * (t837 - (t753 *
+    t840 - t750 * t800) - (t357 * t840 - t750 * t628) - (t764 * (t759 * d_q[3] + q[3] * t855) - t760
+    * t825)));
+  real t869 = t226 * t288;
+  real t874 = t226 * t776;
+  real t876 = t749 - t753 * t869 - t357 * t869 - t764 * t874;
+  real t878 = t226 * t759;
+  real t880 = t226 * t270;
+  real t885 = t764 * t878 + (t357 * t880 + (t769 + t753 * t880));
+  real t887 = t384 * t876 - t315 * t885;
+  real t892 = t288 * t406 + t226 * t505;
+  real t913 = t270 * t406 + t226 * t528;
+  real t931 = t876 * t534 + t384 * (t837 - (t753 * t892 - t869 * t800) - (t357 * t892 - t869 * t628)
+    - (t764 * (t776 * t406 + t226 * t814) - t874 * t825)) - (t885 * t638 + t315 * (t753 * t913 -
+    t880 * t800 + t789 + (t357 * t913 - t880 * t628) + (t764 * (t759 * t406 + t226 * t855) - t878 *
+    t825)));
+  real t936 = B[2] * p[9];
+  real t938 = B[5] * p[10];
+  real t941 = B[8] * p[11];
+  real t943 = B[0] * t936 + B[3] * t938 + B[6] * t941;
+  real t949 = B[1] * t936 + B[4] * t938 + B[7] * t941;
+  real t956 = B[2] * t936 + B[5] * t938 + B[8] * t941;
+  real t958 = t275 * t943 + t289 * t949 + t308 * t956;
+  real t964 = t956 * t411 + (t949 * t517 + t943 * t531);
+  real t979 = 0.5 * (t395 * t400 + t213 * t665) - 0.5 * (t690 * t419 + t219 * t743) + 0.5 * (t781 *
+    t406 + t226 * t864) - 0.5 * (t887 * d_q[3] + q[3] * t931) - (t258 * (t958 * t42 + t4 * t964) -
+    t4 * t958 * t476) - (t258 * (t958 * t433 + t227 * t964) - t227 * t958 * t476);
+  real t1015 = 0.5 * (t781 * t400 + t213 * t864) - (0.5 * (t395 * t406 + t226 * t665) + 0.5 * (t690
+    * d_q[3] + q[3] * t743)) + 0.5 * (t887 * t419 + t219 * t931) + (t258 * (t958 * t502 + t285 *
+    t964) - t285 * t958 * t476) - (t258 * (t958 * t499 + t286 * t964) - t286 * t958 * t476);
+  real t1052 = 0.5 * (t690 * t406 + t226 * t743) - 0.5 * (t395 * d_q[3] + q[3] * t665) + 0.5 * (t781
+    * t419 + t219 * t864) - 0.5 * (t887 * t400 + t213 * t931) - (t258 * (t958 * t522 + t267 * t964)
+    - t267 * t958 * t476) - (t258 * (t958 * t525 + t268 * t964) - t268 * t958 * t476);
+  d_tau[3] = d_effort[3] + (B[2] * t979 + B[0] * t1015 + B[1] * t1052 - p[13] * d_u[3]);
+  d_tau[4] = d_effort[4] + (B[5] * t979 + B[3] * t1015 + B[4] * t1052 - p[14] * d_u[4]);
+  d_tau[5] = d_effort[5] + (B[8] * t979 + B[6] * t1015 + B[7] * t1052 - p[15] * d_u[5]);
+  return 0;
 }
 
-static int mstmm_sweep_laws_six_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_laws_six_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_laws_six_slope_inputs[] = {
-    {"p", 16, "", 0, 0},
-    {"q", 7, "", 0, 0},
-    {"u", 6, "", 0, 0},
-    {"B", 9, "", 0, 0},
-    {"effort", 6, "N, N*m", 0, 0},
-    {"twist_ref", 1, "rad", 0, 0},
-    {"d_q", 7, "", 0, 0},
-    {"d_u", 6, "", 0, 0},
-    {"d_effort", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_laws_six_slope_outputs[] = {
-    {"d_tau", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_laws_six_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], out[0]))
 
 static const mstmm_kernel mstmm_sweep_laws_kernels[] = {
-    {
-        .name = "linear",
-        .function = (void (*)(void))mstmm_sweep_laws_linear,
-        .call = mstmm_sweep_laws_linear_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_laws_linear_inputs,
-        .outputs = mstmm_sweep_laws_linear_outputs,
-        .ir_hash = "6c389ff61b289ee8a19f72095efd0a7ed0dd6af496cf49cfb36a1e22dfebcb87",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "full",
-        .function = (void (*)(void))mstmm_sweep_laws_full,
-        .call = mstmm_sweep_laws_full_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_laws_full_inputs,
-        .outputs = mstmm_sweep_laws_full_outputs,
-        .ir_hash = "60299925e1a3a4d2ca5d749570cf7baebde6e904f5cbd3a362951eb74f4eddeb",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rotation",
-        .function = (void (*)(void))mstmm_sweep_laws_rotation,
-        .call = mstmm_sweep_laws_rotation_call,
-        .n_inputs = 6,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_laws_rotation_inputs,
-        .outputs = mstmm_sweep_laws_rotation_outputs,
-        .ir_hash = "2b9b3d62741ddd0e84c725330481120e69b28424f27d0233545e57104599be5c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "six",
-        .function = (void (*)(void))mstmm_sweep_laws_six,
-        .call = mstmm_sweep_laws_six_call,
-        .n_inputs = 6,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_laws_six_inputs,
-        .outputs = mstmm_sweep_laws_six_outputs,
-        .ir_hash = "82d727d1604b17cf2a7468e57701a8ae269dfd6b60e157c47c1574e3bf7939e3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "linear_slope",
-        .function = (void (*)(void))mstmm_sweep_laws_linear_slope,
-        .call = mstmm_sweep_laws_linear_slope_call,
-        .n_inputs = 7,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_laws_linear_slope_inputs,
-        .outputs = mstmm_sweep_laws_linear_slope_outputs,
-        .ir_hash = "1fa9ee2c8eeb1e610067f5d6624b4156dbd06f5168b322900e5ad5e6ec80b245",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "full_slope",
-        .function = (void (*)(void))mstmm_sweep_laws_full_slope,
-        .call = mstmm_sweep_laws_full_slope_call,
-        .n_inputs = 7,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_laws_full_slope_inputs,
-        .outputs = mstmm_sweep_laws_full_slope_outputs,
-        .ir_hash = "fdf537a47b57cc5ccac18487ff50ab0e68e4e989a9228e8d2b7c4eafd718c72d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rotation_slope",
-        .function = (void (*)(void))mstmm_sweep_laws_rotation_slope,
-        .call = mstmm_sweep_laws_rotation_slope_call,
-        .n_inputs = 9,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_laws_rotation_slope_inputs,
-        .outputs = mstmm_sweep_laws_rotation_slope_outputs,
-        .ir_hash = "518ce09857b014a37bd72b5443cbfb22f73a778e8c4c41425e305cb7b2c29e5c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "six_slope",
-        .function = (void (*)(void))mstmm_sweep_laws_six_slope,
-        .call = mstmm_sweep_laws_six_slope_call,
-        .n_inputs = 9,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_laws_six_slope_inputs,
-        .outputs = mstmm_sweep_laws_six_slope_outputs,
-        .ir_hash = "573e54a1a9a82a1605b53bf203ada3a4a0a6dbe95ee51be622458ae4845b1d08",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"linear", MSTMM_FUNCTIONS(mstmm_sweep_laws_linear), 4, 3, (const mstmm_port[]){{"p", 3, "", 0,
+    0}, {"q", 1, "m or rad", 0, 0}, {"u", 1, "m/s or rad/s", 0, 0}, {"effort", 1, "N or N*m", 0,
+    0}}, (const mstmm_port[]){{"tau", 1, "N or N*m", 0, 0}, {"V", 1, "J", 0, 0}, {"P", 1, "W", 0,
+    0}}, "fc19c7b24bd96a1952a90fbc12c8f44196762f9b86929470fb879ca38f1c5a16", 0, NULL},
+  {"full", MSTMM_FUNCTIONS(mstmm_sweep_laws_full), 4, 3, (const mstmm_port[]){{"p", 11, "", 0, 0},
+    {"q", 1, "m or rad", 0, 0}, {"u", 1, "m/s or rad/s", 0, 0}, {"effort", 1, "N or N*m", 0, 0}},
+    (const mstmm_port[]){{"tau", 1, "N or N*m", 0, 0}, {"V", 1, "J", 0, 0}, {"P", 1, "W", 0, 0}},
+    "1332db83833e47a661ef7349c6a734c417e8053a6025e115b79239be104b52f0", 0, NULL},
+  {"rotation", MSTMM_FUNCTIONS(mstmm_sweep_laws_rotation), 6, 4, (const mstmm_port[]){{"p", 7, "",
+    0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "rad/s", 0, 0}, {"B", 9, "", 0, 0}, {"effort", 3, "N*m", 0,
+    0}, {"twist_ref", 1, "rad", 0, 0}}, (const mstmm_port[]){{"tau", 3, "N*m", 0, 0}, {"V", 1, "J",
+    0, 0}, {"P", 1, "W", 0, 0}, {"twist", 1, "rad", 0, 0}},
+    "5c4601a30867c60bf7712786bac9b84cf6441d23a3c1e32b21bd3220c8e123a0", 0, NULL},
+  {"six", MSTMM_FUNCTIONS(mstmm_sweep_laws_six), 6, 4, (const mstmm_port[]){{"p", 16, "", 0, 0},
+    {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}, {"B", 9, "", 0, 0}, {"effort", 6, "N, N*m", 0, 0},
+    {"twist_ref", 1, "rad", 0, 0}}, (const mstmm_port[]){{"tau", 6, "N, N*m", 0, 0}, {"V", 1, "J",
+    0, 0}, {"P", 1, "W", 0, 0}, {"twist", 1, "rad", 0, 0}},
+    "7654906dea196221a59ff23d627cbc38239c025b56b0b8d10ad7180549caee78", 0, NULL},
+  {"linear_slope", MSTMM_FUNCTIONS(mstmm_sweep_laws_linear_slope), 7, 1, (const mstmm_port[]){{"p",
+    3, "", 0, 0}, {"q", 1, "m or rad", 0, 0}, {"u", 1, "m/s or rad/s", 0, 0}, {"effort", 1,
+    "N or N*m", 0, 0}, {"d_q", 1, "m or rad", 0, 0}, {"d_u", 1, "m/s or rad/s", 0, 0}, {"d_effort",
+    1, "N or N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 1, "N or N*m", 0, 0}},
+    "2b1e769b4cea0d5eea89dc6bb7ac5dbabb66f33778cc7c059d63cf8206ce36c8", 0, NULL},
+  {"full_slope", MSTMM_FUNCTIONS(mstmm_sweep_laws_full_slope), 7, 1, (const mstmm_port[]){{"p", 11,
+    "", 0, 0}, {"q", 1, "m or rad", 0, 0}, {"u", 1, "m/s or rad/s", 0, 0}, {"effort", 1, "N or N*m",
+    0, 0}, {"d_q", 1, "m or rad", 0, 0}, {"d_u", 1, "m/s or rad/s", 0, 0}, {"d_effort", 1,
+    "N or N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 1, "N or N*m", 0, 0}},
+    "398f339542afe3edf118ea57b16455e4e07c328e761d7cc5f8a27f8599b0d924", 0, NULL},
+  {"rotation_slope", MSTMM_FUNCTIONS(mstmm_sweep_laws_rotation_slope), 9, 1, (const
+    mstmm_port[]){{"p", 7, "", 0, 0}, {"q", 4, "", 0, 0}, {"u", 3, "rad/s", 0, 0}, {"B", 9, "", 0,
+    0}, {"effort", 3, "N*m", 0, 0}, {"twist_ref", 1, "rad", 0, 0}, {"d_q", 4, "", 0, 0}, {"d_u", 3,
+    "rad/s", 0, 0}, {"d_effort", 3, "N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 3, "N*m", 0, 0}},
+    "fe6f5475029d9f053b86ee9333345d625a380fd65c84bf822fce09065ec17072", 0, NULL},
+  {"six_slope", MSTMM_FUNCTIONS(mstmm_sweep_laws_six_slope), 9, 1, (const mstmm_port[]){{"p", 16,
+    "", 0, 0}, {"q", 7, "", 0, 0}, {"u", 6, "", 0, 0}, {"B", 9, "", 0, 0}, {"effort", 6, "N, N*m",
+    0, 0}, {"twist_ref", 1, "rad", 0, 0}, {"d_q", 7, "", 0, 0}, {"d_u", 6, "", 0, 0}, {"d_effort",
+    6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_tau", 6, "N, N*m", 0, 0}},
+    "5722c40dcc3e0f4bfe9377cc907e096a46a889c4f6ab6c4152d352c8a7bda833", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_laws = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "laws",
-    .hash = "54f21629b4d46b03b136e51298ed16fd3d01f5b9ca63a85b0997002e83589805",
+    .hash = "b5faf9620d6ef48264e9b582b0c292640f584a7f000f1522586d05f1d26f6e16",
     .nq = 0,
     .nu = 0,
     .np = 0,

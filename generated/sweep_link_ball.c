@@ -7,149 +7,45 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_ball;
-int mstmm_sweep_link_ball_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_ball_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_ball_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_ball_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* rotation of the ball hinge
  * in  link[12] rotation, inboard hinge axes to parent axes; inboard point (m)
  * in  q[4] coordinates: w, x, y, z
  * out turn[3][3] rotation, body axes to parent axes
  */
-int mstmm_sweep_link_ball_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_ball_turn(in_t link, in_t q, out_t turn)
 {
-    const real t0 = q[3] * q[3];
-    const real t1 = q[2] * q[2];
-    const real t2 = q[0] * q[0];
-    const real t3 = q[1] * q[1];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t0 + t5;
-    const real t7 = 1.0 / t6;
-    const real t8 = 2.0 * t7;
-    const real t9 = q[0] * q[3];
-    const real t10 = q[1] * q[2];
-    const real t11 = t9 + t10;
-    const real t12 = link[1] * t11;
-    const real t13 = t8 * t12;
-    const real t14 = t1 + t0;
-    const real t15 = t14 * t8;
-    const real t16 = 1.0 - t15;
-    const real t17 = link[0] * t16;
-    const real t18 = q[1] * q[3];
-    const real t19 = q[0] * q[2];
-    const real t20 = t18 - t19;
-    const real t21 = link[2] * t20;
-    const real t22 = t8 * t21;
-    const real t23 = t17 + t22;
-    const real t24 = t13 + t23;
-    turn[0] = t24;
-    const real t25 = t10 - t9;
-    const real t26 = link[0] * t25;
-    const real t27 = t8 * t26;
-    const real t28 = t0 + t3;
-    const real t29 = t8 * t28;
-    const real t30 = 1.0 - t29;
-    const real t31 = link[1] * t30;
-    const real t32 = q[0] * q[1];
-    const real t33 = q[2] * q[3];
-    const real t34 = t32 + t33;
-    const real t35 = link[2] * t34;
-    const real t36 = t8 * t35;
-    const real t37 = t31 + t36;
-    const real t38 = t27 + t37;
-    turn[1] = t38;
-    const real t39 = t19 + t18;
-    const real t40 = link[0] * t39;
-    const real t41 = t8 * t40;
-    const real t42 = t1 + t3;
-    const real t43 = t8 * t42;
-    const real t44 = 1.0 - t43;
-    const real t45 = link[2] * t44;
-    const real t46 = t33 - t32;
-    const real t47 = link[1] * t46;
-    const real t48 = t8 * t47;
-    const real t49 = t45 + t48;
-    const real t50 = t41 + t49;
-    turn[2] = t50;
-    const real t51 = link[4] * t11;
-    const real t52 = t8 * t51;
-    const real t53 = link[3] * t16;
-    const real t54 = link[5] * t20;
-    const real t55 = t8 * t54;
-    const real t56 = t53 + t55;
-    const real t57 = t52 + t56;
-    turn[3] = t57;
-    const real t58 = link[3] * t25;
-    const real t59 = t8 * t58;
-    const real t60 = link[4] * t30;
-    const real t61 = link[5] * t34;
-    const real t62 = t8 * t61;
-    const real t63 = t60 + t62;
-    const real t64 = t59 + t63;
-    turn[4] = t64;
-    const real t65 = link[3] * t39;
-    const real t66 = t8 * t65;
-    const real t67 = link[5] * t44;
-    const real t68 = link[4] * t46;
-    const real t69 = t8 * t68;
-    const real t70 = t67 + t69;
-    const real t71 = t66 + t70;
-    turn[5] = t71;
-    const real t72 = link[7] * t11;
-    const real t73 = t8 * t72;
-    const real t74 = link[6] * t16;
-    const real t75 = link[8] * t20;
-    const real t76 = t8 * t75;
-    const real t77 = t74 + t76;
-    const real t78 = t73 + t77;
-    turn[6] = t78;
-    const real t79 = link[6] * t25;
-    const real t80 = t8 * t79;
-    const real t81 = link[7] * t30;
-    const real t82 = link[8] * t34;
-    const real t83 = t8 * t82;
-    const real t84 = t81 + t83;
-    const real t85 = t80 + t84;
-    turn[7] = t85;
-    const real t86 = link[6] * t39;
-    const real t87 = t8 * t86;
-    const real t88 = link[8] * t44;
-    const real t89 = link[7] * t46;
-    const real t90 = t8 * t89;
-    const real t91 = t88 + t90;
-    const real t92 = t87 + t91;
-    turn[8] = t92;
-    return 0;
+  real t0 = q[3] * q[3];
+  real t1 = q[2] * q[2];
+  real t3 = q[1] * q[1];
+  real t8 = 2.0 * (1.0 / (t0 + (t1 + (q[0] * q[0] + t3))));
+  real t9 = q[0] * q[3];
+  real t10 = q[1] * q[2];
+  real t11 = t9 + t10;
+  real t16 = 1.0 - (t1 + t0) * t8;
+  real t18 = q[1] * q[3];
+  real t19 = q[0] * q[2];
+  real t20 = t18 - t19;
+  turn[0] = t8 * (link[1] * t11) + (link[0] * t16 + t8 * (link[2] * t20));
+  real t25 = t10 - t9;
+  real t30 = 1.0 - t8 * (t0 + t3);
+  real t32 = q[0] * q[1];
+  real t33 = q[2] * q[3];
+  real t34 = t32 + t33;
+  turn[1] = t8 * (link[0] * t25) + (link[1] * t30 + t8 * (link[2] * t34));
+  real t39 = t19 + t18;
+  real t44 = 1.0 - t8 * (t1 + t3);
+  real t46 = t33 - t32;
+  turn[2] = t8 * (link[0] * t39) + (link[2] * t44 + t8 * (link[1] * t46));
+  turn[3] = t8 * (link[4] * t11) + (link[3] * t16 + t8 * (link[5] * t20));
+  turn[4] = t8 * (link[3] * t25) + (link[4] * t30 + t8 * (link[5] * t34));
+  turn[5] = t8 * (link[3] * t39) + (link[5] * t44 + t8 * (link[4] * t46));
+  turn[6] = t8 * (link[7] * t11) + (link[6] * t16 + t8 * (link[8] * t20));
+  turn[7] = t8 * (link[6] * t25) + (link[7] * t30 + t8 * (link[8] * t34));
+  turn[8] = t8 * (link[6] * t39) + (link[8] * t44 + t8 * (link[7] * t46));
+  return 0;
 }
 
-static int mstmm_sweep_link_ball_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_ball_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_ball_turn_inputs[] = {
-    {"link", 12, "", 0, 0},
-    {"q", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_ball_turn_outputs[] = {
-    {"turn", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_ball_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the ball hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -166,265 +62,74 @@ static const mstmm_port mstmm_sweep_link_ball_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[4] coordinate rates
  */
-int mstmm_sweep_link_ball_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_ball_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    (void)p;
-    (void)d;
-    const real t0 = turn[0] * motion_I[0];
-    const real t1 = turn[3] * motion_I[1];
-    const real t2 = t0 + t1;
-    const real t3 = turn[6] * motion_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = u[0] + t4;
-    motion[0] = t5;
-    const real t6 = turn[1] * motion_I[0];
-    const real t7 = turn[4] * motion_I[1];
-    const real t8 = t6 + t7;
-    const real t9 = turn[7] * motion_I[2];
-    const real t10 = t8 + t9;
-    const real t11 = u[1] + t10;
-    motion[1] = t11;
-    const real t12 = turn[2] * motion_I[0];
-    const real t13 = turn[5] * motion_I[1];
-    const real t14 = t12 + t13;
-    const real t15 = turn[8] * motion_I[2];
-    const real t16 = t14 + t15;
-    const real t17 = u[2] + t16;
-    motion[2] = t17;
-    const real t18 = turn[0] * motion_I[3];
-    const real t19 = turn[3] * motion_I[4];
-    const real t20 = t18 + t19;
-    const real t21 = turn[6] * motion_I[5];
-    const real t22 = t20 + t21;
-    const real t23 = u[2] * t10;
-    const real t24 = u[1] * t16;
-    const real t25 = t23 - t24;
-    const real t26 = t22 + t25;
-    motion[3] = t26;
-    const real t27 = turn[1] * motion_I[3];
-    const real t28 = turn[4] * motion_I[4];
-    const real t29 = t27 + t28;
-    const real t30 = turn[7] * motion_I[5];
-    const real t31 = t29 + t30;
-    const real t32 = u[0] * t16;
-    const real t33 = u[2] * t4;
-    const real t34 = t32 - t33;
-    const real t35 = t31 + t34;
-    motion[4] = t35;
-    const real t36 = turn[2] * motion_I[3];
-    const real t37 = turn[5] * motion_I[4];
-    const real t38 = t36 + t37;
-    const real t39 = turn[8] * motion_I[5];
-    const real t40 = t38 + t39;
-    const real t41 = u[1] * t4;
-    const real t42 = u[0] * t10;
-    const real t43 = t41 - t42;
-    const real t44 = t40 + t43;
-    motion[5] = t44;
-    const real t45 = motion_I[0] * motion_I[1];
-    const real t46 = t45 - motion_I[5];
-    const real t47 = link[10] * t46;
-    const real t48 = motion_I[1] * motion_I[1];
-    const real t49 = motion_I[2] * motion_I[2];
-    const real t50 = t48 + t49;
-    const real t51 = link[9] * t50;
-    const real t52 = t47 - t51;
-    const real t53 = motion_I[0] * motion_I[2];
-    const real t54 = motion_I[4] + t53;
-    const real t55 = link[11] * t54;
-    const real t56 = t52 + t55;
-    const real t57 = motion_I[6] + t56;
-    const real t58 = turn[0] * t57;
-    const real t59 = motion_I[5] + t45;
-    const real t60 = link[9] * t59;
-    const real t61 = motion_I[0] * motion_I[0];
-    const real t62 = t49 + t61;
-    const real t63 = link[10] * t62;
-    const real t64 = t60 - t63;
-    const real t65 = motion_I[1] * motion_I[2];
-    const real t66 = t65 - motion_I[3];
-    const real t67 = link[11] * t66;
-    const real t68 = t64 + t67;
-    const real t69 = motion_I[7] + t68;
-    const real t70 = turn[3] * t69;
-    const real t71 = t58 + t70;
-    const real t72 = t53 - motion_I[4];
-    const real t73 = link[9] * t72;
-    const real t74 = motion_I[3] + t65;
-    const real t75 = link[10] * t74;
-    const real t76 = t73 + t75;
-    const real t77 = t48 + t61;
-    const real t78 = link[11] * t77;
-    const real t79 = t76 - t78;
-    const real t80 = motion_I[8] + t79;
-    const real t81 = turn[6] * t80;
-    const real t82 = t71 + t81;
-    motion[6] = t82;
-    const real t83 = turn[1] * t57;
-    const real t84 = turn[4] * t69;
-    const real t85 = t83 + t84;
-    const real t86 = turn[7] * t80;
-    const real t87 = t85 + t86;
-    motion[7] = t87;
-    const real t88 = turn[2] * t57;
-    const real t89 = turn[5] * t69;
-    const real t90 = t88 + t89;
-    const real t91 = turn[8] * t80;
-    const real t92 = t90 + t91;
-    motion[8] = t92;
-    const real t93 = b[0] * t82;
-    const real t94 = t5 * t11;
-    const real t95 = t94 - t44;
-    const real t96 = b[2] * t95;
-    const real t97 = t5 * t17;
-    const real t98 = t35 + t97;
-    const real t99 = b[3] * t98;
-    const real t100 = t96 + t99;
-    const real t101 = t11 * t11;
-    const real t102 = t17 * t17;
-    const real t103 = t101 + t102;
-    const real t104 = b[1] * t103;
-    const real t105 = t100 - t104;
-    const real t106 = t93 + t105;
-    e_B[0] = t106;
-    const real t107 = b[0] * t87;
-    const real t108 = t44 + t94;
-    const real t109 = b[1] * t108;
-    const real t110 = t11 * t17;
-    const real t111 = t110 - t26;
-    const real t112 = b[3] * t111;
-    const real t113 = t109 + t112;
-    const real t114 = t5 * t5;
-    const real t115 = t102 + t114;
-    const real t116 = b[2] * t115;
-    const real t117 = t113 - t116;
-    const real t118 = t107 + t117;
-    e_B[1] = t118;
-    const real t119 = b[0] * t92;
-    const real t120 = t97 - t35;
-    const real t121 = b[1] * t120;
-    const real t122 = t26 + t110;
-    const real t123 = b[2] * t122;
-    const real t124 = t121 + t123;
-    const real t125 = t101 + t114;
-    const real t126 = b[3] * t125;
-    const real t127 = t124 - t126;
-    const real t128 = t119 + t127;
-    e_B[2] = t128;
-    const real t129 = b[6] * t44;
-    const real t130 = b[5] * t35;
-    const real t131 = b[4] * t26;
-    const real t132 = b[2] * t92;
-    const real t133 = b[9] * t17;
-    const real t134 = b[6] * t5;
-    const real t135 = b[8] * t11;
-    const real t136 = t134 + t135;
-    const real t137 = t133 + t136;
-    const real t138 = t11 * t137;
-    const real t139 = b[8] * t17;
-    const real t140 = b[5] * t5;
-    const real t141 = b[7] * t11;
-    const real t142 = t140 + t141;
-    const real t143 = t139 + t142;
-    const real t144 = t17 * t143;
-    const real t145 = t138 - t144;
-    const real t146 = t132 + t145;
-    const real t147 = b[3] * t87;
-    const real t148 = t146 - t147;
-    const real t149 = t131 + t148;
-    const real t150 = t130 + t149;
-    const real t151 = t129 + t150;
-    e_B[3] = t151;
-    const real t152 = b[8] * t44;
-    const real t153 = b[7] * t35;
-    const real t154 = b[5] * t26;
-    const real t155 = b[3] * t82;
-    const real t156 = b[6] * t17;
-    const real t157 = b[4] * t5;
-    const real t158 = b[5] * t11;
-    const real t159 = t157 + t158;
-    const real t160 = t156 + t159;
-    const real t161 = t17 * t160;
-    const real t162 = t5 * t137;
-    const real t163 = t161 - t162;
-    const real t164 = b[1] * t92;
-    const real t165 = t163 - t164;
-    const real t166 = t155 + t165;
-    const real t167 = t154 + t166;
-    const real t168 = t153 + t167;
-    const real t169 = t152 + t168;
-    e_B[4] = t169;
-    const real t170 = b[9] * t44;
-    const real t171 = b[8] * t35;
-    const real t172 = b[6] * t26;
-    const real t173 = b[1] * t87;
-    const real t174 = t5 * t143;
-    const real t175 = t11 * t160;
-    const real t176 = t174 - t175;
-    const real t177 = t173 + t176;
-    const real t178 = b[2] * t82;
-    const real t179 = t177 - t178;
-    const real t180 = t172 + t179;
-    const real t181 = t171 + t180;
-    const real t182 = t170 + t181;
-    e_B[5] = t182;
-    const real t183 = q[3] * u[2];
-    const real t184 = q[1] * u[0];
-    const real t185 = q[2] * u[1];
-    const real t186 = t184 + t185;
-    const real t187 = t183 + t186;
-    const real t188 = 0.5 * t187;
-    const real t189 = -t188;
-    qdot[0] = t189;
-    const real t190 = q[0] * u[0];
-    const real t191 = q[2] * u[2];
-    const real t192 = t190 + t191;
-    const real t193 = q[3] * u[1];
-    const real t194 = t192 - t193;
-    const real t195 = 0.5 * t194;
-    qdot[1] = t195;
-    const real t196 = q[3] * u[0];
-    const real t197 = q[0] * u[1];
-    const real t198 = q[1] * u[2];
-    const real t199 = t197 - t198;
-    const real t200 = t196 + t199;
-    const real t201 = 0.5 * t200;
-    qdot[2] = t201;
-    const real t202 = q[0] * u[2];
-    const real t203 = q[1] * u[1];
-    const real t204 = t202 + t203;
-    const real t205 = q[2] * u[0];
-    const real t206 = t204 - t205;
-    const real t207 = 0.5 * t206;
-    qdot[3] = t207;
-    return 0;
+  (void)p;
+  (void)d;
+  real t4 = turn[0] * motion_I[0] + turn[3] * motion_I[1] + turn[6] * motion_I[2];
+  real t5 = u[0] + t4;
+  motion[0] = t5;
+  real t10 = turn[1] * motion_I[0] + turn[4] * motion_I[1] + turn[7] * motion_I[2];
+  real t11 = u[1] + t10;
+  motion[1] = t11;
+  real t16 = turn[2] * motion_I[0] + turn[5] * motion_I[1] + turn[8] * motion_I[2];
+  real t17 = u[2] + t16;
+  motion[2] = t17;
+  real t26 = turn[0] * motion_I[3] + turn[3] * motion_I[4] + turn[6] * motion_I[5] + (u[2] * t10 -
+    u[1] * t16);
+  motion[3] = t26;
+  real t35 = turn[1] * motion_I[3] + turn[4] * motion_I[4] + turn[7] * motion_I[5] + (u[0] * t16 -
+    u[2] * t4);
+  motion[4] = t35;
+  real t44 = turn[2] * motion_I[3] + turn[5] * motion_I[4] + turn[8] * motion_I[5] + (u[1] * t4 -
+    u[0] * t10);
+  motion[5] = t44;
+  real t45 = motion_I[0] * motion_I[1];
+  real t48 = motion_I[1] * motion_I[1];
+  real t49 = motion_I[2] * motion_I[2];
+  real t53 = motion_I[0] * motion_I[2];
+  real t57 = motion_I[6] + (link[10] * (t45 - motion_I[5]) - link[9] * (t48 + t49) + link[11] *
+    (motion_I[4] + t53));
+  real t61 = motion_I[0] * motion_I[0];
+  real t65 = motion_I[1] * motion_I[2];
+  real t69 = motion_I[7] + (link[9] * (motion_I[5] + t45) - link[10] * (t49 + t61) + link[11] * (t65
+    - motion_I[3]));
+  real t80 = motion_I[8] + (link[9] * (t53 - motion_I[4]) + link[10] * (motion_I[3] + t65) -
+    link[11] * (t48 + t61));
+  real t82 = turn[0] * t57 + turn[3] * t69 + turn[6] * t80;
+  motion[6] = t82;
+  real t87 = turn[1] * t57 + turn[4] * t69 + turn[7] * t80;
+  motion[7] = t87;
+  real t92 = turn[2] * t57 + turn[5] * t69 + turn[8] * t80;
+  motion[8] = t92;
+  real t94 = t5 * t11;
+  real t97 = t5 * t17;
+  real t101 = t11 * t11;
+  real t102 = t17 * t17;
+  e_B[0] = b[0] * t82 + (b[2] * (t94 - t44) + b[3] * (t35 + t97) - b[1] * (t101 + t102));
+  real t110 = t11 * t17;
+  real t114 = t5 * t5;
+  e_B[1] = b[0] * t87 + (b[1] * (t44 + t94) + b[3] * (t110 - t26) - b[2] * (t102 + t114));
+  e_B[2] = b[0] * t92 + (b[1] * (t97 - t35) + b[2] * (t26 + t110) - b[3] * (t101 + t114));
+  real t137 = b[9] * t17 + (b[6] * t5 + b[8] * t11);
+  real t143 = b[8] * t17 + (b[5] * t5 + b[7] * t11);
+  e_B[3] = b[6] * t44 + (b[5] * t35 + (b[4] * t26 + (b[2] * t92 + (t11 * t137 - t17 * t143) - b[3] *
+    t87)));
+  real t160 = b[6] * t17 + (b[4] * t5 + b[5] * t11);
+  e_B[4] = b[8] * t44 + (b[7] * t35 + (b[5] * t26 + (b[3] * t82 + (t17 * t160 - t5 * t137 - b[1] *
+    t92))));
+  e_B[5] = b[9] * t44 + (b[8] * t35 + (b[6] * t26 + (b[1] * t87 + (t5 * t143 - t11 * t160) - b[2] *
+    t82)));
+  qdot[0] = -(0.5 * (q[3] * u[2] + (q[1] * u[0] + q[2] * u[1])));
+  qdot[1] = 0.5 * (q[0] * u[0] + q[2] * u[2] - q[3] * u[1]);
+  qdot[2] = 0.5 * (q[3] * u[0] + (q[0] * u[1] - q[1] * u[2]));
+  qdot[3] = 0.5 * (q[0] * u[2] + q[1] * u[1] - q[2] * u[0]);
+  return 0;
 }
 
-static int mstmm_sweep_link_ball_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_ball_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_ball_forward_inputs[] = {
-    {"link", 12, "", 0, 0},
-    {"turn", 9, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 4, "", 0, 0},
-    {"u", 3, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_ball_forward_outputs[] = {
-    {"d", 0, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 4, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_ball_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the ball hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -443,440 +148,146 @@ static const mstmm_port mstmm_sweep_link_ball_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_ball_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_ball_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K, in_t e_K,
+    in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)d;
-    (void)p;
-    const real t0 = b[4] + S_K[15];
-    const real t1 = 0.0 < t0;
-    if (!(t1 != 0)) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t2 = b[7] + S_K[18];
-    const real t3 = t2 * ((real)1 / (real)10000000000000);
-    const real t4 = b[5] + S_K[16];
-    const real t5 = 1.0 / t0;
-    const real t6 = t4 * t5;
-    const real t7 = t4 * t6;
-    const real t8 = t2 - t7;
-    const real t9 = t3 < t8;
-    if (!(t9 != 0)) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t10 = b[9] + S_K[20];
-    const real t11 = t10 * ((real)1 / (real)10000000000000);
-    const real t12 = b[6] + S_K[17];
-    const real t13 = t12 * t5;
-    const real t14 = t12 * t13;
-    const real t15 = t10 - t14;
-    const real t16 = b[8] + S_K[19];
-    const real t17 = t12 * t6;
-    const real t18 = t16 - t17;
-    const real t19 = 1.0 / t8;
-    const real t20 = t19 * t18;
-    const real t21 = t18 * t20;
-    const real t22 = t15 - t21;
-    const real t23 = t11 < t22;
-    if (!(t23 != 0)) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
-    const real t24 = b[4] + b[7];
-    const real t25 = b[9] + t24;
-    const real t26 = ((real)1 / (real)300000000000000) * t25;
-    const real t27 = 0.0 < t26;
-    const real t28 = t0 + t2;
-    const real t29 = t10 + t28;
-    const real t30 = ((real)1 / (real)300000000000000) * t29;
-    const real t31 = t27 != 0 ? t26 : t30;
-    const real t32 = t31 < t0;
-    if (!(t32 != 0)) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
-    const real t33 = t31 < t2;
-    if (!(t33 != 0)) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
-    const real t34 = t31 < t10;
-    if (!(t34 != 0)) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
-    const real t35 = S_K[3] * t5;
-    G[0] = t35;
-    const real t36 = S_K[8] - b[3];
-    const real t37 = t36 * t5;
-    G[1] = t37;
-    const real t38 = b[2] + S_K[12];
-    const real t39 = t38 * t5;
-    G[2] = t39;
-    G[3] = t5;
-    G[4] = 0.0;
-    G[5] = 0.0;
-    const real t40 = b[3] + S_K[4];
-    const real t41 = S_K[3] * t6;
-    const real t42 = t40 - t41;
-    const real t43 = t19 * t42;
-    G[6] = t43;
-    const real t44 = t36 * t6;
-    const real t45 = S_K[9] - t44;
-    const real t46 = t19 * t45;
-    G[7] = t46;
-    const real t47 = S_K[13] - b[1];
-    const real t48 = t38 * t6;
-    const real t49 = t47 - t48;
-    const real t50 = t19 * t49;
-    G[8] = t50;
-    G[9] = t6;
-    G[10] = t19;
-    G[11] = 0.0;
-    const real t51 = 1.0 / t22;
-    const real t52 = S_K[5] - b[2];
-    const real t53 = S_K[3] * t13;
-    const real t54 = t52 - t53;
-    const real t55 = t20 * t42;
-    const real t56 = t54 - t55;
-    const real t57 = t51 * t56;
-    G[12] = t57;
-    const real t58 = b[1] + S_K[10];
-    const real t59 = t36 * t13;
-    const real t60 = t58 - t59;
-    const real t61 = t20 * t45;
-    const real t62 = t60 - t61;
-    const real t63 = t51 * t62;
-    G[13] = t63;
-    const real t64 = t38 * t13;
-    const real t65 = S_K[14] - t64;
-    const real t66 = t20 * t49;
-    const real t67 = t65 - t66;
-    const real t68 = t51 * t67;
-    G[14] = t68;
-    G[15] = t13;
-    G[16] = t20;
-    G[17] = t51;
-    const real t69 = e_K[3] + e_B[3];
-    const real t70 = tau[0] - t69;
-    const real t71 = t5 * t70;
-    g[0] = t71;
-    const real t72 = e_K[4] + e_B[4];
-    const real t73 = tau[1] - t72;
-    const real t74 = t6 * t70;
-    const real t75 = t73 - t74;
-    const real t76 = t19 * t75;
-    g[1] = t76;
-    const real t77 = e_K[5] + e_B[5];
-    const real t78 = tau[2] - t77;
-    const real t79 = t13 * t70;
-    const real t80 = t78 - t79;
-    const real t81 = t20 * t75;
-    const real t82 = t80 - t81;
-    const real t83 = t51 * t82;
-    g[2] = t83;
-    const real t84 = b[0] + S_K[0];
-    const real t85 = S_K[3] * t35;
-    const real t86 = t42 * t43;
-    const real t87 = t85 + t86;
-    const real t88 = t56 * t57;
-    const real t89 = t87 + t88;
-    const real t90 = t84 - t89;
-    const real t91 = turn[0] * t90;
-    const real t92 = S_K[3] * t37;
-    const real t93 = t42 * t46;
-    const real t94 = t92 + t93;
-    const real t95 = t56 * t63;
-    const real t96 = t94 + t95;
-    const real t97 = S_K[1] - t96;
-    const real t98 = turn[1] * t97;
-    const real t99 = t91 + t98;
-    const real t100 = S_K[3] * t39;
-    const real t101 = t42 * t50;
-    const real t102 = t100 + t101;
-    const real t103 = t56 * t68;
-    const real t104 = t102 + t103;
-    const real t105 = S_K[2] - t104;
-    const real t106 = turn[2] * t105;
-    const real t107 = t99 + t106;
-    const real t108 = turn[0] * t107;
-    const real t109 = turn[0] * t97;
-    const real t110 = b[0] + S_K[6];
-    const real t111 = t36 * t37;
-    const real t112 = t45 * t46;
-    const real t113 = t111 + t112;
-    const real t114 = t62 * t63;
-    const real t115 = t113 + t114;
-    const real t116 = t110 - t115;
-    const real t117 = turn[1] * t116;
-    const real t118 = t109 + t117;
-    const real t119 = t36 * t39;
-    const real t120 = t45 * t50;
-    const real t121 = t119 + t120;
-    const real t122 = t62 * t68;
-    const real t123 = t121 + t122;
-    const real t124 = S_K[7] - t123;
-    const real t125 = turn[2] * t124;
-    const real t126 = t118 + t125;
-    const real t127 = turn[1] * t126;
-    const real t128 = t108 + t127;
-    const real t129 = turn[0] * t105;
-    const real t130 = turn[1] * t124;
-    const real t131 = t129 + t130;
-    const real t132 = b[0] + S_K[11];
-    const real t133 = t38 * t39;
-    const real t134 = t49 * t50;
-    const real t135 = t133 + t134;
-    const real t136 = t67 * t68;
-    const real t137 = t135 + t136;
-    const real t138 = t132 - t137;
-    const real t139 = turn[2] * t138;
-    const real t140 = t131 + t139;
-    const real t141 = turn[2] * t140;
-    const real t142 = t128 + t141;
-    S_I[0] = t142;
-    const real t143 = turn[3] * t107;
-    const real t144 = turn[4] * t126;
-    const real t145 = t143 + t144;
-    const real t146 = turn[5] * t140;
-    const real t147 = t145 + t146;
-    S_I[1] = t147;
-    const real t148 = turn[6] * t107;
-    const real t149 = turn[7] * t126;
-    const real t150 = t148 + t149;
-    const real t151 = turn[8] * t140;
-    const real t152 = t150 + t151;
-    S_I[2] = t152;
-    const real t153 = link[10] * t152;
-    const real t154 = link[11] * t147;
-    const real t155 = t153 - t154;
-    S_I[3] = t155;
-    const real t156 = link[11] * t142;
-    const real t157 = link[9] * t152;
-    const real t158 = t156 - t157;
-    S_I[4] = t158;
-    const real t159 = link[9] * t147;
-    const real t160 = link[10] * t142;
-    const real t161 = t159 - t160;
-    S_I[5] = t161;
-    const real t162 = turn[3] * t90;
-    const real t163 = turn[4] * t97;
-    const real t164 = t162 + t163;
-    const real t165 = turn[5] * t105;
-    const real t166 = t164 + t165;
-    const real t167 = turn[3] * t166;
-    const real t168 = turn[3] * t97;
-    const real t169 = turn[4] * t116;
-    const real t170 = t168 + t169;
-    const real t171 = turn[5] * t124;
-    const real t172 = t170 + t171;
-    const real t173 = turn[4] * t172;
-    const real t174 = t167 + t173;
-    const real t175 = turn[3] * t105;
-    const real t176 = turn[4] * t124;
-    const real t177 = t175 + t176;
-    const real t178 = turn[5] * t138;
-    const real t179 = t177 + t178;
-    const real t180 = turn[5] * t179;
-    const real t181 = t174 + t180;
-    S_I[6] = t181;
-    const real t182 = turn[6] * t166;
-    const real t183 = turn[7] * t172;
-    const real t184 = t182 + t183;
-    const real t185 = turn[8] * t179;
-    const real t186 = t184 + t185;
-    S_I[7] = t186;
-    const real t187 = link[10] * t186;
-    const real t188 = link[11] * t181;
-    const real t189 = t187 - t188;
-    S_I[8] = t189;
-    const real t190 = link[9] * t186;
-    const real t191 = t154 - t190;
-    S_I[9] = t191;
-    const real t192 = link[9] * t181;
-    const real t193 = link[10] * t147;
-    const real t194 = t192 - t193;
-    S_I[10] = t194;
-    const real t195 = turn[6] * t90;
-    const real t196 = turn[7] * t97;
-    const real t197 = t195 + t196;
-    const real t198 = turn[8] * t105;
-    const real t199 = t197 + t198;
-    const real t200 = turn[6] * t199;
-    const real t201 = turn[6] * t97;
-    const real t202 = turn[7] * t116;
-    const real t203 = t201 + t202;
-    const real t204 = turn[8] * t124;
-    const real t205 = t203 + t204;
-    const real t206 = turn[7] * t205;
-    const real t207 = t200 + t206;
-    const real t208 = turn[6] * t105;
-    const real t209 = turn[7] * t124;
-    const real t210 = t208 + t209;
-    const real t211 = turn[8] * t138;
-    const real t212 = t210 + t211;
-    const real t213 = turn[8] * t212;
-    const real t214 = t207 + t213;
-    S_I[11] = t214;
-    const real t215 = link[10] * t214;
-    const real t216 = link[11] * t186;
-    const real t217 = t215 - t216;
-    S_I[12] = t217;
-    const real t218 = link[11] * t152;
-    const real t219 = link[9] * t214;
-    const real t220 = t218 - t219;
-    S_I[13] = t220;
-    const real t221 = t190 - t153;
-    S_I[14] = t221;
-    const real t222 = link[10] * t217;
-    const real t223 = link[11] * t189;
-    const real t224 = t222 - t223;
-    S_I[15] = t224;
-    const real t225 = link[10] * t220;
-    const real t226 = link[11] * t191;
-    const real t227 = t225 - t226;
-    S_I[16] = t227;
-    const real t228 = link[10] * t221;
-    const real t229 = link[11] * t194;
-    const real t230 = t228 - t229;
-    S_I[17] = t230;
-    const real t231 = link[11] * t158;
-    const real t232 = link[9] * t220;
-    const real t233 = t231 - t232;
-    S_I[18] = t233;
-    const real t234 = link[11] * t161;
-    const real t235 = link[9] * t221;
-    const real t236 = t234 - t235;
-    S_I[19] = t236;
-    const real t237 = link[9] * t194;
-    const real t238 = link[10] * t161;
-    const real t239 = t237 - t238;
-    S_I[20] = t239;
-    const real t240 = e_K[0] + e_B[0];
-    const real t241 = t35 * t70;
-    const real t242 = t43 * t75;
-    const real t243 = t241 + t242;
-    const real t244 = t57 * t82;
-    const real t245 = t243 + t244;
-    const real t246 = t240 + t245;
-    const real t247 = turn[0] * t246;
-    const real t248 = e_K[1] + e_B[1];
-    const real t249 = t37 * t70;
-    const real t250 = t46 * t75;
-    const real t251 = t249 + t250;
-    const real t252 = t63 * t82;
-    const real t253 = t251 + t252;
-    const real t254 = t248 + t253;
-    const real t255 = turn[1] * t254;
-    const real t256 = t247 + t255;
-    const real t257 = e_K[2] + e_B[2];
-    const real t258 = t39 * t70;
-    const real t259 = t50 * t75;
-    const real t260 = t258 + t259;
-    const real t261 = t68 * t82;
-    const real t262 = t260 + t261;
-    const real t263 = t257 + t262;
-    const real t264 = turn[2] * t263;
-    const real t265 = t256 + t264;
-    e_I[0] = t265;
-    const real t266 = turn[3] * t246;
-    const real t267 = turn[4] * t254;
-    const real t268 = t266 + t267;
-    const real t269 = turn[5] * t263;
-    const real t270 = t268 + t269;
-    e_I[1] = t270;
-    const real t271 = turn[6] * t246;
-    const real t272 = turn[7] * t254;
-    const real t273 = t271 + t272;
-    const real t274 = turn[8] * t263;
-    const real t275 = t273 + t274;
-    e_I[2] = t275;
-    const real t276 = turn[0] * tau[0];
-    const real t277 = turn[1] * tau[1];
-    const real t278 = t276 + t277;
-    const real t279 = turn[2] * tau[2];
-    const real t280 = t278 + t279;
-    const real t281 = link[10] * turn[6];
-    const real t282 = link[11] * turn[3];
-    const real t283 = t281 - t282;
-    const real t284 = t246 * t283;
-    const real t285 = link[10] * turn[7];
-    const real t286 = link[11] * turn[4];
-    const real t287 = t285 - t286;
-    const real t288 = t254 * t287;
-    const real t289 = t284 + t288;
-    const real t290 = link[10] * turn[8];
-    const real t291 = link[11] * turn[5];
-    const real t292 = t290 - t291;
-    const real t293 = t263 * t292;
-    const real t294 = t289 + t293;
-    const real t295 = t280 + t294;
-    e_I[3] = t295;
-    const real t296 = turn[3] * tau[0];
-    const real t297 = turn[4] * tau[1];
-    const real t298 = t296 + t297;
-    const real t299 = turn[5] * tau[2];
-    const real t300 = t298 + t299;
-    const real t301 = link[11] * turn[0];
-    const real t302 = link[9] * turn[6];
-    const real t303 = t301 - t302;
-    const real t304 = t246 * t303;
-    const real t305 = link[11] * turn[1];
-    const real t306 = link[9] * turn[7];
-    const real t307 = t305 - t306;
-    const real t308 = t254 * t307;
-    const real t309 = t304 + t308;
-    const real t310 = link[11] * turn[2];
-    const real t311 = link[9] * turn[8];
-    const real t312 = t310 - t311;
-    const real t313 = t263 * t312;
-    const real t314 = t309 + t313;
-    const real t315 = t300 + t314;
-    e_I[4] = t315;
-    const real t316 = turn[6] * tau[0];
-    const real t317 = turn[7] * tau[1];
-    const real t318 = t316 + t317;
-    const real t319 = turn[8] * tau[2];
-    const real t320 = t318 + t319;
-    const real t321 = link[9] * turn[3];
-    const real t322 = link[10] * turn[0];
-    const real t323 = t321 - t322;
-    const real t324 = t246 * t323;
-    const real t325 = link[9] * turn[4];
-    const real t326 = link[10] * turn[1];
-    const real t327 = t325 - t326;
-    const real t328 = t254 * t327;
-    const real t329 = t324 + t328;
-    const real t330 = link[9] * turn[5];
-    const real t331 = link[10] * turn[2];
-    const real t332 = t330 - t331;
-    const real t333 = t263 * t332;
-    const real t334 = t329 + t333;
-    const real t335 = t320 + t334;
-    e_I[5] = t335;
-    return 0;
+  (void)d;
+  (void)p;
+  real t0 = b[4] + S_K[15];
+  if (!((0.0 < t0))) return 1; /* pivot 1 of 3 vanishes: a motion of the hinge is undetermined */
+  real t2 = b[7] + S_K[18];
+  real t4 = b[5] + S_K[16];
+  real t5 = 1.0 / t0;
+  real t6 = t4 * t5;
+  real t8 = t2 - t4 * t6;
+  if (!((t2 * ((real)1 / (real)10000000000000) < t8))) return 1; /* pivot 2 of 3 vanishes: a motion of the hinge is undetermined */
+  real t10 = b[9] + S_K[20];
+  real t12 = b[6] + S_K[17];
+  real t13 = t12 * t5;
+  real t18 = b[8] + S_K[19] - t12 * t6;
+  real t19 = 1.0 / t8;
+  real t20 = t19 * t18;
+  real t22 = t10 - t12 * t13 - t18 * t20;
+  if (!((t10 * ((real)1 / (real)10000000000000) < t22))) return 1; /* pivot 3 of 3 vanishes: a motion of the hinge is undetermined */
+  real t26 = ((real)1 / (real)300000000000000) * (b[9] + (b[4] + b[7]));
+  real t30 = ((real)1 / (real)300000000000000) * (t10 + (t0 + t2));
+  real t31 = (0.0 < t26) ? t26 : t30;
+  if (!((t31 < t0))) return 1; /* speed 1 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t31 < t2))) return 1; /* speed 2 of 3 moves no inertia: its acceleration is undetermined */
+  if (!((t31 < t10))) return 1; /* speed 3 of 3 moves no inertia: its acceleration is undetermined */
+  real t35 = S_K[3] * t5;
+  G[0] = t35;
+  real t36 = S_K[8] - b[3];
+  real t37 = t36 * t5;
+  G[1] = t37;
+  real t38 = b[2] + S_K[12];
+  real t39 = t38 * t5;
+  G[2] = t39;
+  G[3] = t5;
+  G[4] = G[5] = 0.0;
+  real t42 = b[3] + S_K[4] - S_K[3] * t6;
+  real t43 = t19 * t42;
+  G[6] = t43;
+  real t45 = S_K[9] - t36 * t6;
+  real t46 = t19 * t45;
+  G[7] = t46;
+  real t49 = S_K[13] - b[1] - t38 * t6;
+  real t50 = t19 * t49;
+  G[8] = t50;
+  G[9] = t6;
+  G[10] = t19;
+  G[11] = 0.0;
+  real t51 = 1.0 / t22;
+  real t56 = S_K[5] - b[2] - S_K[3] * t13 - t20 * t42;
+  real t57 = t51 * t56;
+  G[12] = t57;
+  real t62 = b[1] + S_K[10] - t36 * t13 - t20 * t45;
+  real t63 = t51 * t62;
+  G[13] = t63;
+  real t67 = S_K[14] - t38 * t13 - t20 * t49;
+  real t68 = t51 * t67;
+  G[14] = t68;
+  G[15] = t13;
+  G[16] = t20;
+  G[17] = t51;
+  real t70 = tau[0] - (e_K[3] + e_B[3]);
+  g[0] = t5 * t70;
+  real t75 = tau[1] - (e_K[4] + e_B[4]) - t6 * t70;
+  g[1] = t19 * t75;
+  real t82 = tau[2] - (e_K[5] + e_B[5]) - t13 * t70 - t20 * t75;
+  g[2] = t51 * t82;
+  real t90 = b[0] + S_K[0] - (S_K[3] * t35 + t42 * t43 + t56 * t57);
+  real t97 = S_K[1] - (S_K[3] * t37 + t42 * t46 + t56 * t63);
+  real t105 = S_K[2] - (S_K[3] * t39 + t42 * t50 + t56 * t68);
+  real t107 = turn[0] * t90 + turn[1] * t97 + turn[2] * t105;
+  real t116 = b[0] + S_K[6] - (t36 * t37 + t45 * t46 + t62 * t63);
+  real t124 = S_K[7] - (t36 * t39 + t45 * t50 + t62 * t68);
+  real t126 = turn[0] * t97 + turn[1] * t116 + turn[2] * t124;
+  real t138 = b[0] + S_K[11] - (t38 * t39 + t49 * t50 + t67 * t68);
+  real t140 = turn[0] * t105 + turn[1] * t124 + turn[2] * t138;
+  real t142 = turn[0] * t107 + turn[1] * t126 + turn[2] * t140;
+  S_I[0] = t142;
+  real t147 = turn[3] * t107 + turn[4] * t126 + turn[5] * t140;
+  S_I[1] = t147;
+  real t152 = turn[6] * t107 + turn[7] * t126 + turn[8] * t140;
+  S_I[2] = t152;
+  real t153 = link[10] * t152;
+  real t154 = link[11] * t147;
+  S_I[3] = t153 - t154;
+  real t158 = link[11] * t142 - link[9] * t152;
+  S_I[4] = t158;
+  real t161 = link[9] * t147 - link[10] * t142;
+  S_I[5] = t161;
+  real t166 = turn[3] * t90 + turn[4] * t97 + turn[5] * t105;
+  real t172 = turn[3] * t97 + turn[4] * t116 + turn[5] * t124;
+  real t179 = turn[3] * t105 + turn[4] * t124 + turn[5] * t138;
+  real t181 = turn[3] * t166 + turn[4] * t172 + turn[5] * t179;
+  S_I[6] = t181;
+  real t186 = turn[6] * t166 + turn[7] * t172 + turn[8] * t179;
+  S_I[7] = t186;
+  real t189 = link[10] * t186 - link[11] * t181;
+  S_I[8] = t189;
+  real t190 = link[9] * t186;
+  real t191 = t154 - t190;
+  S_I[9] = t191;
+  real t194 = link[9] * t181 - link[10] * t147;
+  S_I[10] = t194;
+  real t214 = turn[6] * (turn[6] * t90 + turn[7] * t97 + turn[8] * t105) + turn[7] * (turn[6] * t97
+    + turn[7] * t116 + turn[8] * t124) + turn[8] * (turn[6] * t105 + turn[7] * t124 + turn[8] *
+    t138);
+  S_I[11] = t214;
+  real t217 = link[10] * t214 - link[11] * t186;
+  S_I[12] = t217;
+  real t220 = link[11] * t152 - link[9] * t214;
+  S_I[13] = t220;
+  real t221 = t190 - t153;
+  S_I[14] = t221;
+  S_I[15] = link[10] * t217 - link[11] * t189;
+  S_I[16] = link[10] * t220 - link[11] * t191;
+  S_I[17] = link[10] * t221 - link[11] * t194;
+  S_I[18] = link[11] * t158 - link[9] * t220;
+  S_I[19] = link[11] * t161 - link[9] * t221;
+  S_I[20] = link[9] * t194 - link[10] * t161;
+  real t246 = e_K[0] + e_B[0] + (t35 * t70 + t43 * t75 + t57 * t82);
+  real t254 = e_K[1] + e_B[1] + (t37 * t70 + t46 * t75 + t63 * t82);
+  real t263 = e_K[2] + e_B[2] + (t39 * t70 + t50 * t75 + t68 * t82);
+  e_I[0] = turn[0] * t246 + turn[1] * t254 + turn[2] * t263;
+  e_I[1] = turn[3] * t246 + turn[4] * t254 + turn[5] * t263;
+  e_I[2] = turn[6] * t246 + turn[7] * t254 + turn[8] * t263;
+  e_I[3] = turn[0] * tau[0] + turn[1] * tau[1] + turn[2] * tau[2] + (t246 * (link[10] * turn[6] -
+    link[11] * turn[3]) + t254 * (link[10] * turn[7] - link[11] * turn[4]) + t263 * (link[10] *
+    turn[8] - link[11] * turn[5]));
+  e_I[4] = turn[3] * tau[0] + turn[4] * tau[1] + turn[5] * tau[2] + (t246 * (link[11] * turn[0] -
+    link[9] * turn[6]) + t254 * (link[11] * turn[1] - link[9] * turn[7]) + t263 * (link[11] *
+    turn[2] - link[9] * turn[8]));
+  e_I[5] = turn[6] * tau[0] + turn[7] * tau[1] + turn[8] * tau[2] + (t246 * (link[9] * turn[3] -
+    link[10] * turn[0]) + t254 * (link[9] * turn[4] - link[10] * turn[1]) + t263 * (link[9] *
+    turn[5] - link[10] * turn[2]));
+  return 0;
 }
 
-static int mstmm_sweep_link_ball_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_ball_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_ball_condense_inputs[] = {
-    {"link", 12, "", 0, 0},
-    {"turn", 9, "", 0, 0},
-    {"d", 0, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 3, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_ball_condense_outputs[] = {
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_ball_condense_guards[] = {
-    {1, "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 3 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 3 of 3 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_ball_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the ball hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -891,170 +302,68 @@ static const mstmm_guard mstmm_sweep_link_ball_condense_guards[] = {
  * out udot[3] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_ball_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_ball_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    (void)d;
-    (void)p;
-    const real t0 = link[11] * delta_I[4];
-    const real t1 = link[10] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = delta_I[0] + t2;
-    const real t4 = turn[2] * t3;
-    const real t5 = link[9] * delta_I[5];
-    const real t6 = link[11] * delta_I[3];
-    const real t7 = t5 - t6;
-    const real t8 = delta_I[1] + t7;
-    const real t9 = turn[5] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = link[10] * delta_I[3];
-    const real t12 = link[9] * delta_I[4];
-    const real t13 = t11 - t12;
-    const real t14 = delta_I[2] + t13;
-    const real t15 = turn[8] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = G[2] * t16;
-    const real t18 = turn[0] * t3;
-    const real t19 = turn[3] * t8;
-    const real t20 = t18 + t19;
-    const real t21 = turn[6] * t14;
-    const real t22 = t20 + t21;
-    const real t23 = G[0] * t22;
-    const real t24 = turn[1] * t3;
-    const real t25 = turn[4] * t8;
-    const real t26 = t24 + t25;
-    const real t27 = turn[7] * t14;
-    const real t28 = t26 + t27;
-    const real t29 = G[1] * t28;
-    const real t30 = t23 + t29;
-    const real t31 = t17 + t30;
-    const real t32 = g[0] - t31;
-    const real t33 = G[8] * t16;
-    const real t34 = G[6] * t22;
-    const real t35 = G[7] * t28;
-    const real t36 = t34 + t35;
-    const real t37 = t33 + t36;
-    const real t38 = g[1] - t37;
-    const real t39 = G[14] * t16;
-    const real t40 = G[12] * t22;
-    const real t41 = G[13] * t28;
-    const real t42 = t40 + t41;
-    const real t43 = t39 + t42;
-    const real t44 = g[2] - t43;
-    const real t45 = G[16] * t44;
-    const real t46 = t38 - t45;
-    const real t47 = G[9] * t46;
-    const real t48 = t32 - t47;
-    const real t49 = G[15] * t44;
-    const real t50 = t48 - t49;
-    const real t51 = turn[0] * delta_I[3];
-    const real t52 = turn[3] * delta_I[4];
-    const real t53 = t51 + t52;
-    const real t54 = turn[6] * delta_I[5];
-    const real t55 = t53 + t54;
-    const real t56 = t50 - t55;
-    udot[0] = t56;
-    const real t57 = turn[1] * delta_I[3];
-    const real t58 = turn[4] * delta_I[4];
-    const real t59 = t57 + t58;
-    const real t60 = turn[7] * delta_I[5];
-    const real t61 = t59 + t60;
-    const real t62 = t46 - t61;
-    udot[1] = t62;
-    const real t63 = turn[2] * delta_I[3];
-    const real t64 = turn[5] * delta_I[4];
-    const real t65 = t63 + t64;
-    const real t66 = turn[8] * delta_I[5];
-    const real t67 = t65 + t66;
-    const real t68 = t44 - t67;
-    udot[2] = t68;
-    delta[0] = t22;
-    delta[1] = t28;
-    delta[2] = t16;
-    delta[3] = t50;
-    delta[4] = t46;
-    delta[5] = t44;
-    return 0;
+  (void)d;
+  (void)p;
+  real t3 = delta_I[0] + (link[11] * delta_I[4] - link[10] * delta_I[5]);
+  real t8 = delta_I[1] + (link[9] * delta_I[5] - link[11] * delta_I[3]);
+  real t14 = delta_I[2] + (link[10] * delta_I[3] - link[9] * delta_I[4]);
+  real t16 = turn[2] * t3 + turn[5] * t8 + turn[8] * t14;
+  real t22 = turn[0] * t3 + turn[3] * t8 + turn[6] * t14;
+  real t28 = turn[1] * t3 + turn[4] * t8 + turn[7] * t14;
+  real t44 = g[2] - (G[14] * t16 + (G[12] * t22 + G[13] * t28));
+  real t46 = g[1] - (G[8] * t16 + (G[6] * t22 + G[7] * t28)) - G[16] * t44;
+  real t50 = g[0] - (G[2] * t16 + (G[0] * t22 + G[1] * t28)) - G[9] * t46 - G[15] * t44;
+  udot[0] = t50 - (turn[0] * delta_I[3] + turn[3] * delta_I[4] + turn[6] * delta_I[5]);
+  udot[1] = t46 - (turn[1] * delta_I[3] + turn[4] * delta_I[4] + turn[7] * delta_I[5]);
+  udot[2] = t44 - (turn[2] * delta_I[3] + turn[5] * delta_I[4] + turn[8] * delta_I[5]);
+  delta[0] = t22;
+  delta[1] = t28;
+  delta[2] = t16;
+  delta[3] = t50;
+  delta[4] = t46;
+  delta[5] = t44;
+  return 0;
 }
 
-static int mstmm_sweep_link_ball_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_ball_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_ball_recover_inputs[] = {
-    {"link", 12, "", 0, 0},
-    {"turn", 9, "", 0, 0},
-    {"d", 0, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"G", 18, "", 0, 0},
-    {"g", 3, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_ball_recover_outputs[] = {
-    {"udot", 3, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_ball_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_ball_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_ball_turn,
-        .call = mstmm_sweep_link_ball_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_ball_turn_inputs,
-        .outputs = mstmm_sweep_link_ball_turn_outputs,
-        .ir_hash = "71815725ebb7bf912d6cdb352977d06df639e5ad157b565830128395cd2a601f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_ball_forward,
-        .call = mstmm_sweep_link_ball_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_ball_forward_inputs,
-        .outputs = mstmm_sweep_link_ball_forward_outputs,
-        .ir_hash = "3899e7234ddaffd186408de9861c06b6bf672261b54449db915a1b6b14d175f7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_ball_condense,
-        .call = mstmm_sweep_link_ball_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_ball_condense_inputs,
-        .outputs = mstmm_sweep_link_ball_condense_outputs,
-        .ir_hash = "3e12931af1e9baee9bbb0d6a7b906f5a3ba37c1553bf844683cd112848bb7f87",
-        .n_guards = 6,
-        .guards = mstmm_sweep_link_ball_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_ball_recover,
-        .call = mstmm_sweep_link_ball_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_ball_recover_inputs,
-        .outputs = mstmm_sweep_link_ball_recover_outputs,
-        .ir_hash = "25e1982364f89943126344e9683192e80ef2cb12c48e1a44442f683a68f65e5b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_ball_turn), 2, 1, (const mstmm_port[]){{"link", 12, "",
+    0, 0}, {"q", 4, "", 0, 0}}, (const mstmm_port[]){{"turn", 9, "", 0, 0}},
+    "3c7734534563ebdb371264a8486d5da4d22de7b1fabeb95ab9133bf9e38fa892", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_ball_forward), 7, 4, (const mstmm_port[]){{"link",
+    12, "", 0, 0}, {"turn", 9, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0, 0}, {"q", 4, "", 0,
+    0}, {"u", 3, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d", 0, "m", 0, 0},
+    {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot", 4, "", 0, 0}},
+    "47d67b9977b933774952ec186d274ef77c7a9e66b8307637b160108cb1d5bd5e", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_ball_condense), 9, 4, (const mstmm_port[]){{"link",
+    12, "", 0, 0}, {"turn", 9, "", 0, 0}, {"d", 0, "m", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0,
+    0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"tau", 3,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 18, "", 0, 0}, {"g", 3, "", 0, 0}, {"S_I", 21, "",
+    0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "70ac33f1f84f5d36aa680b664e202c525370a31c3f026e53de019543f3c1d876", 6, (const mstmm_guard[]){{1,
+    "pivot 1 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 3 of 3 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 3 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 3 of 3 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_ball_recover), 7, 2, (const mstmm_port[]){{"link",
+    12, "", 0, 0}, {"turn", 9, "", 0, 0}, {"d", 0, "m", 0, 0}, {"p", 0, "", 0, 0}, {"G", 18, "", 0,
+    0}, {"g", 3, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 3, "", 0, 0},
+    {"delta", 6, "", 0, 0}}, "b0f456b586530fc1051fd29c1fd28978f7238c34ff8af62478293c63e0ecfdb1", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_sweep_link_ball = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_ball",
-    .hash = "604fb75b7993ffc57abb68dcc9ae01d3eace33a4f127bd397a2de85f07f7ef57",
+    .hash = "2ab3529b240436ec21be6e92a59bd02bb06ab577119ca3e49a5ab751b2f6105b",
     .nq = 0,
     .nu = 0,
     .np = 0,

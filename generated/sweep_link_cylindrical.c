@@ -7,49 +7,18 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_cylindrical;
-int mstmm_sweep_link_cylindrical_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_cylindrical_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_cylindrical_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the cylindrical hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[2] coordinates: displacement [m], angle [rad]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_cylindrical_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_cylindrical_turn(in_t link, in_t q, out_t turn)
 {
-    const real t0 = link[3] + q[1];
-    turn[0] = t0;
-    return 0;
+  turn[0] = link[3] + q[1];
+  return 0;
 }
 
-static int mstmm_sweep_link_cylindrical_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_cylindrical_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_cylindrical_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 2, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_cylindrical_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_cylindrical_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the cylindrical hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,221 +35,67 @@ static const mstmm_port mstmm_sweep_link_cylindrical_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[2] coordinate rates
  */
-int mstmm_sweep_link_cylindrical_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_cylindrical_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    (void)p;
-    const real t0 = link[4] + q[0];
-    d[0] = t0;
-    const real t1 = turn[0] * motion_I[0];
-    const real t2 = link[0] * motion_I[1];
-    const real t3 = link[1] * motion_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = turn[1] * t4;
-    const real t6 = t1 + t5;
-    motion[0] = t6;
-    const real t7 = turn[0] * t4;
-    const real t8 = turn[1] * motion_I[0];
-    const real t9 = t7 - t8;
-    motion[1] = t9;
-    const real t10 = link[0] * motion_I[2];
-    const real t11 = link[1] * motion_I[1];
-    const real t12 = t10 - t11;
-    const real t13 = u[1] + t12;
-    motion[2] = t13;
-    const real t14 = turn[0] * motion_I[3];
-    const real t15 = link[0] * motion_I[4];
-    const real t16 = link[1] * motion_I[5];
-    const real t17 = t15 + t16;
-    const real t18 = turn[1] * t17;
-    const real t19 = t14 + t18;
-    const real t20 = u[1] * t9;
-    const real t21 = t19 + t20;
-    motion[3] = t21;
-    const real t22 = turn[0] * t17;
-    const real t23 = turn[1] * motion_I[3];
-    const real t24 = t22 - t23;
-    const real t25 = u[1] * t6;
-    const real t26 = t24 - t25;
-    motion[4] = t26;
-    const real t27 = link[0] * motion_I[5];
-    const real t28 = link[1] * motion_I[4];
-    const real t29 = t27 - t28;
-    motion[5] = t29;
-    const real t30 = motion_I[1] * motion_I[1];
-    const real t31 = motion_I[2] * motion_I[2];
-    const real t32 = t30 + t31;
-    const real t33 = link[2] * t32;
-    const real t34 = motion_I[6] - t33;
-    const real t35 = motion_I[0] * t12;
-    const real t36 = t17 + t35;
-    const real t37 = t0 * t36;
-    const real t38 = t34 + t37;
-    const real t39 = turn[0] * t38;
-    const real t40 = motion_I[0] * motion_I[1];
-    const real t41 = motion_I[5] + t40;
-    const real t42 = link[2] * t41;
-    const real t43 = motion_I[7] + t42;
-    const real t44 = link[0] * t43;
-    const real t45 = motion_I[0] * motion_I[2];
-    const real t46 = t45 - motion_I[4];
-    const real t47 = link[2] * t46;
-    const real t48 = motion_I[8] + t47;
-    const real t49 = link[1] * t48;
-    const real t50 = t44 + t49;
-    const real t51 = t4 * t12;
-    const real t52 = t51 - motion_I[3];
-    const real t53 = t0 * t52;
-    const real t54 = t50 + t53;
-    const real t55 = turn[1] * t54;
-    const real t56 = t39 + t55;
-    const real t57 = u[0] * t9;
-    const real t58 = 2.0 * t57;
-    const real t59 = t56 + t58;
-    motion[6] = t59;
-    const real t60 = turn[0] * t54;
-    const real t61 = turn[1] * t38;
-    const real t62 = t60 - t61;
-    const real t63 = u[0] * t6;
-    const real t64 = 2.0 * t63;
-    const real t65 = t62 - t64;
-    motion[7] = t65;
-    const real t66 = link[0] * t48;
-    const real t67 = link[1] * t43;
-    const real t68 = t66 - t67;
-    const real t69 = motion_I[0] * motion_I[0];
-    const real t70 = t4 * t4;
-    const real t71 = t69 + t70;
-    const real t72 = t0 * t71;
-    const real t73 = t68 - t72;
-    motion[8] = t73;
-    const real t74 = b[0] * t59;
-    const real t75 = t28 - t27;
-    const real t76 = t6 * t9;
-    const real t77 = t75 + t76;
-    const real t78 = b[2] * t77;
-    const real t79 = t6 * t13;
-    const real t80 = t26 + t79;
-    const real t81 = b[3] * t80;
-    const real t82 = t78 + t81;
-    const real t83 = t9 * t9;
-    const real t84 = t13 * t13;
-    const real t85 = t83 + t84;
-    const real t86 = b[1] * t85;
-    const real t87 = t82 - t86;
-    const real t88 = t74 + t87;
-    e_B[0] = t88;
-    const real t89 = b[0] * t65;
-    const real t90 = t29 + t76;
-    const real t91 = b[1] * t90;
-    const real t92 = t9 * t13;
-    const real t93 = t92 - t21;
-    const real t94 = b[3] * t93;
-    const real t95 = t91 + t94;
-    const real t96 = t6 * t6;
-    const real t97 = t84 + t96;
-    const real t98 = b[2] * t97;
-    const real t99 = t95 - t98;
-    const real t100 = t89 + t99;
-    e_B[1] = t100;
-    const real t101 = b[0] * t73;
-    const real t102 = t25 - t24;
-    const real t103 = t79 + t102;
-    const real t104 = b[1] * t103;
-    const real t105 = t21 + t92;
-    const real t106 = b[2] * t105;
-    const real t107 = t104 + t106;
-    const real t108 = t83 + t96;
-    const real t109 = b[3] * t108;
-    const real t110 = t107 - t109;
-    const real t111 = t101 + t110;
-    e_B[2] = t111;
-    const real t112 = b[6] * t29;
-    const real t113 = b[5] * t26;
-    const real t114 = b[4] * t21;
-    const real t115 = b[2] * t73;
-    const real t116 = b[9] * t13;
-    const real t117 = b[6] * t6;
-    const real t118 = b[8] * t9;
-    const real t119 = t117 + t118;
-    const real t120 = t116 + t119;
-    const real t121 = t9 * t120;
-    const real t122 = b[8] * t13;
-    const real t123 = b[5] * t6;
-    const real t124 = b[7] * t9;
-    const real t125 = t123 + t124;
-    const real t126 = t122 + t125;
-    const real t127 = t13 * t126;
-    const real t128 = t121 - t127;
-    const real t129 = t115 + t128;
-    const real t130 = b[3] * t65;
-    const real t131 = t129 - t130;
-    const real t132 = t114 + t131;
-    const real t133 = t113 + t132;
-    const real t134 = t112 + t133;
-    e_B[3] = t134;
-    const real t135 = b[8] * t29;
-    const real t136 = b[7] * t26;
-    const real t137 = b[5] * t21;
-    const real t138 = b[3] * t59;
-    const real t139 = b[6] * t13;
-    const real t140 = b[4] * t6;
-    const real t141 = b[5] * t9;
-    const real t142 = t140 + t141;
-    const real t143 = t139 + t142;
-    const real t144 = t13 * t143;
-    const real t145 = t6 * t120;
-    const real t146 = t144 - t145;
-    const real t147 = b[1] * t73;
-    const real t148 = t146 - t147;
-    const real t149 = t138 + t148;
-    const real t150 = t137 + t149;
-    const real t151 = t136 + t150;
-    const real t152 = t135 + t151;
-    e_B[4] = t152;
-    const real t153 = b[9] * t29;
-    const real t154 = b[8] * t26;
-    const real t155 = b[6] * t21;
-    const real t156 = b[1] * t65;
-    const real t157 = t6 * t126;
-    const real t158 = t9 * t143;
-    const real t159 = t157 - t158;
-    const real t160 = t156 + t159;
-    const real t161 = b[2] * t59;
-    const real t162 = t160 - t161;
-    const real t163 = t155 + t162;
-    const real t164 = t154 + t163;
-    const real t165 = t153 + t164;
-    e_B[5] = t165;
-    qdot[0] = u[0];
-    qdot[1] = u[1];
-    return 0;
+  (void)p;
+  real t0 = link[4] + q[0];
+  d[0] = t0;
+  real t4 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t6 = turn[0] * motion_I[0] + turn[1] * t4;
+  motion[0] = t6;
+  real t9 = turn[0] * t4 - turn[1] * motion_I[0];
+  motion[1] = t9;
+  real t12 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  real t13 = u[1] + t12;
+  motion[2] = t13;
+  real t17 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t21 = turn[0] * motion_I[3] + turn[1] * t17 + u[1] * t9;
+  motion[3] = t21;
+  real t24 = turn[0] * t17 - turn[1] * motion_I[3];
+  real t25 = u[1] * t6;
+  real t26 = t24 - t25;
+  motion[4] = t26;
+  real t27 = link[0] * motion_I[5];
+  real t28 = link[1] * motion_I[4];
+  real t29 = t27 - t28;
+  motion[5] = t29;
+  real t38 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) + t0 *
+    (t17 + motion_I[0] * t12);
+  real t43 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t48 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t54 = link[0] * t43 + link[1] * t48 + t0 * (t4 * t12 - motion_I[3]);
+  real t59 = turn[0] * t38 + turn[1] * t54 + 2.0 * (u[0] * t9);
+  motion[6] = t59;
+  real t65 = turn[0] * t54 - turn[1] * t38 - 2.0 * (u[0] * t6);
+  motion[7] = t65;
+  real t73 = link[0] * t48 - link[1] * t43 - t0 * (motion_I[0] * motion_I[0] + t4 * t4);
+  motion[8] = t73;
+  real t76 = t6 * t9;
+  real t79 = t6 * t13;
+  real t83 = t9 * t9;
+  real t84 = t13 * t13;
+  e_B[0] = b[0] * t59 + (b[2] * (t28 - t27 + t76) + b[3] * (t26 + t79) - b[1] * (t83 + t84));
+  real t92 = t9 * t13;
+  real t96 = t6 * t6;
+  e_B[1] = b[0] * t65 + (b[1] * (t29 + t76) + b[3] * (t92 - t21) - b[2] * (t84 + t96));
+  e_B[2] = b[0] * t73 + (b[1] * (t79 + (t25 - t24)) + b[2] * (t21 + t92) - b[3] * (t83 + t96));
+  real t120 = b[9] * t13 + (b[6] * t6 + b[8] * t9);
+  real t126 = b[8] * t13 + (b[5] * t6 + b[7] * t9);
+  e_B[3] = b[6] * t29 + (b[5] * t26 + (b[4] * t21 + (b[2] * t73 + (t9 * t120 - t13 * t126) - b[3] *
+    t65)));
+  real t143 = b[6] * t13 + (b[4] * t6 + b[5] * t9);
+  e_B[4] = b[8] * t29 + (b[7] * t26 + (b[5] * t21 + (b[3] * t59 + (t13 * t143 - t6 * t120 - b[1] *
+    t73))));
+  e_B[5] = b[9] * t29 + (b[8] * t26 + (b[6] * t21 + (b[1] * t65 + (t6 * t126 - t9 * t143) - b[2] *
+    t59)));
+  qdot[0] = u[0];
+  qdot[1] = u[1];
+  return 0;
 }
 
-static int mstmm_sweep_link_cylindrical_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_cylindrical_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_cylindrical_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 2, "", 0, 0},
-    {"u", 2, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_cylindrical_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 2, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_cylindrical_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the cylindrical hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -299,387 +114,157 @@ static const mstmm_port mstmm_sweep_link_cylindrical_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_cylindrical_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_cylindrical_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K,
+    in_t e_K, in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = b[0] + S_K[11];
-    const real t1 = 0.0 < t0;
-    if (!(t1 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t2 = b[9] + S_K[20];
-    const real t3 = t2 * ((real)1 / (real)10000000000000);
-    const real t4 = 1.0 / t0;
-    const real t5 = S_K[14] * t4;
-    const real t6 = S_K[14] * t5;
-    const real t7 = t2 - t6;
-    const real t8 = t3 < t7;
-    if (!(t8 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t1 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
-    if (!(t8 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
-    const real t9 = 0.0 < b[0];
-    const real t10 = b[0] * ((real)1 / (real)100000000000000);
-    const real t11 = b[0] + S_K[0];
-    const real t12 = b[0] + S_K[6];
-    const real t13 = t11 + t12;
-    const real t14 = t0 + t13;
-    const real t15 = ((real)1 / (real)300000000000000) * t14;
-    const real t16 = t9 != 0 ? t10 : t15;
-    const real t17 = t16 < t0;
-    if (!(t17 != 0)) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
-    const real t18 = b[4] + b[7];
-    const real t19 = b[9] + t18;
-    const real t20 = ((real)1 / (real)300000000000000) * t19;
-    const real t21 = 0.0 < t20;
-    const real t22 = b[4] + S_K[15];
-    const real t23 = b[7] + S_K[18];
-    const real t24 = t22 + t23;
-    const real t25 = t2 + t24;
-    const real t26 = ((real)1 / (real)300000000000000) * t25;
-    const real t27 = t21 != 0 ? t20 : t26;
-    const real t28 = t27 < t2;
-    if (!(t28 != 0)) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
-    const real t29 = S_K[2] * t4;
-    const real t30 = 1.0 / t7;
-    const real t31 = S_K[5] - b[2];
-    const real t32 = S_K[2] * t5;
-    const real t33 = t31 - t32;
-    const real t34 = t30 * t33;
-    const real t35 = t5 * t34;
-    const real t36 = t29 - t35;
-    G[0] = t36;
-    const real t37 = S_K[7] * t4;
-    const real t38 = b[1] + S_K[10];
-    const real t39 = S_K[7] * t5;
-    const real t40 = t38 - t39;
-    const real t41 = t30 * t40;
-    const real t42 = t5 * t41;
-    const real t43 = t37 - t42;
-    G[1] = t43;
-    G[2] = 1.0;
-    const real t44 = b[2] + S_K[12];
-    const real t45 = t44 * t4;
-    const real t46 = b[6] + S_K[17];
-    const real t47 = t44 * t5;
-    const real t48 = t46 - t47;
-    const real t49 = t30 * t48;
-    const real t50 = t5 * t49;
-    const real t51 = t45 - t50;
-    G[3] = t51;
-    const real t52 = S_K[13] - b[1];
-    const real t53 = t52 * t4;
-    const real t54 = b[8] + S_K[19];
-    const real t55 = t52 * t5;
-    const real t56 = t54 - t55;
-    const real t57 = t30 * t56;
-    const real t58 = t5 * t57;
-    const real t59 = t53 - t58;
-    G[4] = t59;
-    G[5] = 0.0;
-    G[6] = t34;
-    G[7] = t41;
-    G[8] = 0.0;
-    G[9] = t49;
-    G[10] = t57;
-    G[11] = 1.0;
-    const real t60 = e_K[2] + e_B[2];
-    const real t61 = tau[0] - t60;
-    const real t62 = t4 * t61;
-    const real t63 = e_K[5] + e_B[5];
-    const real t64 = tau[1] - t63;
-    const real t65 = t5 * t61;
-    const real t66 = t64 - t65;
-    const real t67 = t30 * t66;
-    const real t68 = t5 * t67;
-    const real t69 = t62 - t68;
-    g[0] = t69;
-    g[1] = t67;
-    const real t70 = S_K[2] * t36;
-    const real t71 = t31 * t34;
-    const real t72 = t70 + t71;
-    const real t73 = t11 - t72;
-    const real t74 = turn[0] * t73;
-    const real t75 = S_K[2] * t43;
-    const real t76 = t31 * t41;
-    const real t77 = t75 + t76;
-    const real t78 = S_K[1] - t77;
-    const real t79 = turn[1] * t78;
-    const real t80 = t74 - t79;
-    const real t81 = turn[0] * t80;
-    const real t82 = turn[0] * t78;
-    const real t83 = S_K[7] * t43;
-    const real t84 = t38 * t41;
-    const real t85 = t83 + t84;
-    const real t86 = t12 - t85;
-    const real t87 = turn[1] * t86;
-    const real t88 = t82 - t87;
-    const real t89 = turn[1] * t88;
-    const real t90 = t81 - t89;
-    S_I[0] = t90;
-    const real t91 = turn[1] * t80;
-    const real t92 = turn[0] * t88;
-    const real t93 = t91 + t92;
-    const real t94 = link[0] * t93;
-    S_I[1] = t94;
-    const real t95 = link[1] * t93;
-    S_I[2] = t95;
-    const real t96 = S_K[2] * t51;
-    const real t97 = t31 * t49;
-    const real t98 = t96 + t97;
-    const real t99 = S_K[3] - t98;
-    const real t100 = turn[0] * t99;
-    const real t101 = S_K[8] - b[3];
-    const real t102 = S_K[7] * t51;
-    const real t103 = t38 * t49;
-    const real t104 = t102 + t103;
-    const real t105 = t101 - t104;
-    const real t106 = turn[1] * t105;
-    const real t107 = t100 - t106;
-    const real t108 = turn[0] * t107;
-    const real t109 = b[3] + S_K[4];
-    const real t110 = S_K[2] * t59;
-    const real t111 = t31 * t57;
-    const real t112 = t110 + t111;
-    const real t113 = t109 - t112;
-    const real t114 = turn[0] * t113;
-    const real t115 = S_K[7] * t59;
-    const real t116 = t38 * t57;
-    const real t117 = t115 + t116;
-    const real t118 = S_K[9] - t117;
-    const real t119 = turn[1] * t118;
-    const real t120 = t114 - t119;
-    const real t121 = turn[1] * t120;
-    const real t122 = t108 - t121;
-    const real t123 = d[0] * t93;
-    const real t124 = t122 - t123;
-    S_I[3] = t124;
-    const real t125 = turn[1] * t107;
-    const real t126 = turn[0] * t120;
-    const real t127 = t125 + t126;
-    const real t128 = d[0] * t90;
-    const real t129 = t127 + t128;
-    const real t130 = link[0] * t129;
-    const real t131 = link[2] * t95;
-    const real t132 = t130 - t131;
-    S_I[4] = t132;
-    const real t133 = link[1] * t129;
-    const real t134 = link[2] * t94;
-    const real t135 = t133 + t134;
-    S_I[5] = t135;
-    const real t136 = turn[1] * t73;
-    const real t137 = t82 + t136;
-    const real t138 = turn[1] * t137;
-    const real t139 = turn[0] * t86;
-    const real t140 = t79 + t139;
-    const real t141 = turn[0] * t140;
-    const real t142 = t138 + t141;
-    const real t143 = link[0] * t142;
-    const real t144 = link[0] * t143;
-    S_I[6] = t144;
-    const real t145 = link[1] * t143;
-    S_I[7] = t145;
-    const real t146 = turn[1] * t99;
-    const real t147 = turn[0] * t105;
-    const real t148 = t146 + t147;
-    const real t149 = turn[0] * t148;
-    const real t150 = turn[1] * t113;
-    const real t151 = turn[0] * t118;
-    const real t152 = t150 + t151;
-    const real t153 = turn[1] * t152;
-    const real t154 = t149 - t153;
-    const real t155 = d[0] * t142;
-    const real t156 = t154 - t155;
-    const real t157 = link[0] * t156;
-    S_I[8] = t157;
-    const real t158 = turn[1] * t148;
-    const real t159 = turn[0] * t152;
-    const real t160 = t158 + t159;
-    const real t161 = t160 + t123;
-    const real t162 = link[0] * t161;
-    const real t163 = link[0] * t162;
-    const real t164 = link[2] * t145;
-    const real t165 = t163 - t164;
-    S_I[9] = t165;
-    const real t166 = link[1] * t162;
-    const real t167 = link[2] * t144;
-    const real t168 = t166 + t167;
-    S_I[10] = t168;
-    const real t169 = link[1] * t142;
-    const real t170 = link[1] * t169;
-    S_I[11] = t170;
-    const real t171 = link[1] * t156;
-    S_I[12] = t171;
-    const real t172 = link[1] * t161;
-    const real t173 = link[0] * t172;
-    const real t174 = link[2] * t170;
-    const real t175 = t173 - t174;
-    S_I[13] = t175;
-    const real t176 = link[1] * t172;
-    const real t177 = t176 + t164;
-    S_I[14] = t177;
-    const real t178 = t44 * t51;
-    const real t179 = t46 * t49;
-    const real t180 = t178 + t179;
-    const real t181 = t22 - t180;
-    const real t182 = turn[0] * t181;
-    const real t183 = b[5] + S_K[16];
-    const real t184 = t44 * t59;
-    const real t185 = t46 * t57;
-    const real t186 = t184 + t185;
-    const real t187 = t183 - t186;
-    const real t188 = turn[1] * t187;
-    const real t189 = t182 - t188;
-    const real t190 = turn[0] * t189;
-    const real t191 = turn[0] * t187;
-    const real t192 = t52 * t59;
-    const real t193 = t54 * t57;
-    const real t194 = t192 + t193;
-    const real t195 = t23 - t194;
-    const real t196 = turn[1] * t195;
-    const real t197 = t191 - t196;
-    const real t198 = turn[1] * t197;
-    const real t199 = t190 - t198;
-    const real t200 = t154 + t156;
-    const real t201 = d[0] * t200;
-    const real t202 = t199 - t201;
-    S_I[15] = t202;
-    const real t203 = turn[1] * t189;
-    const real t204 = turn[0] * t197;
-    const real t205 = t203 + t204;
-    const real t206 = t122 - t161;
-    const real t207 = d[0] * t206;
-    const real t208 = t205 + t207;
-    const real t209 = link[0] * t208;
-    const real t210 = link[2] * t171;
-    const real t211 = t209 - t210;
-    S_I[16] = t211;
-    const real t212 = link[1] * t208;
-    const real t213 = link[2] * t157;
-    const real t214 = t212 + t213;
-    S_I[17] = t214;
-    const real t215 = turn[1] * t181;
-    const real t216 = t191 + t215;
-    const real t217 = turn[1] * t216;
-    const real t218 = turn[0] * t195;
-    const real t219 = t188 + t218;
-    const real t220 = turn[0] * t219;
-    const real t221 = t217 + t220;
-    const real t222 = t127 + t129;
-    const real t223 = d[0] * t222;
-    const real t224 = t221 + t223;
-    const real t225 = link[0] * t224;
-    const real t226 = link[0] * t225;
-    const real t227 = t173 + t175;
-    const real t228 = link[2] * t227;
-    const real t229 = t226 - t228;
-    S_I[18] = t229;
-    const real t230 = link[1] * t225;
-    const real t231 = t163 - t177;
-    const real t232 = link[2] * t231;
-    const real t233 = t230 + t232;
-    S_I[19] = t233;
-    const real t234 = link[1] * t224;
-    const real t235 = link[1] * t234;
-    const real t236 = t166 + t168;
-    const real t237 = link[2] * t236;
-    const real t238 = t235 + t237;
-    S_I[20] = t238;
-    const real t239 = e_K[0] + e_B[0];
-    const real t240 = t36 * t61;
-    const real t241 = t34 * t64;
-    const real t242 = t240 + t241;
-    const real t243 = t239 + t242;
-    const real t244 = turn[0] * t243;
-    const real t245 = e_K[1] + e_B[1];
-    const real t246 = t43 * t61;
-    const real t247 = t41 * t64;
-    const real t248 = t246 + t247;
-    const real t249 = t245 + t248;
-    const real t250 = turn[1] * t249;
-    const real t251 = t244 - t250;
-    e_I[0] = t251;
-    const real t252 = turn[1] * t243;
-    const real t253 = turn[0] * t249;
-    const real t254 = t252 + t253;
-    const real t255 = link[0] * t254;
-    const real t256 = link[1] * tau[0];
-    const real t257 = t255 - t256;
-    e_I[1] = t257;
-    const real t258 = link[1] * t254;
-    const real t259 = link[0] * tau[0];
-    const real t260 = t258 + t259;
-    e_I[2] = t260;
-    const real t261 = e_K[3] + e_B[3];
-    const real t262 = t51 * t61;
-    const real t263 = t49 * t64;
-    const real t264 = t262 + t263;
-    const real t265 = t261 + t264;
-    const real t266 = turn[0] * t265;
-    const real t267 = e_K[4] + e_B[4];
-    const real t268 = t59 * t61;
-    const real t269 = t57 * t64;
-    const real t270 = t268 + t269;
-    const real t271 = t267 + t270;
-    const real t272 = turn[1] * t271;
-    const real t273 = t266 - t272;
-    const real t274 = d[0] * t254;
-    const real t275 = t273 - t274;
-    e_I[3] = t275;
-    const real t276 = turn[1] * t265;
-    const real t277 = turn[0] * t271;
-    const real t278 = t276 + t277;
-    const real t279 = d[0] * t251;
-    const real t280 = t278 + t279;
-    const real t281 = link[0] * t280;
-    const real t282 = link[1] * tau[1];
-    const real t283 = t281 - t282;
-    const real t284 = link[2] * t260;
-    const real t285 = t283 - t284;
-    e_I[4] = t285;
-    const real t286 = link[1] * t280;
-    const real t287 = link[0] * tau[1];
-    const real t288 = t286 + t287;
-    const real t289 = link[2] * t257;
-    const real t290 = t288 + t289;
-    e_I[5] = t290;
-    return 0;
+  (void)p;
+  real t0 = b[0] + S_K[11];
+  real t1 = 0.0 < t0;
+  if (!(t1 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  real t2 = b[9] + S_K[20];
+  real t4 = 1.0 / t0;
+  real t5 = S_K[14] * t4;
+  real t7 = t2 - S_K[14] * t5;
+  real t8 = t2 * ((real)1 / (real)10000000000000) < t7;
+  if (!(t8 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t1 != 0)) return 1; /* pivot 1 of 2 vanishes: a motion of the hinge is undetermined */
+  if (!(t8 != 0)) return 1; /* pivot 2 of 2 vanishes: a motion of the hinge is undetermined */
+  real t10 = b[0] * ((real)1 / (real)100000000000000);
+  real t11 = b[0] + S_K[0];
+  real t12 = b[0] + S_K[6];
+  real t15 = ((real)1 / (real)300000000000000) * (t0 + (t11 + t12));
+  if (!((((0.0 < b[0]) ? t10 : t15) < t0))) return 1; /* speed 1 of 2 moves no inertia: its acceleration is undetermined */
+  real t20 = ((real)1 / (real)300000000000000) * (b[9] + (b[4] + b[7]));
+  real t22 = b[4] + S_K[15];
+  real t23 = b[7] + S_K[18];
+  real t26 = ((real)1 / (real)300000000000000) * (t2 + (t22 + t23));
+  if (!((((0.0 < t20) ? t20 : t26) < t2))) return 1; /* speed 2 of 2 moves no inertia: its acceleration is undetermined */
+  real t30 = 1.0 / t7;
+  real t31 = S_K[5] - b[2];
+  real t34 = t30 * (t31 - S_K[2] * t5);
+  real t36 = S_K[2] * t4 - t5 * t34;
+  G[0] = t36;
+  real t38 = b[1] + S_K[10];
+  real t41 = t30 * (t38 - S_K[7] * t5);
+  real t43 = S_K[7] * t4 - t5 * t41;
+  G[1] = t43;
+  G[2] = 1.0;
+  real t44 = b[2] + S_K[12];
+  real t46 = b[6] + S_K[17];
+  real t49 = t30 * (t46 - t44 * t5);
+  real t51 = t44 * t4 - t5 * t49;
+  G[3] = t51;
+  real t52 = S_K[13] - b[1];
+  real t54 = b[8] + S_K[19];
+  real t57 = t30 * (t54 - t52 * t5);
+  real t59 = t52 * t4 - t5 * t57;
+  G[4] = t59;
+  G[5] = 0.0;
+  G[6] = t34;
+  G[7] = t41;
+  G[8] = 0.0;
+  G[9] = t49;
+  G[10] = t57;
+  G[11] = 1.0;
+  real t61 = tau[0] - (e_K[2] + e_B[2]);
+  real t64 = tau[1] - (e_K[5] + e_B[5]);
+  real t67 = t30 * (t64 - t5 * t61);
+  g[0] = t4 * t61 - t5 * t67;
+  g[1] = t67;
+  real t73 = t11 - (S_K[2] * t36 + t31 * t34);
+  real t78 = S_K[1] - (S_K[2] * t43 + t31 * t41);
+  real t79 = turn[1] * t78;
+  real t80 = turn[0] * t73 - t79;
+  real t82 = turn[0] * t78;
+  real t86 = t12 - (S_K[7] * t43 + t38 * t41);
+  real t88 = t82 - turn[1] * t86;
+  real t90 = turn[0] * t80 - turn[1] * t88;
+  S_I[0] = t90;
+  real t93 = turn[1] * t80 + turn[0] * t88;
+  real t94 = link[0] * t93;
+  S_I[1] = t94;
+  real t95 = link[1] * t93;
+  S_I[2] = t95;
+  real t99 = S_K[3] - (S_K[2] * t51 + t31 * t49);
+  real t105 = S_K[8] - b[3] - (S_K[7] * t51 + t38 * t49);
+  real t107 = turn[0] * t99 - turn[1] * t105;
+  real t113 = b[3] + S_K[4] - (S_K[2] * t59 + t31 * t57);
+  real t118 = S_K[9] - (S_K[7] * t59 + t38 * t57);
+  real t120 = turn[0] * t113 - turn[1] * t118;
+  real t122 = turn[0] * t107 - turn[1] * t120;
+  real t123 = d[0] * t93;
+  S_I[3] = t122 - t123;
+  real t127 = turn[1] * t107 + turn[0] * t120;
+  real t129 = t127 + d[0] * t90;
+  S_I[4] = link[0] * t129 - link[2] * t95;
+  S_I[5] = link[1] * t129 + link[2] * t94;
+  real t142 = turn[1] * (t82 + turn[1] * t73) + turn[0] * (t79 + turn[0] * t86);
+  real t143 = link[0] * t142;
+  real t144 = link[0] * t143;
+  S_I[6] = t144;
+  real t145 = link[1] * t143;
+  S_I[7] = t145;
+  real t148 = turn[1] * t99 + turn[0] * t105;
+  real t152 = turn[1] * t113 + turn[0] * t118;
+  real t154 = turn[0] * t148 - turn[1] * t152;
+  real t156 = t154 - d[0] * t142;
+  real t157 = link[0] * t156;
+  S_I[8] = t157;
+  real t161 = turn[1] * t148 + turn[0] * t152 + t123;
+  real t162 = link[0] * t161;
+  real t163 = link[0] * t162;
+  real t164 = link[2] * t145;
+  S_I[9] = t163 - t164;
+  real t166 = link[1] * t162;
+  real t168 = t166 + link[2] * t144;
+  S_I[10] = t168;
+  real t170 = link[1] * (link[1] * t142);
+  S_I[11] = t170;
+  real t171 = link[1] * t156;
+  S_I[12] = t171;
+  real t172 = link[1] * t161;
+  real t173 = link[0] * t172;
+  real t175 = t173 - link[2] * t170;
+  S_I[13] = t175;
+  real t177 = link[1] * t172 + t164;
+  S_I[14] = t177;
+  real t181 = t22 - (t44 * t51 + t46 * t49);
+  real t187 = b[5] + S_K[16] - (t44 * t59 + t46 * t57);
+  real t188 = turn[1] * t187;
+  real t189 = turn[0] * t181 - t188;
+  real t191 = turn[0] * t187;
+  real t195 = t23 - (t52 * t59 + t54 * t57);
+  real t197 = t191 - turn[1] * t195;
+  S_I[15] = turn[0] * t189 - turn[1] * t197 - d[0] * (t154 + t156);
+  real t208 = turn[1] * t189 + turn[0] * t197 + d[0] * (t122 - t161);
+  S_I[16] = link[0] * t208 - link[2] * t171;
+  S_I[17] = link[1] * t208 + link[2] * t157;
+  real t224 = turn[1] * (t191 + turn[1] * t181) + turn[0] * (t188 + turn[0] * t195) + d[0] * (t127 +
+    t129);
+  real t225 = link[0] * t224;
+  S_I[18] = link[0] * t225 - link[2] * (t173 + t175);
+  S_I[19] = link[1] * t225 + link[2] * (t163 - t177);
+  S_I[20] = link[1] * (link[1] * t224) + link[2] * (t166 + t168);
+  real t243 = e_K[0] + e_B[0] + (t36 * t61 + t34 * t64);
+  real t249 = e_K[1] + e_B[1] + (t43 * t61 + t41 * t64);
+  real t251 = turn[0] * t243 - turn[1] * t249;
+  e_I[0] = t251;
+  real t254 = turn[1] * t243 + turn[0] * t249;
+  real t257 = link[0] * t254 - link[1] * tau[0];
+  e_I[1] = t257;
+  real t260 = link[1] * t254 + link[0] * tau[0];
+  e_I[2] = t260;
+  real t265 = e_K[3] + e_B[3] + (t51 * t61 + t49 * t64);
+  real t271 = e_K[4] + e_B[4] + (t59 * t61 + t57 * t64);
+  e_I[3] = turn[0] * t265 - turn[1] * t271 - d[0] * t254;
+  real t280 = turn[1] * t265 + turn[0] * t271 + d[0] * t251;
+  e_I[4] = link[0] * t280 - link[1] * tau[1] - link[2] * t260;
+  e_I[5] = link[1] * t280 + link[0] * tau[1] + link[2] * t257;
+  return 0;
 }
 
-static int mstmm_sweep_link_cylindrical_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_cylindrical_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_cylindrical_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 2, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_cylindrical_condense_outputs[] = {
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_cylindrical_condense_guards[] = {
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 2 moves no inertia: its acceleration is undetermined"},
-    {1, "speed 2 of 2 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_cylindrical_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the cylindrical hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -694,153 +279,72 @@ static const mstmm_guard mstmm_sweep_link_cylindrical_condense_guards[] = {
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_cylindrical_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_cylindrical_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = link[2] * delta_I[5];
-    const real t1 = delta_I[1] + t0;
-    const real t2 = link[1] * t1;
-    const real t3 = link[2] * delta_I[4];
-    const real t4 = delta_I[2] - t3;
-    const real t5 = link[0] * t4;
-    const real t6 = t2 - t5;
-    const real t7 = link[0] * delta_I[4];
-    const real t8 = link[1] * delta_I[5];
-    const real t9 = t7 + t8;
-    const real t10 = d[0] * t9;
-    const real t11 = delta_I[0] + t10;
-    const real t12 = turn[0] * t11;
-    const real t13 = link[0] * t1;
-    const real t14 = link[1] * t4;
-    const real t15 = t13 + t14;
-    const real t16 = d[0] * delta_I[3];
-    const real t17 = t15 - t16;
-    const real t18 = turn[1] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = G[0] * t19;
-    const real t21 = turn[0] * t17;
-    const real t22 = turn[1] * t11;
-    const real t23 = t21 - t22;
-    const real t24 = G[1] * t23;
-    const real t25 = t20 + t24;
-    const real t26 = t6 - t25;
-    const real t27 = turn[0] * delta_I[3];
-    const real t28 = turn[1] * t9;
-    const real t29 = t27 + t28;
-    const real t30 = G[3] * t29;
-    const real t31 = t26 - t30;
-    const real t32 = turn[0] * t9;
-    const real t33 = turn[1] * delta_I[3];
-    const real t34 = t32 - t33;
-    const real t35 = G[4] * t34;
-    const real t36 = t31 - t35;
-    const real t37 = g[0] + t36;
-    udot[0] = t37;
-    const real t38 = link[1] * delta_I[4];
-    const real t39 = link[0] * delta_I[5];
-    const real t40 = t38 - t39;
-    const real t41 = G[6] * t19;
-    const real t42 = G[7] * t23;
-    const real t43 = t41 + t42;
-    const real t44 = G[9] * t29;
-    const real t45 = t43 + t44;
-    const real t46 = G[10] * t34;
-    const real t47 = t45 + t46;
-    const real t48 = t40 - t47;
-    const real t49 = g[1] + t48;
-    udot[1] = t49;
-    delta[0] = t19;
-    delta[1] = t23;
-    const real t50 = t5 - t2;
-    const real t51 = t50 + t37;
-    delta[2] = t51;
-    delta[3] = t29;
-    delta[4] = t34;
-    const real t52 = t39 - t38;
-    const real t53 = t52 + t49;
-    delta[5] = t53;
-    return 0;
+  (void)p;
+  real t1 = delta_I[1] + link[2] * delta_I[5];
+  real t2 = link[1] * t1;
+  real t4 = delta_I[2] - link[2] * delta_I[4];
+  real t5 = link[0] * t4;
+  real t9 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t11 = delta_I[0] + d[0] * t9;
+  real t17 = link[0] * t1 + link[1] * t4 - d[0] * delta_I[3];
+  real t19 = turn[0] * t11 + turn[1] * t17;
+  real t23 = turn[0] * t17 - turn[1] * t11;
+  real t29 = turn[0] * delta_I[3] + turn[1] * t9;
+  real t34 = turn[0] * t9 - turn[1] * delta_I[3];
+  real t37 = g[0] + (t2 - t5 - (G[0] * t19 + G[1] * t23) - G[3] * t29 - G[4] * t34);
+  udot[0] = t37;
+  real t38 = link[1] * delta_I[4];
+  real t39 = link[0] * delta_I[5];
+  real t49 = g[1] + (t38 - t39 - (G[6] * t19 + G[7] * t23 + G[9] * t29 + G[10] * t34));
+  udot[1] = t49;
+  delta[0] = t19;
+  delta[1] = t23;
+  delta[2] = t5 - t2 + t37;
+  delta[3] = t29;
+  delta[4] = t34;
+  delta[5] = t39 - t38 + t49;
+  return 0;
 }
 
-static int mstmm_sweep_link_cylindrical_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_cylindrical_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_cylindrical_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"G", 12, "", 0, 0},
-    {"g", 2, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_cylindrical_recover_outputs[] = {
-    {"udot", 2, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_cylindrical_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_cylindrical_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_cylindrical_turn,
-        .call = mstmm_sweep_link_cylindrical_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_cylindrical_turn_inputs,
-        .outputs = mstmm_sweep_link_cylindrical_turn_outputs,
-        .ir_hash = "8d22d421f43722d946dbfaf9e4cee057d8df93f70898b1b9dcaedc51c0868e08",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_cylindrical_forward,
-        .call = mstmm_sweep_link_cylindrical_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_cylindrical_forward_inputs,
-        .outputs = mstmm_sweep_link_cylindrical_forward_outputs,
-        .ir_hash = "31e97f77abc8ef0b1ede3ce5493d24251c0b86ff1d457434c5e5d2036133ddab",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_cylindrical_condense,
-        .call = mstmm_sweep_link_cylindrical_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_cylindrical_condense_inputs,
-        .outputs = mstmm_sweep_link_cylindrical_condense_outputs,
-        .ir_hash = "c0e005df2e0757d8b030aec809baeb82cbb7eb621d3066f02efaf218365ffc4a",
-        .n_guards = 6,
-        .guards = mstmm_sweep_link_cylindrical_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_cylindrical_recover,
-        .call = mstmm_sweep_link_cylindrical_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_cylindrical_recover_inputs,
-        .outputs = mstmm_sweep_link_cylindrical_recover_outputs,
-        .ir_hash = "627daa1a709ed5a019803bcd9488babdff165c19b5ff8b60ff95f7d433167761",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_cylindrical_turn), 2, 1, (const mstmm_port[]){{"link",
+    5, "", 0, 0}, {"q", 2, "", 0, 0}}, (const mstmm_port[]){{"turn", 1, "rad", 0, 0}},
+    "ea56a2e4164c4a611e43162bd48a39e6bf48a3ce8846a766b07d6e95250f3c93", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_cylindrical_forward), 7, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0,
+    0}, {"q", 2, "", 0, 0}, {"u", 2, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d", 1, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot",
+    2, "", 0, 0}}, "414a62b6d034d8ba00fabafc81ec979788cf3a9c84d6da041172b67f676618a8", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_cylindrical_condense), 9, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "",
+    0, 0}, {"p", 0, "", 0, 0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6,
+    "N, N*m", 0, 0}, {"tau", 2, "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 12, "", 0, 0}, {"g", 2,
+    "", 0, 0}, {"S_I", 21, "", 0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "aa11feaebf0762bed8bb264c1d9de43d98fe51f26f999244a688bff6ed06c910", 6, (const mstmm_guard[]){{1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 2 of 2 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 2 moves no inertia: its acceleration is undetermined"}, {1,
+    "speed 2 of 2 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_cylindrical_recover), 7, 2, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 0, "", 0,
+    0}, {"G", 12, "", 0, 0}, {"g", 2, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 2, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "c5e1a99349ebb46b6166d2b8cdd7babd4d8d668c0a84e650642fb352154f0234", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_link_cylindrical = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_cylindrical",
-    .hash = "a3158c3b19ee87469ba9d973b09a65444d1226b222fc746e467f66b7cea3aacb",
+    .hash = "ba34f4842f3e759740ef66b74d69ca298c924f53c2d1634d78780bf07b14917c",
     .nq = 0,
     .nu = 0,
     .np = 0,

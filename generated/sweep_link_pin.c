@@ -7,49 +7,18 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_pin;
-int mstmm_sweep_link_pin_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_pin_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the pin hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[1] coordinates: angle [rad]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_pin_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_pin_turn(in_t link, in_t q, out_t turn)
 {
-    const real t0 = link[3] + q[0];
-    turn[0] = t0;
-    return 0;
+  turn[0] = link[3] + q[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,214 +35,66 @@ static const mstmm_port mstmm_sweep_link_pin_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_pin_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_pin_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    (void)p;
-    (void)q;
-    d[0] = link[4];
-    const real t0 = turn[0] * motion_I[0];
-    const real t1 = link[0] * motion_I[1];
-    const real t2 = link[1] * motion_I[2];
-    const real t3 = t1 + t2;
-    const real t4 = turn[1] * t3;
-    const real t5 = t0 + t4;
-    motion[0] = t5;
-    const real t6 = turn[0] * t3;
-    const real t7 = turn[1] * motion_I[0];
-    const real t8 = t6 - t7;
-    motion[1] = t8;
-    const real t9 = link[0] * motion_I[2];
-    const real t10 = link[1] * motion_I[1];
-    const real t11 = t9 - t10;
-    const real t12 = u[0] + t11;
-    motion[2] = t12;
-    const real t13 = turn[0] * motion_I[3];
-    const real t14 = link[0] * motion_I[4];
-    const real t15 = link[1] * motion_I[5];
-    const real t16 = t14 + t15;
-    const real t17 = turn[1] * t16;
-    const real t18 = t13 + t17;
-    const real t19 = u[0] * t8;
-    const real t20 = t18 + t19;
-    motion[3] = t20;
-    const real t21 = turn[0] * t16;
-    const real t22 = turn[1] * motion_I[3];
-    const real t23 = t21 - t22;
-    const real t24 = u[0] * t5;
-    const real t25 = t23 - t24;
-    motion[4] = t25;
-    const real t26 = link[0] * motion_I[5];
-    const real t27 = link[1] * motion_I[4];
-    const real t28 = t26 - t27;
-    motion[5] = t28;
-    const real t29 = motion_I[1] * motion_I[1];
-    const real t30 = motion_I[2] * motion_I[2];
-    const real t31 = t29 + t30;
-    const real t32 = link[2] * t31;
-    const real t33 = motion_I[6] - t32;
-    const real t34 = motion_I[0] * t11;
-    const real t35 = t16 + t34;
-    const real t36 = link[4] * t35;
-    const real t37 = t33 + t36;
-    const real t38 = turn[0] * t37;
-    const real t39 = motion_I[0] * motion_I[1];
-    const real t40 = motion_I[5] + t39;
-    const real t41 = link[2] * t40;
-    const real t42 = motion_I[7] + t41;
-    const real t43 = link[0] * t42;
-    const real t44 = motion_I[0] * motion_I[2];
-    const real t45 = t44 - motion_I[4];
-    const real t46 = link[2] * t45;
-    const real t47 = motion_I[8] + t46;
-    const real t48 = link[1] * t47;
-    const real t49 = t43 + t48;
-    const real t50 = t3 * t11;
-    const real t51 = t50 - motion_I[3];
-    const real t52 = link[4] * t51;
-    const real t53 = t49 + t52;
-    const real t54 = turn[1] * t53;
-    const real t55 = t38 + t54;
-    motion[6] = t55;
-    const real t56 = turn[0] * t53;
-    const real t57 = turn[1] * t37;
-    const real t58 = t56 - t57;
-    motion[7] = t58;
-    const real t59 = link[0] * t47;
-    const real t60 = link[1] * t42;
-    const real t61 = t59 - t60;
-    const real t62 = motion_I[0] * motion_I[0];
-    const real t63 = t3 * t3;
-    const real t64 = t62 + t63;
-    const real t65 = link[4] * t64;
-    const real t66 = t61 - t65;
-    motion[8] = t66;
-    const real t67 = b[0] * t55;
-    const real t68 = t27 - t26;
-    const real t69 = t5 * t8;
-    const real t70 = t68 + t69;
-    const real t71 = b[2] * t70;
-    const real t72 = t5 * t12;
-    const real t73 = t25 + t72;
-    const real t74 = b[3] * t73;
-    const real t75 = t71 + t74;
-    const real t76 = t8 * t8;
-    const real t77 = t12 * t12;
-    const real t78 = t76 + t77;
-    const real t79 = b[1] * t78;
-    const real t80 = t75 - t79;
-    const real t81 = t67 + t80;
-    e_B[0] = t81;
-    const real t82 = b[0] * t58;
-    const real t83 = t28 + t69;
-    const real t84 = b[1] * t83;
-    const real t85 = t8 * t12;
-    const real t86 = t85 - t20;
-    const real t87 = b[3] * t86;
-    const real t88 = t84 + t87;
-    const real t89 = t5 * t5;
-    const real t90 = t77 + t89;
-    const real t91 = b[2] * t90;
-    const real t92 = t88 - t91;
-    const real t93 = t82 + t92;
-    e_B[1] = t93;
-    const real t94 = b[0] * t66;
-    const real t95 = t24 - t23;
-    const real t96 = t72 + t95;
-    const real t97 = b[1] * t96;
-    const real t98 = t20 + t85;
-    const real t99 = b[2] * t98;
-    const real t100 = t97 + t99;
-    const real t101 = t76 + t89;
-    const real t102 = b[3] * t101;
-    const real t103 = t100 - t102;
-    const real t104 = t94 + t103;
-    e_B[2] = t104;
-    const real t105 = b[6] * t28;
-    const real t106 = b[5] * t25;
-    const real t107 = b[4] * t20;
-    const real t108 = b[2] * t66;
-    const real t109 = b[9] * t12;
-    const real t110 = b[6] * t5;
-    const real t111 = b[8] * t8;
-    const real t112 = t110 + t111;
-    const real t113 = t109 + t112;
-    const real t114 = t8 * t113;
-    const real t115 = b[8] * t12;
-    const real t116 = b[5] * t5;
-    const real t117 = b[7] * t8;
-    const real t118 = t116 + t117;
-    const real t119 = t115 + t118;
-    const real t120 = t12 * t119;
-    const real t121 = t114 - t120;
-    const real t122 = t108 + t121;
-    const real t123 = b[3] * t58;
-    const real t124 = t122 - t123;
-    const real t125 = t107 + t124;
-    const real t126 = t106 + t125;
-    const real t127 = t105 + t126;
-    e_B[3] = t127;
-    const real t128 = b[8] * t28;
-    const real t129 = b[7] * t25;
-    const real t130 = b[5] * t20;
-    const real t131 = b[3] * t55;
-    const real t132 = b[6] * t12;
-    const real t133 = b[4] * t5;
-    const real t134 = b[5] * t8;
-    const real t135 = t133 + t134;
-    const real t136 = t132 + t135;
-    const real t137 = t12 * t136;
-    const real t138 = t5 * t113;
-    const real t139 = t137 - t138;
-    const real t140 = b[1] * t66;
-    const real t141 = t139 - t140;
-    const real t142 = t131 + t141;
-    const real t143 = t130 + t142;
-    const real t144 = t129 + t143;
-    const real t145 = t128 + t144;
-    e_B[4] = t145;
-    const real t146 = b[9] * t28;
-    const real t147 = b[8] * t25;
-    const real t148 = b[6] * t20;
-    const real t149 = b[1] * t58;
-    const real t150 = t5 * t119;
-    const real t151 = t8 * t136;
-    const real t152 = t150 - t151;
-    const real t153 = t149 + t152;
-    const real t154 = b[2] * t55;
-    const real t155 = t153 - t154;
-    const real t156 = t148 + t155;
-    const real t157 = t147 + t156;
-    const real t158 = t146 + t157;
-    e_B[5] = t158;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  (void)q;
+  d[0] = link[4];
+  real t3 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t5 = turn[0] * motion_I[0] + turn[1] * t3;
+  motion[0] = t5;
+  real t8 = turn[0] * t3 - turn[1] * motion_I[0];
+  motion[1] = t8;
+  real t11 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  real t12 = u[0] + t11;
+  motion[2] = t12;
+  real t16 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t20 = turn[0] * motion_I[3] + turn[1] * t16 + u[0] * t8;
+  motion[3] = t20;
+  real t23 = turn[0] * t16 - turn[1] * motion_I[3];
+  real t24 = u[0] * t5;
+  real t25 = t23 - t24;
+  motion[4] = t25;
+  real t26 = link[0] * motion_I[5];
+  real t27 = link[1] * motion_I[4];
+  real t28 = t26 - t27;
+  motion[5] = t28;
+  real t37 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) +
+    link[4] * (t16 + motion_I[0] * t11);
+  real t42 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t47 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t53 = link[0] * t42 + link[1] * t47 + link[4] * (t3 * t11 - motion_I[3]);
+  real t55 = turn[0] * t37 + turn[1] * t53;
+  motion[6] = t55;
+  real t58 = turn[0] * t53 - turn[1] * t37;
+  motion[7] = t58;
+  real t66 = link[0] * t47 - link[1] * t42 - link[4] * (motion_I[0] * motion_I[0] + t3 * t3);
+  motion[8] = t66;
+  real t69 = t5 * t8;
+  real t72 = t5 * t12;
+  real t76 = t8 * t8;
+  real t77 = t12 * t12;
+  e_B[0] = b[0] * t55 + (b[2] * (t27 - t26 + t69) + b[3] * (t25 + t72) - b[1] * (t76 + t77));
+  real t85 = t8 * t12;
+  real t89 = t5 * t5;
+  e_B[1] = b[0] * t58 + (b[1] * (t28 + t69) + b[3] * (t85 - t20) - b[2] * (t77 + t89));
+  e_B[2] = b[0] * t66 + (b[1] * (t72 + (t24 - t23)) + b[2] * (t20 + t85) - b[3] * (t76 + t89));
+  real t113 = b[9] * t12 + (b[6] * t5 + b[8] * t8);
+  real t119 = b[8] * t12 + (b[5] * t5 + b[7] * t8);
+  e_B[3] = b[6] * t28 + (b[5] * t25 + (b[4] * t20 + (b[2] * t66 + (t8 * t113 - t12 * t119) - b[3] *
+    t58)));
+  real t136 = b[6] * t12 + (b[4] * t5 + b[5] * t8);
+  e_B[4] = b[8] * t28 + (b[7] * t25 + (b[5] * t20 + (b[3] * t55 + (t12 * t136 - t5 * t113 - b[1] *
+    t66))));
+  e_B[5] = b[9] * t28 + (b[8] * t25 + (b[6] * t20 + (b[1] * t58 + (t5 * t119 - t8 * t136) - b[2] *
+    t55)));
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -292,362 +113,144 @@ static const mstmm_port mstmm_sweep_link_pin_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_pin_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_pin_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K, in_t e_K,
+    in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = b[9] + S_K[20];
-    const real t1 = 0.0 < t0;
-    if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t2 = b[4] + b[7];
-    const real t3 = b[9] + t2;
-    const real t4 = ((real)1 / (real)300000000000000) * t3;
-    const real t5 = 0.0 < t4;
-    const real t6 = b[4] + S_K[15];
-    const real t7 = b[7] + S_K[18];
-    const real t8 = t6 + t7;
-    const real t9 = t0 + t8;
-    const real t10 = ((real)1 / (real)300000000000000) * t9;
-    const real t11 = t5 != 0 ? t4 : t10;
-    const real t12 = t11 < t0;
-    if (!(t12 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t13 = S_K[5] - b[2];
-    const real t14 = 1.0 / t0;
-    const real t15 = t13 * t14;
-    G[0] = t15;
-    const real t16 = b[1] + S_K[10];
-    const real t17 = t16 * t14;
-    G[1] = t17;
-    const real t18 = S_K[14] * t14;
-    G[2] = t18;
-    const real t19 = b[6] + S_K[17];
-    const real t20 = t19 * t14;
-    G[3] = t20;
-    const real t21 = b[8] + S_K[19];
-    const real t22 = t21 * t14;
-    G[4] = t22;
-    G[5] = 1.0;
-    const real t23 = e_K[5] + e_B[5];
-    const real t24 = tau[0] - t23;
-    const real t25 = t14 * t24;
-    g[0] = t25;
-    const real t26 = b[0] + S_K[0];
-    const real t27 = t13 * t15;
-    const real t28 = t26 - t27;
-    const real t29 = turn[0] * t28;
-    const real t30 = t13 * t17;
-    const real t31 = S_K[1] - t30;
-    const real t32 = turn[1] * t31;
-    const real t33 = t29 - t32;
-    const real t34 = turn[0] * t33;
-    const real t35 = turn[0] * t31;
-    const real t36 = b[0] + S_K[6];
-    const real t37 = t16 * t17;
-    const real t38 = t36 - t37;
-    const real t39 = turn[1] * t38;
-    const real t40 = t35 - t39;
-    const real t41 = turn[1] * t40;
-    const real t42 = t34 - t41;
-    S_I[0] = t42;
-    const real t43 = turn[1] * t33;
-    const real t44 = turn[0] * t40;
-    const real t45 = t43 + t44;
-    const real t46 = link[0] * t45;
-    const real t47 = t13 * t18;
-    const real t48 = S_K[2] - t47;
-    const real t49 = turn[0] * t48;
-    const real t50 = t16 * t18;
-    const real t51 = S_K[7] - t50;
-    const real t52 = turn[1] * t51;
-    const real t53 = t49 - t52;
-    const real t54 = link[1] * t53;
-    const real t55 = t46 - t54;
-    S_I[1] = t55;
-    const real t56 = link[1] * t45;
-    const real t57 = link[0] * t53;
-    const real t58 = t56 + t57;
-    S_I[2] = t58;
-    const real t59 = t13 * t20;
-    const real t60 = S_K[3] - t59;
-    const real t61 = turn[0] * t60;
-    const real t62 = S_K[8] - b[3];
-    const real t63 = t16 * t20;
-    const real t64 = t62 - t63;
-    const real t65 = turn[1] * t64;
-    const real t66 = t61 - t65;
-    const real t67 = turn[0] * t66;
-    const real t68 = b[3] + S_K[4];
-    const real t69 = t13 * t22;
-    const real t70 = t68 - t69;
-    const real t71 = turn[0] * t70;
-    const real t72 = t16 * t22;
-    const real t73 = S_K[9] - t72;
-    const real t74 = turn[1] * t73;
-    const real t75 = t71 - t74;
-    const real t76 = turn[1] * t75;
-    const real t77 = t67 - t76;
-    const real t78 = d[0] * t45;
-    const real t79 = t77 - t78;
-    S_I[3] = t79;
-    const real t80 = turn[1] * t66;
-    const real t81 = turn[0] * t75;
-    const real t82 = t80 + t81;
-    const real t83 = d[0] * t42;
-    const real t84 = t82 + t83;
-    const real t85 = link[0] * t84;
-    const real t86 = link[2] * t58;
-    const real t87 = t85 - t86;
-    S_I[4] = t87;
-    const real t88 = link[1] * t84;
-    const real t89 = link[2] * t55;
-    const real t90 = t88 + t89;
-    S_I[5] = t90;
-    const real t91 = turn[1] * t28;
-    const real t92 = t35 + t91;
-    const real t93 = turn[1] * t92;
-    const real t94 = turn[0] * t38;
-    const real t95 = t32 + t94;
-    const real t96 = turn[0] * t95;
-    const real t97 = t93 + t96;
-    const real t98 = link[0] * t97;
-    const real t99 = turn[1] * t48;
-    const real t100 = turn[0] * t51;
-    const real t101 = t99 + t100;
-    const real t102 = link[1] * t101;
-    const real t103 = t98 - t102;
-    const real t104 = link[0] * t103;
-    const real t105 = link[0] * t101;
-    const real t106 = b[0] + S_K[11];
-    const real t107 = S_K[14] * t18;
-    const real t108 = t106 - t107;
-    const real t109 = link[1] * t108;
-    const real t110 = t105 - t109;
-    const real t111 = link[1] * t110;
-    const real t112 = t104 - t111;
-    S_I[6] = t112;
-    const real t113 = link[1] * t103;
-    const real t114 = link[0] * t110;
-    const real t115 = t113 + t114;
-    S_I[7] = t115;
-    const real t116 = turn[1] * t60;
-    const real t117 = turn[0] * t64;
-    const real t118 = t116 + t117;
-    const real t119 = turn[0] * t118;
-    const real t120 = turn[1] * t70;
-    const real t121 = turn[0] * t73;
-    const real t122 = t120 + t121;
-    const real t123 = turn[1] * t122;
-    const real t124 = t119 - t123;
-    const real t125 = d[0] * t97;
-    const real t126 = t124 - t125;
-    const real t127 = link[0] * t126;
-    const real t128 = b[2] + S_K[12];
-    const real t129 = S_K[14] * t20;
-    const real t130 = t128 - t129;
-    const real t131 = turn[0] * t130;
-    const real t132 = S_K[13] - b[1];
-    const real t133 = S_K[14] * t22;
-    const real t134 = t132 - t133;
-    const real t135 = turn[1] * t134;
-    const real t136 = t131 - t135;
-    const real t137 = d[0] * t101;
-    const real t138 = t136 - t137;
-    const real t139 = link[1] * t138;
-    const real t140 = t127 - t139;
-    S_I[8] = t140;
-    const real t141 = turn[1] * t118;
-    const real t142 = turn[0] * t122;
-    const real t143 = t141 + t142;
-    const real t144 = t143 + t78;
-    const real t145 = link[0] * t144;
-    const real t146 = turn[1] * t130;
-    const real t147 = turn[0] * t134;
-    const real t148 = t146 + t147;
-    const real t149 = d[0] * t53;
-    const real t150 = t148 + t149;
-    const real t151 = link[1] * t150;
-    const real t152 = t145 - t151;
-    const real t153 = link[0] * t152;
-    const real t154 = link[2] * t115;
-    const real t155 = t153 - t154;
-    S_I[9] = t155;
-    const real t156 = link[1] * t152;
-    const real t157 = link[2] * t112;
-    const real t158 = t156 + t157;
-    S_I[10] = t158;
-    const real t159 = link[1] * t97;
-    const real t160 = t105 + t159;
-    const real t161 = link[1] * t160;
-    const real t162 = link[0] * t108;
-    const real t163 = t102 + t162;
-    const real t164 = link[0] * t163;
-    const real t165 = t161 + t164;
-    S_I[11] = t165;
-    const real t166 = link[1] * t126;
-    const real t167 = link[0] * t138;
-    const real t168 = t166 + t167;
-    S_I[12] = t168;
-    const real t169 = link[1] * t144;
-    const real t170 = link[0] * t150;
-    const real t171 = t169 + t170;
-    const real t172 = link[0] * t171;
-    const real t173 = link[2] * t165;
-    const real t174 = t172 - t173;
-    S_I[13] = t174;
-    const real t175 = link[1] * t171;
-    const real t176 = t175 + t154;
-    S_I[14] = t176;
-    const real t177 = t19 * t20;
-    const real t178 = t6 - t177;
-    const real t179 = turn[0] * t178;
-    const real t180 = b[5] + S_K[16];
-    const real t181 = t19 * t22;
-    const real t182 = t180 - t181;
-    const real t183 = turn[1] * t182;
-    const real t184 = t179 - t183;
-    const real t185 = turn[0] * t184;
-    const real t186 = turn[0] * t182;
-    const real t187 = t21 * t22;
-    const real t188 = t7 - t187;
-    const real t189 = turn[1] * t188;
-    const real t190 = t186 - t189;
-    const real t191 = turn[1] * t190;
-    const real t192 = t185 - t191;
-    const real t193 = t124 + t126;
-    const real t194 = d[0] * t193;
-    const real t195 = t192 - t194;
-    S_I[15] = t195;
-    const real t196 = turn[1] * t184;
-    const real t197 = turn[0] * t190;
-    const real t198 = t196 + t197;
-    const real t199 = t77 - t144;
-    const real t200 = d[0] * t199;
-    const real t201 = t198 + t200;
-    const real t202 = link[0] * t201;
-    const real t203 = link[2] * t168;
-    const real t204 = t202 - t203;
-    S_I[16] = t204;
-    const real t205 = link[1] * t201;
-    const real t206 = link[2] * t140;
-    const real t207 = t205 + t206;
-    S_I[17] = t207;
-    const real t208 = turn[1] * t178;
-    const real t209 = t186 + t208;
-    const real t210 = turn[1] * t209;
-    const real t211 = turn[0] * t188;
-    const real t212 = t183 + t211;
-    const real t213 = turn[0] * t212;
-    const real t214 = t210 + t213;
-    const real t215 = t82 + t84;
-    const real t216 = d[0] * t215;
-    const real t217 = t214 + t216;
-    const real t218 = link[0] * t217;
-    const real t219 = link[0] * t218;
-    const real t220 = t172 + t174;
-    const real t221 = link[2] * t220;
-    const real t222 = t219 - t221;
-    S_I[18] = t222;
-    const real t223 = link[1] * t218;
-    const real t224 = t153 - t176;
-    const real t225 = link[2] * t224;
-    const real t226 = t223 + t225;
-    S_I[19] = t226;
-    const real t227 = link[1] * t217;
-    const real t228 = link[1] * t227;
-    const real t229 = t156 + t158;
-    const real t230 = link[2] * t229;
-    const real t231 = t228 + t230;
-    S_I[20] = t231;
-    const real t232 = e_K[0] + e_B[0];
-    const real t233 = t15 * t24;
-    const real t234 = t232 + t233;
-    const real t235 = turn[0] * t234;
-    const real t236 = e_K[1] + e_B[1];
-    const real t237 = t17 * t24;
-    const real t238 = t236 + t237;
-    const real t239 = turn[1] * t238;
-    const real t240 = t235 - t239;
-    e_I[0] = t240;
-    const real t241 = turn[1] * t234;
-    const real t242 = turn[0] * t238;
-    const real t243 = t241 + t242;
-    const real t244 = link[0] * t243;
-    const real t245 = e_K[2] + e_B[2];
-    const real t246 = t18 * t24;
-    const real t247 = t245 + t246;
-    const real t248 = link[1] * t247;
-    const real t249 = t244 - t248;
-    e_I[1] = t249;
-    const real t250 = link[1] * t243;
-    const real t251 = link[0] * t247;
-    const real t252 = t250 + t251;
-    e_I[2] = t252;
-    const real t253 = e_K[3] + e_B[3];
-    const real t254 = t20 * t24;
-    const real t255 = t253 + t254;
-    const real t256 = turn[0] * t255;
-    const real t257 = e_K[4] + e_B[4];
-    const real t258 = t22 * t24;
-    const real t259 = t257 + t258;
-    const real t260 = turn[1] * t259;
-    const real t261 = t256 - t260;
-    const real t262 = d[0] * t243;
-    const real t263 = t261 - t262;
-    e_I[3] = t263;
-    const real t264 = turn[1] * t255;
-    const real t265 = turn[0] * t259;
-    const real t266 = t264 + t265;
-    const real t267 = d[0] * t240;
-    const real t268 = t266 + t267;
-    const real t269 = link[0] * t268;
-    const real t270 = link[1] * tau[0];
-    const real t271 = t269 - t270;
-    const real t272 = link[2] * t252;
-    const real t273 = t271 - t272;
-    e_I[4] = t273;
-    const real t274 = link[1] * t268;
-    const real t275 = link[0] * tau[0];
-    const real t276 = t274 + t275;
-    const real t277 = link[2] * t249;
-    const real t278 = t276 + t277;
-    e_I[5] = t278;
-    return 0;
+  (void)p;
+  real t0 = b[9] + S_K[20];
+  real t1 = 0.0 < t0;
+  if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t4 = ((real)1 / (real)300000000000000) * (b[9] + (b[4] + b[7]));
+  real t6 = b[4] + S_K[15];
+  real t7 = b[7] + S_K[18];
+  real t10 = ((real)1 / (real)300000000000000) * (t0 + (t6 + t7));
+  if (!((((0.0 < t4) ? t4 : t10) < t0))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t13 = S_K[5] - b[2];
+  real t14 = 1.0 / t0;
+  real t15 = t13 * t14;
+  G[0] = t15;
+  real t16 = b[1] + S_K[10];
+  real t17 = t16 * t14;
+  G[1] = t17;
+  real t18 = S_K[14] * t14;
+  G[2] = t18;
+  real t19 = b[6] + S_K[17];
+  real t20 = t19 * t14;
+  G[3] = t20;
+  real t21 = b[8] + S_K[19];
+  real t22 = t21 * t14;
+  G[4] = t22;
+  G[5] = 1.0;
+  real t24 = tau[0] - (e_K[5] + e_B[5]);
+  g[0] = t14 * t24;
+  real t28 = b[0] + S_K[0] - t13 * t15;
+  real t31 = S_K[1] - t13 * t17;
+  real t32 = turn[1] * t31;
+  real t33 = turn[0] * t28 - t32;
+  real t35 = turn[0] * t31;
+  real t38 = b[0] + S_K[6] - t16 * t17;
+  real t40 = t35 - turn[1] * t38;
+  real t42 = turn[0] * t33 - turn[1] * t40;
+  S_I[0] = t42;
+  real t45 = turn[1] * t33 + turn[0] * t40;
+  real t48 = S_K[2] - t13 * t18;
+  real t51 = S_K[7] - t16 * t18;
+  real t53 = turn[0] * t48 - turn[1] * t51;
+  real t55 = link[0] * t45 - link[1] * t53;
+  S_I[1] = t55;
+  real t58 = link[1] * t45 + link[0] * t53;
+  S_I[2] = t58;
+  real t60 = S_K[3] - t13 * t20;
+  real t64 = S_K[8] - b[3] - t16 * t20;
+  real t66 = turn[0] * t60 - turn[1] * t64;
+  real t70 = b[3] + S_K[4] - t13 * t22;
+  real t73 = S_K[9] - t16 * t22;
+  real t75 = turn[0] * t70 - turn[1] * t73;
+  real t77 = turn[0] * t66 - turn[1] * t75;
+  real t78 = d[0] * t45;
+  S_I[3] = t77 - t78;
+  real t82 = turn[1] * t66 + turn[0] * t75;
+  real t84 = t82 + d[0] * t42;
+  S_I[4] = link[0] * t84 - link[2] * t58;
+  S_I[5] = link[1] * t84 + link[2] * t55;
+  real t97 = turn[1] * (t35 + turn[1] * t28) + turn[0] * (t32 + turn[0] * t38);
+  real t101 = turn[1] * t48 + turn[0] * t51;
+  real t102 = link[1] * t101;
+  real t103 = link[0] * t97 - t102;
+  real t105 = link[0] * t101;
+  real t108 = b[0] + S_K[11] - S_K[14] * t18;
+  real t110 = t105 - link[1] * t108;
+  real t112 = link[0] * t103 - link[1] * t110;
+  S_I[6] = t112;
+  real t115 = link[1] * t103 + link[0] * t110;
+  S_I[7] = t115;
+  real t118 = turn[1] * t60 + turn[0] * t64;
+  real t122 = turn[1] * t70 + turn[0] * t73;
+  real t124 = turn[0] * t118 - turn[1] * t122;
+  real t126 = t124 - d[0] * t97;
+  real t130 = b[2] + S_K[12] - S_K[14] * t20;
+  real t134 = S_K[13] - b[1] - S_K[14] * t22;
+  real t138 = turn[0] * t130 - turn[1] * t134 - d[0] * t101;
+  real t140 = link[0] * t126 - link[1] * t138;
+  S_I[8] = t140;
+  real t144 = turn[1] * t118 + turn[0] * t122 + t78;
+  real t150 = turn[1] * t130 + turn[0] * t134 + d[0] * t53;
+  real t152 = link[0] * t144 - link[1] * t150;
+  real t153 = link[0] * t152;
+  real t154 = link[2] * t115;
+  S_I[9] = t153 - t154;
+  real t156 = link[1] * t152;
+  real t158 = t156 + link[2] * t112;
+  S_I[10] = t158;
+  real t165 = link[1] * (t105 + link[1] * t97) + link[0] * (t102 + link[0] * t108);
+  S_I[11] = t165;
+  real t168 = link[1] * t126 + link[0] * t138;
+  S_I[12] = t168;
+  real t171 = link[1] * t144 + link[0] * t150;
+  real t172 = link[0] * t171;
+  real t174 = t172 - link[2] * t165;
+  S_I[13] = t174;
+  real t176 = link[1] * t171 + t154;
+  S_I[14] = t176;
+  real t178 = t6 - t19 * t20;
+  real t182 = b[5] + S_K[16] - t19 * t22;
+  real t183 = turn[1] * t182;
+  real t184 = turn[0] * t178 - t183;
+  real t186 = turn[0] * t182;
+  real t188 = t7 - t21 * t22;
+  real t190 = t186 - turn[1] * t188;
+  S_I[15] = turn[0] * t184 - turn[1] * t190 - d[0] * (t124 + t126);
+  real t201 = turn[1] * t184 + turn[0] * t190 + d[0] * (t77 - t144);
+  S_I[16] = link[0] * t201 - link[2] * t168;
+  S_I[17] = link[1] * t201 + link[2] * t140;
+  real t217 = turn[1] * (t186 + turn[1] * t178) + turn[0] * (t183 + turn[0] * t188) + d[0] * (t82 +
+    t84);
+  real t218 = link[0] * t217;
+  S_I[18] = link[0] * t218 - link[2] * (t172 + t174);
+  S_I[19] = link[1] * t218 + link[2] * (t153 - t176);
+  S_I[20] = link[1] * (link[1] * t217) + link[2] * (t156 + t158);
+  real t234 = e_K[0] + e_B[0] + t15 * t24;
+  real t238 = e_K[1] + e_B[1] + t17 * t24;
+  real t240 = turn[0] * t234 - turn[1] * t238;
+  e_I[0] = t240;
+  real t243 = turn[1] * t234 + turn[0] * t238;
+  real t247 = e_K[2] + e_B[2] + t18 * t24;
+  real t249 = link[0] * t243 - link[1] * t247;
+  e_I[1] = t249;
+  real t252 = link[1] * t243 + link[0] * t247;
+  e_I[2] = t252;
+  real t255 = e_K[3] + e_B[3] + t20 * t24;
+  real t259 = e_K[4] + e_B[4] + t22 * t24;
+  e_I[3] = turn[0] * t255 - turn[1] * t259 - d[0] * t243;
+  real t268 = turn[1] * t255 + turn[0] * t259 + d[0] * t240;
+  e_I[4] = link[0] * t268 - link[1] * tau[0] - link[2] * t252;
+  e_I[5] = link[1] * t268 + link[0] * tau[0] + link[2] * t249;
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_pin_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -662,143 +265,66 @@ static const mstmm_guard mstmm_sweep_link_pin_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_pin_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_pin_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g, in_t delta_I,
+    out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = link[1] * delta_I[4];
-    const real t1 = link[0] * delta_I[5];
-    const real t2 = t0 - t1;
-    const real t3 = link[0] * delta_I[4];
-    const real t4 = link[1] * delta_I[5];
-    const real t5 = t3 + t4;
-    const real t6 = d[0] * t5;
-    const real t7 = delta_I[0] + t6;
-    const real t8 = turn[0] * t7;
-    const real t9 = link[2] * delta_I[5];
-    const real t10 = delta_I[1] + t9;
-    const real t11 = link[0] * t10;
-    const real t12 = link[2] * delta_I[4];
-    const real t13 = delta_I[2] - t12;
-    const real t14 = link[1] * t13;
-    const real t15 = t11 + t14;
-    const real t16 = d[0] * delta_I[3];
-    const real t17 = t15 - t16;
-    const real t18 = turn[1] * t17;
-    const real t19 = t8 + t18;
-    const real t20 = G[0] * t19;
-    const real t21 = turn[0] * t17;
-    const real t22 = turn[1] * t7;
-    const real t23 = t21 - t22;
-    const real t24 = G[1] * t23;
-    const real t25 = t20 + t24;
-    const real t26 = link[0] * t13;
-    const real t27 = link[1] * t10;
-    const real t28 = t26 - t27;
-    const real t29 = G[2] * t28;
-    const real t30 = t25 + t29;
-    const real t31 = turn[0] * delta_I[3];
-    const real t32 = turn[1] * t5;
-    const real t33 = t31 + t32;
-    const real t34 = G[3] * t33;
-    const real t35 = t30 + t34;
-    const real t36 = turn[0] * t5;
-    const real t37 = turn[1] * delta_I[3];
-    const real t38 = t36 - t37;
-    const real t39 = G[4] * t38;
-    const real t40 = t35 + t39;
-    const real t41 = t2 - t40;
-    const real t42 = g[0] + t41;
-    udot[0] = t42;
-    delta[0] = t19;
-    delta[1] = t23;
-    delta[2] = t28;
-    delta[3] = t33;
-    delta[4] = t38;
-    const real t43 = t1 - t0;
-    const real t44 = t43 + t42;
-    delta[5] = t44;
-    return 0;
+  (void)p;
+  real t0 = link[1] * delta_I[4];
+  real t1 = link[0] * delta_I[5];
+  real t5 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t7 = delta_I[0] + d[0] * t5;
+  real t10 = delta_I[1] + link[2] * delta_I[5];
+  real t13 = delta_I[2] - link[2] * delta_I[4];
+  real t17 = link[0] * t10 + link[1] * t13 - d[0] * delta_I[3];
+  real t19 = turn[0] * t7 + turn[1] * t17;
+  real t23 = turn[0] * t17 - turn[1] * t7;
+  real t28 = link[0] * t13 - link[1] * t10;
+  real t33 = turn[0] * delta_I[3] + turn[1] * t5;
+  real t38 = turn[0] * t5 - turn[1] * delta_I[3];
+  real t42 = g[0] + (t0 - t1 - (G[0] * t19 + G[1] * t23 + G[2] * t28 + G[3] * t33 + G[4] * t38));
+  udot[0] = t42;
+  delta[0] = t19;
+  delta[1] = t23;
+  delta[2] = t28;
+  delta[3] = t33;
+  delta[4] = t38;
+  delta[5] = t1 - t0 + t42;
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_pin_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_pin_turn,
-        .call = mstmm_sweep_link_pin_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_pin_turn_inputs,
-        .outputs = mstmm_sweep_link_pin_turn_outputs,
-        .ir_hash = "b4d0fb94384dc25e8aaecb25276338d5743b5e74b90b3a275fd2982011293d60",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_pin_forward,
-        .call = mstmm_sweep_link_pin_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_pin_forward_inputs,
-        .outputs = mstmm_sweep_link_pin_forward_outputs,
-        .ir_hash = "88955d9fbb8cd6d10bf536140145f42a881482370993172f3421fd09a365930d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_pin_condense,
-        .call = mstmm_sweep_link_pin_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_pin_condense_inputs,
-        .outputs = mstmm_sweep_link_pin_condense_outputs,
-        .ir_hash = "8b42c33f460e4731d44e0e1f2e3a35074b93c8670d96178a8d03a38d01e6711e",
-        .n_guards = 3,
-        .guards = mstmm_sweep_link_pin_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_pin_recover,
-        .call = mstmm_sweep_link_pin_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_pin_recover_inputs,
-        .outputs = mstmm_sweep_link_pin_recover_outputs,
-        .ir_hash = "4c6d812425e48c0c2c6666809f880e964c8a9f8274d7efc34c653e96ba3a4d48",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_turn), 2, 1, (const mstmm_port[]){{"link", 5, "", 0,
+    0}, {"q", 1, "", 0, 0}}, (const mstmm_port[]){{"turn", 1, "rad", 0, 0}},
+    "d9de6da27ebd8ce60784323c8a95f3cdefd76f4213bd2995beb2ec48efe2a60c", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_forward), 7, 4, (const mstmm_port[]){{"link", 5,
+    "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0},
+    {"u", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d", 1, "m", 0, 0},
+    {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "2e85558da835d561902b0a755298d61ae469935da31bcad519d1e0e141435501", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_condense), 9, 4, (const mstmm_port[]){{"link",
+    5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0,
+    0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"tau", 1,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"S_I", 21, "",
+    0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "a5ee52c44e36b6be6a715d8ab16b400805f6818e78c399373189eb51ef2bdaad", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_recover), 7, 2, (const mstmm_port[]){{"link", 5,
+    "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 0, "", 0, 0}, {"G", 6, "", 0, 0},
+    {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0},
+    {"delta", 6, "", 0, 0}}, "390aa754295641fcef98fae9b338aa3548ddde9ce1a0699c507a8bc352e0c1c1", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_sweep_link_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_pin",
-    .hash = "8adb2ea482dd82ac6d1b679b884e7def021b319a619c1d6a174ced92a639fb9d",
+    .hash = "0e39b2bc1318ed78114cddb1a94a62d033cf6275caf431fd6d24499f772b2a12",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,49 +7,18 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_pin_rotor;
-int mstmm_sweep_link_pin_rotor_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_pin_rotor_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_pin_rotor_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_pin_rotor_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the pin hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[1] coordinates: angle [rad]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_pin_rotor_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_pin_rotor_turn(in_t link, in_t q, out_t turn)
 {
-    const real t0 = link[3] + q[0];
-    turn[0] = t0;
-    return 0;
+  turn[0] = link[3] + q[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_rotor_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_rotor_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_rotor_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,214 +35,66 @@ static const mstmm_port mstmm_sweep_link_pin_rotor_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_pin_rotor_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_pin_rotor_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    (void)p;
-    (void)q;
-    d[0] = link[4];
-    const real t0 = turn[0] * motion_I[0];
-    const real t1 = link[0] * motion_I[1];
-    const real t2 = link[1] * motion_I[2];
-    const real t3 = t1 + t2;
-    const real t4 = turn[1] * t3;
-    const real t5 = t0 + t4;
-    motion[0] = t5;
-    const real t6 = turn[0] * t3;
-    const real t7 = turn[1] * motion_I[0];
-    const real t8 = t6 - t7;
-    motion[1] = t8;
-    const real t9 = link[0] * motion_I[2];
-    const real t10 = link[1] * motion_I[1];
-    const real t11 = t9 - t10;
-    const real t12 = u[0] + t11;
-    motion[2] = t12;
-    const real t13 = turn[0] * motion_I[3];
-    const real t14 = link[0] * motion_I[4];
-    const real t15 = link[1] * motion_I[5];
-    const real t16 = t14 + t15;
-    const real t17 = turn[1] * t16;
-    const real t18 = t13 + t17;
-    const real t19 = u[0] * t8;
-    const real t20 = t18 + t19;
-    motion[3] = t20;
-    const real t21 = turn[0] * t16;
-    const real t22 = turn[1] * motion_I[3];
-    const real t23 = t21 - t22;
-    const real t24 = u[0] * t5;
-    const real t25 = t23 - t24;
-    motion[4] = t25;
-    const real t26 = link[0] * motion_I[5];
-    const real t27 = link[1] * motion_I[4];
-    const real t28 = t26 - t27;
-    motion[5] = t28;
-    const real t29 = motion_I[1] * motion_I[1];
-    const real t30 = motion_I[2] * motion_I[2];
-    const real t31 = t29 + t30;
-    const real t32 = link[2] * t31;
-    const real t33 = motion_I[6] - t32;
-    const real t34 = motion_I[0] * t11;
-    const real t35 = t16 + t34;
-    const real t36 = link[4] * t35;
-    const real t37 = t33 + t36;
-    const real t38 = turn[0] * t37;
-    const real t39 = motion_I[0] * motion_I[1];
-    const real t40 = motion_I[5] + t39;
-    const real t41 = link[2] * t40;
-    const real t42 = motion_I[7] + t41;
-    const real t43 = link[0] * t42;
-    const real t44 = motion_I[0] * motion_I[2];
-    const real t45 = t44 - motion_I[4];
-    const real t46 = link[2] * t45;
-    const real t47 = motion_I[8] + t46;
-    const real t48 = link[1] * t47;
-    const real t49 = t43 + t48;
-    const real t50 = t3 * t11;
-    const real t51 = t50 - motion_I[3];
-    const real t52 = link[4] * t51;
-    const real t53 = t49 + t52;
-    const real t54 = turn[1] * t53;
-    const real t55 = t38 + t54;
-    motion[6] = t55;
-    const real t56 = turn[0] * t53;
-    const real t57 = turn[1] * t37;
-    const real t58 = t56 - t57;
-    motion[7] = t58;
-    const real t59 = link[0] * t47;
-    const real t60 = link[1] * t42;
-    const real t61 = t59 - t60;
-    const real t62 = motion_I[0] * motion_I[0];
-    const real t63 = t3 * t3;
-    const real t64 = t62 + t63;
-    const real t65 = link[4] * t64;
-    const real t66 = t61 - t65;
-    motion[8] = t66;
-    const real t67 = b[0] * t55;
-    const real t68 = t27 - t26;
-    const real t69 = t5 * t8;
-    const real t70 = t68 + t69;
-    const real t71 = b[2] * t70;
-    const real t72 = t5 * t12;
-    const real t73 = t25 + t72;
-    const real t74 = b[3] * t73;
-    const real t75 = t71 + t74;
-    const real t76 = t8 * t8;
-    const real t77 = t12 * t12;
-    const real t78 = t76 + t77;
-    const real t79 = b[1] * t78;
-    const real t80 = t75 - t79;
-    const real t81 = t67 + t80;
-    e_B[0] = t81;
-    const real t82 = b[0] * t58;
-    const real t83 = t28 + t69;
-    const real t84 = b[1] * t83;
-    const real t85 = t8 * t12;
-    const real t86 = t85 - t20;
-    const real t87 = b[3] * t86;
-    const real t88 = t84 + t87;
-    const real t89 = t5 * t5;
-    const real t90 = t77 + t89;
-    const real t91 = b[2] * t90;
-    const real t92 = t88 - t91;
-    const real t93 = t82 + t92;
-    e_B[1] = t93;
-    const real t94 = b[0] * t66;
-    const real t95 = t24 - t23;
-    const real t96 = t72 + t95;
-    const real t97 = b[1] * t96;
-    const real t98 = t20 + t85;
-    const real t99 = b[2] * t98;
-    const real t100 = t97 + t99;
-    const real t101 = t76 + t89;
-    const real t102 = b[3] * t101;
-    const real t103 = t100 - t102;
-    const real t104 = t94 + t103;
-    e_B[2] = t104;
-    const real t105 = b[6] * t28;
-    const real t106 = b[5] * t25;
-    const real t107 = b[4] * t20;
-    const real t108 = b[2] * t66;
-    const real t109 = b[9] * t12;
-    const real t110 = b[6] * t5;
-    const real t111 = b[8] * t8;
-    const real t112 = t110 + t111;
-    const real t113 = t109 + t112;
-    const real t114 = t8 * t113;
-    const real t115 = b[8] * t12;
-    const real t116 = b[5] * t5;
-    const real t117 = b[7] * t8;
-    const real t118 = t116 + t117;
-    const real t119 = t115 + t118;
-    const real t120 = t12 * t119;
-    const real t121 = t114 - t120;
-    const real t122 = t108 + t121;
-    const real t123 = b[3] * t58;
-    const real t124 = t122 - t123;
-    const real t125 = t107 + t124;
-    const real t126 = t106 + t125;
-    const real t127 = t105 + t126;
-    e_B[3] = t127;
-    const real t128 = b[8] * t28;
-    const real t129 = b[7] * t25;
-    const real t130 = b[5] * t20;
-    const real t131 = b[3] * t55;
-    const real t132 = b[6] * t12;
-    const real t133 = b[4] * t5;
-    const real t134 = b[5] * t8;
-    const real t135 = t133 + t134;
-    const real t136 = t132 + t135;
-    const real t137 = t12 * t136;
-    const real t138 = t5 * t113;
-    const real t139 = t137 - t138;
-    const real t140 = b[1] * t66;
-    const real t141 = t139 - t140;
-    const real t142 = t131 + t141;
-    const real t143 = t130 + t142;
-    const real t144 = t129 + t143;
-    const real t145 = t128 + t144;
-    e_B[4] = t145;
-    const real t146 = b[9] * t28;
-    const real t147 = b[8] * t25;
-    const real t148 = b[6] * t20;
-    const real t149 = b[1] * t58;
-    const real t150 = t5 * t119;
-    const real t151 = t8 * t136;
-    const real t152 = t150 - t151;
-    const real t153 = t149 + t152;
-    const real t154 = b[2] * t55;
-    const real t155 = t153 - t154;
-    const real t156 = t148 + t155;
-    const real t157 = t147 + t156;
-    const real t158 = t146 + t157;
-    e_B[5] = t158;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  (void)q;
+  d[0] = link[4];
+  real t3 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t5 = turn[0] * motion_I[0] + turn[1] * t3;
+  motion[0] = t5;
+  real t8 = turn[0] * t3 - turn[1] * motion_I[0];
+  motion[1] = t8;
+  real t11 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  real t12 = u[0] + t11;
+  motion[2] = t12;
+  real t16 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t20 = turn[0] * motion_I[3] + turn[1] * t16 + u[0] * t8;
+  motion[3] = t20;
+  real t23 = turn[0] * t16 - turn[1] * motion_I[3];
+  real t24 = u[0] * t5;
+  real t25 = t23 - t24;
+  motion[4] = t25;
+  real t26 = link[0] * motion_I[5];
+  real t27 = link[1] * motion_I[4];
+  real t28 = t26 - t27;
+  motion[5] = t28;
+  real t37 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) +
+    link[4] * (t16 + motion_I[0] * t11);
+  real t42 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t47 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t53 = link[0] * t42 + link[1] * t47 + link[4] * (t3 * t11 - motion_I[3]);
+  real t55 = turn[0] * t37 + turn[1] * t53;
+  motion[6] = t55;
+  real t58 = turn[0] * t53 - turn[1] * t37;
+  motion[7] = t58;
+  real t66 = link[0] * t47 - link[1] * t42 - link[4] * (motion_I[0] * motion_I[0] + t3 * t3);
+  motion[8] = t66;
+  real t69 = t5 * t8;
+  real t72 = t5 * t12;
+  real t76 = t8 * t8;
+  real t77 = t12 * t12;
+  e_B[0] = b[0] * t55 + (b[2] * (t27 - t26 + t69) + b[3] * (t25 + t72) - b[1] * (t76 + t77));
+  real t85 = t8 * t12;
+  real t89 = t5 * t5;
+  e_B[1] = b[0] * t58 + (b[1] * (t28 + t69) + b[3] * (t85 - t20) - b[2] * (t77 + t89));
+  e_B[2] = b[0] * t66 + (b[1] * (t72 + (t24 - t23)) + b[2] * (t20 + t85) - b[3] * (t76 + t89));
+  real t113 = b[9] * t12 + (b[6] * t5 + b[8] * t8);
+  real t119 = b[8] * t12 + (b[5] * t5 + b[7] * t8);
+  e_B[3] = b[6] * t28 + (b[5] * t25 + (b[4] * t20 + (b[2] * t66 + (t8 * t113 - t12 * t119) - b[3] *
+    t58)));
+  real t136 = b[6] * t12 + (b[4] * t5 + b[5] * t8);
+  e_B[4] = b[8] * t28 + (b[7] * t25 + (b[5] * t20 + (b[3] * t55 + (t12 * t136 - t5 * t113 - b[1] *
+    t66))));
+  e_B[5] = b[9] * t28 + (b[8] * t25 + (b[6] * t20 + (b[1] * t58 + (t5 * t119 - t8 * t136) - b[2] *
+    t55)));
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_rotor_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_rotor_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_rotor_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -292,430 +113,164 @@ static const mstmm_port mstmm_sweep_link_pin_rotor_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_pin_rotor_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_pin_rotor_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K,
+    in_t e_K, in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = b[9] + S_K[20];
-    const real t1 = b[10] + t0;
-    const real t2 = 0.0 < t1;
-    if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t3 = b[4] + b[7];
-    const real t4 = b[9] + t3;
-    const real t5 = ((real)1 / (real)300000000000000) * t4;
-    const real t6 = 0.0 < t5;
-    const real t7 = b[4] + S_K[15];
-    const real t8 = b[7] + S_K[18];
-    const real t9 = t7 + t8;
-    const real t10 = t0 + t9;
-    const real t11 = ((real)1 / (real)300000000000000) * t10;
-    const real t12 = t6 != 0 ? t5 : t11;
-    const real t13 = t12 < t1;
-    if (!(t13 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t14 = S_K[5] - b[2];
-    const real t15 = 1.0 / t1;
-    const real t16 = t14 * t15;
-    G[0] = t16;
-    const real t17 = b[1] + S_K[10];
-    const real t18 = t17 * t15;
-    G[1] = t18;
-    const real t19 = S_K[14] * t15;
-    G[2] = t19;
-    const real t20 = b[6] + S_K[17];
-    const real t21 = t20 * t15;
-    G[3] = t21;
-    const real t22 = b[8] + S_K[19];
-    const real t23 = t22 * t15;
-    G[4] = t23;
-    const real t24 = t0 * t15;
-    G[5] = t24;
-    const real t25 = e_K[5] + e_B[5];
-    const real t26 = tau[0] - t25;
-    const real t27 = t15 * t26;
-    g[0] = t27;
-    const real t28 = b[0] + S_K[0];
-    const real t29 = t14 * t16;
-    const real t30 = t28 - t29;
-    const real t31 = turn[0] * t30;
-    const real t32 = t14 * t18;
-    const real t33 = S_K[1] - t32;
-    const real t34 = turn[1] * t33;
-    const real t35 = t31 - t34;
-    const real t36 = turn[0] * t35;
-    const real t37 = turn[0] * t33;
-    const real t38 = b[0] + S_K[6];
-    const real t39 = t17 * t18;
-    const real t40 = t38 - t39;
-    const real t41 = turn[1] * t40;
-    const real t42 = t37 - t41;
-    const real t43 = turn[1] * t42;
-    const real t44 = t36 - t43;
-    S_I[0] = t44;
-    const real t45 = turn[1] * t35;
-    const real t46 = turn[0] * t42;
-    const real t47 = t45 + t46;
-    const real t48 = link[0] * t47;
-    const real t49 = t14 * t19;
-    const real t50 = S_K[2] - t49;
-    const real t51 = turn[0] * t50;
-    const real t52 = t17 * t19;
-    const real t53 = S_K[7] - t52;
-    const real t54 = turn[1] * t53;
-    const real t55 = t51 - t54;
-    const real t56 = link[1] * t55;
-    const real t57 = t48 - t56;
-    S_I[1] = t57;
-    const real t58 = link[1] * t47;
-    const real t59 = link[0] * t55;
-    const real t60 = t58 + t59;
-    S_I[2] = t60;
-    const real t61 = t14 * t21;
-    const real t62 = S_K[3] - t61;
-    const real t63 = turn[0] * t62;
-    const real t64 = S_K[8] - b[3];
-    const real t65 = t17 * t21;
-    const real t66 = t64 - t65;
-    const real t67 = turn[1] * t66;
-    const real t68 = t63 - t67;
-    const real t69 = turn[0] * t68;
-    const real t70 = b[3] + S_K[4];
-    const real t71 = t14 * t23;
-    const real t72 = t70 - t71;
-    const real t73 = turn[0] * t72;
-    const real t74 = t17 * t23;
-    const real t75 = S_K[9] - t74;
-    const real t76 = turn[1] * t75;
-    const real t77 = t73 - t76;
-    const real t78 = turn[1] * t77;
-    const real t79 = t69 - t78;
-    const real t80 = d[0] * t47;
-    const real t81 = t79 - t80;
-    S_I[3] = t81;
-    const real t82 = turn[1] * t68;
-    const real t83 = turn[0] * t77;
-    const real t84 = t82 + t83;
-    const real t85 = d[0] * t44;
-    const real t86 = t84 + t85;
-    const real t87 = link[0] * t86;
-    const real t88 = t14 * t24;
-    const real t89 = t14 - t88;
-    const real t90 = turn[0] * t89;
-    const real t91 = t17 * t24;
-    const real t92 = t17 - t91;
-    const real t93 = turn[1] * t92;
-    const real t94 = t90 - t93;
-    const real t95 = link[1] * t94;
-    const real t96 = t87 - t95;
-    const real t97 = link[2] * t60;
-    const real t98 = t96 - t97;
-    S_I[4] = t98;
-    const real t99 = link[1] * t86;
-    const real t100 = link[0] * t94;
-    const real t101 = t99 + t100;
-    const real t102 = link[2] * t57;
-    const real t103 = t101 + t102;
-    S_I[5] = t103;
-    const real t104 = turn[1] * t30;
-    const real t105 = t37 + t104;
-    const real t106 = turn[1] * t105;
-    const real t107 = turn[0] * t40;
-    const real t108 = t34 + t107;
-    const real t109 = turn[0] * t108;
-    const real t110 = t106 + t109;
-    const real t111 = link[0] * t110;
-    const real t112 = turn[1] * t50;
-    const real t113 = turn[0] * t53;
-    const real t114 = t112 + t113;
-    const real t115 = link[1] * t114;
-    const real t116 = t111 - t115;
-    const real t117 = link[0] * t116;
-    const real t118 = link[0] * t114;
-    const real t119 = b[0] + S_K[11];
-    const real t120 = S_K[14] * t19;
-    const real t121 = t119 - t120;
-    const real t122 = link[1] * t121;
-    const real t123 = t118 - t122;
-    const real t124 = link[1] * t123;
-    const real t125 = t117 - t124;
-    S_I[6] = t125;
-    const real t126 = link[1] * t116;
-    const real t127 = link[0] * t123;
-    const real t128 = t126 + t127;
-    S_I[7] = t128;
-    const real t129 = turn[1] * t62;
-    const real t130 = turn[0] * t66;
-    const real t131 = t129 + t130;
-    const real t132 = turn[0] * t131;
-    const real t133 = turn[1] * t72;
-    const real t134 = turn[0] * t75;
-    const real t135 = t133 + t134;
-    const real t136 = turn[1] * t135;
-    const real t137 = t132 - t136;
-    const real t138 = d[0] * t110;
-    const real t139 = t137 - t138;
-    const real t140 = link[0] * t139;
-    const real t141 = b[2] + S_K[12];
-    const real t142 = S_K[14] * t21;
-    const real t143 = t141 - t142;
-    const real t144 = turn[0] * t143;
-    const real t145 = S_K[13] - b[1];
-    const real t146 = S_K[14] * t23;
-    const real t147 = t145 - t146;
-    const real t148 = turn[1] * t147;
-    const real t149 = t144 - t148;
-    const real t150 = d[0] * t114;
-    const real t151 = t149 - t150;
-    const real t152 = link[1] * t151;
-    const real t153 = t140 - t152;
-    S_I[8] = t153;
-    const real t154 = turn[1] * t131;
-    const real t155 = turn[0] * t135;
-    const real t156 = t154 + t155;
-    const real t157 = t156 + t80;
-    const real t158 = link[0] * t157;
-    const real t159 = turn[1] * t143;
-    const real t160 = turn[0] * t147;
-    const real t161 = t159 + t160;
-    const real t162 = d[0] * t55;
-    const real t163 = t161 + t162;
-    const real t164 = link[1] * t163;
-    const real t165 = t158 - t164;
-    const real t166 = link[0] * t165;
-    const real t167 = turn[1] * t89;
-    const real t168 = turn[0] * t92;
-    const real t169 = t167 + t168;
-    const real t170 = link[0] * t169;
-    const real t171 = S_K[14] * t24;
-    const real t172 = S_K[14] - t171;
-    const real t173 = link[1] * t172;
-    const real t174 = t170 - t173;
-    const real t175 = link[1] * t174;
-    const real t176 = t166 - t175;
-    const real t177 = link[2] * t128;
-    const real t178 = t176 - t177;
-    S_I[9] = t178;
-    const real t179 = link[1] * t165;
-    const real t180 = link[0] * t174;
-    const real t181 = t179 + t180;
-    const real t182 = link[2] * t125;
-    const real t183 = t181 + t182;
-    S_I[10] = t183;
-    const real t184 = link[1] * t110;
-    const real t185 = t118 + t184;
-    const real t186 = link[1] * t185;
-    const real t187 = link[0] * t121;
-    const real t188 = t115 + t187;
-    const real t189 = link[0] * t188;
-    const real t190 = t186 + t189;
-    S_I[11] = t190;
-    const real t191 = link[1] * t139;
-    const real t192 = link[0] * t151;
-    const real t193 = t191 + t192;
-    S_I[12] = t193;
-    const real t194 = link[1] * t157;
-    const real t195 = link[0] * t163;
-    const real t196 = t194 + t195;
-    const real t197 = link[0] * t196;
-    const real t198 = link[1] * t169;
-    const real t199 = link[0] * t172;
-    const real t200 = t198 + t199;
-    const real t201 = link[1] * t200;
-    const real t202 = t197 - t201;
-    const real t203 = link[2] * t190;
-    const real t204 = t202 - t203;
-    S_I[13] = t204;
-    const real t205 = link[1] * t196;
-    const real t206 = link[0] * t200;
-    const real t207 = t205 + t206;
-    const real t208 = t207 + t177;
-    S_I[14] = t208;
-    const real t209 = t20 * t21;
-    const real t210 = t7 - t209;
-    const real t211 = turn[0] * t210;
-    const real t212 = b[5] + S_K[16];
-    const real t213 = t20 * t23;
-    const real t214 = t212 - t213;
-    const real t215 = turn[1] * t214;
-    const real t216 = t211 - t215;
-    const real t217 = turn[0] * t216;
-    const real t218 = turn[0] * t214;
-    const real t219 = t22 * t23;
-    const real t220 = t8 - t219;
-    const real t221 = turn[1] * t220;
-    const real t222 = t218 - t221;
-    const real t223 = turn[1] * t222;
-    const real t224 = t217 - t223;
-    const real t225 = t137 + t139;
-    const real t226 = d[0] * t225;
-    const real t227 = t224 - t226;
-    S_I[15] = t227;
-    const real t228 = turn[1] * t216;
-    const real t229 = turn[0] * t222;
-    const real t230 = t228 + t229;
-    const real t231 = t79 - t157;
-    const real t232 = d[0] * t231;
-    const real t233 = t230 + t232;
-    const real t234 = link[0] * t233;
-    const real t235 = t20 * t24;
-    const real t236 = t20 - t235;
-    const real t237 = turn[0] * t236;
-    const real t238 = t22 * t24;
-    const real t239 = t22 - t238;
-    const real t240 = turn[1] * t239;
-    const real t241 = t237 - t240;
-    const real t242 = d[0] * t169;
-    const real t243 = t241 - t242;
-    const real t244 = link[1] * t243;
-    const real t245 = t234 - t244;
-    const real t246 = link[2] * t193;
-    const real t247 = t245 - t246;
-    S_I[16] = t247;
-    const real t248 = link[1] * t233;
-    const real t249 = link[0] * t243;
-    const real t250 = t248 + t249;
-    const real t251 = link[2] * t153;
-    const real t252 = t250 + t251;
-    S_I[17] = t252;
-    const real t253 = turn[1] * t210;
-    const real t254 = t218 + t253;
-    const real t255 = turn[1] * t254;
-    const real t256 = turn[0] * t220;
-    const real t257 = t215 + t256;
-    const real t258 = turn[0] * t257;
-    const real t259 = t255 + t258;
-    const real t260 = t84 + t86;
-    const real t261 = d[0] * t260;
-    const real t262 = t259 + t261;
-    const real t263 = link[0] * t262;
-    const real t264 = turn[1] * t236;
-    const real t265 = turn[0] * t239;
-    const real t266 = t264 + t265;
-    const real t267 = d[0] * t94;
-    const real t268 = t266 + t267;
-    const real t269 = link[1] * t268;
-    const real t270 = t263 - t269;
-    const real t271 = link[0] * t270;
-    const real t272 = link[0] * t268;
-    const real t273 = t0 * t24;
-    const real t274 = t0 - t273;
-    const real t275 = link[1] * t274;
-    const real t276 = t272 - t275;
-    const real t277 = link[1] * t276;
-    const real t278 = t271 - t277;
-    const real t279 = t202 + t204;
-    const real t280 = link[2] * t279;
-    const real t281 = t278 - t280;
-    S_I[18] = t281;
-    const real t282 = link[1] * t270;
-    const real t283 = link[0] * t276;
-    const real t284 = t282 + t283;
-    const real t285 = t176 - t208;
-    const real t286 = link[2] * t285;
-    const real t287 = t284 + t286;
-    S_I[19] = t287;
-    const real t288 = link[1] * t262;
-    const real t289 = t272 + t288;
-    const real t290 = link[1] * t289;
-    const real t291 = link[0] * t274;
-    const real t292 = t269 + t291;
-    const real t293 = link[0] * t292;
-    const real t294 = t290 + t293;
-    const real t295 = t181 + t183;
-    const real t296 = link[2] * t295;
-    const real t297 = t294 + t296;
-    S_I[20] = t297;
-    const real t298 = e_K[0] + e_B[0];
-    const real t299 = t16 * t26;
-    const real t300 = t298 + t299;
-    const real t301 = turn[0] * t300;
-    const real t302 = e_K[1] + e_B[1];
-    const real t303 = t18 * t26;
-    const real t304 = t302 + t303;
-    const real t305 = turn[1] * t304;
-    const real t306 = t301 - t305;
-    e_I[0] = t306;
-    const real t307 = turn[1] * t300;
-    const real t308 = turn[0] * t304;
-    const real t309 = t307 + t308;
-    const real t310 = link[0] * t309;
-    const real t311 = e_K[2] + e_B[2];
-    const real t312 = t19 * t26;
-    const real t313 = t311 + t312;
-    const real t314 = link[1] * t313;
-    const real t315 = t310 - t314;
-    e_I[1] = t315;
-    const real t316 = link[1] * t309;
-    const real t317 = link[0] * t313;
-    const real t318 = t316 + t317;
-    e_I[2] = t318;
-    const real t319 = e_K[3] + e_B[3];
-    const real t320 = t21 * t26;
-    const real t321 = t319 + t320;
-    const real t322 = turn[0] * t321;
-    const real t323 = e_K[4] + e_B[4];
-    const real t324 = t23 * t26;
-    const real t325 = t323 + t324;
-    const real t326 = turn[1] * t325;
-    const real t327 = t322 - t326;
-    const real t328 = d[0] * t309;
-    const real t329 = t327 - t328;
-    e_I[3] = t329;
-    const real t330 = turn[1] * t321;
-    const real t331 = turn[0] * t325;
-    const real t332 = t330 + t331;
-    const real t333 = d[0] * t306;
-    const real t334 = t332 + t333;
-    const real t335 = link[0] * t334;
-    const real t336 = t24 * t26;
-    const real t337 = t25 + t336;
-    const real t338 = link[1] * t337;
-    const real t339 = t335 - t338;
-    const real t340 = link[2] * t318;
-    const real t341 = t339 - t340;
-    e_I[4] = t341;
-    const real t342 = link[1] * t334;
-    const real t343 = link[0] * t337;
-    const real t344 = t342 + t343;
-    const real t345 = link[2] * t315;
-    const real t346 = t344 + t345;
-    e_I[5] = t346;
-    return 0;
+  (void)p;
+  real t0 = b[9] + S_K[20];
+  real t1 = b[10] + t0;
+  real t2 = 0.0 < t1;
+  if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t5 = ((real)1 / (real)300000000000000) * (b[9] + (b[4] + b[7]));
+  real t7 = b[4] + S_K[15];
+  real t8 = b[7] + S_K[18];
+  real t11 = ((real)1 / (real)300000000000000) * (t0 + (t7 + t8));
+  if (!((((0.0 < t5) ? t5 : t11) < t1))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t14 = S_K[5] - b[2];
+  real t15 = 1.0 / t1;
+  real t16 = t14 * t15;
+  G[0] = t16;
+  real t17 = b[1] + S_K[10];
+  real t18 = t17 * t15;
+  G[1] = t18;
+  real t19 = S_K[14] * t15;
+  G[2] = t19;
+  real t20 = b[6] + S_K[17];
+  real t21 = t20 * t15;
+  G[3] = t21;
+  real t22 = b[8] + S_K[19];
+  real t23 = t22 * t15;
+  G[4] = t23;
+  real t24 = t0 * t15;
+  G[5] = t24;
+  real t25 = e_K[5] + e_B[5];
+  real t26 = tau[0] - t25;
+  g[0] = t15 * t26;
+  real t30 = b[0] + S_K[0] - t14 * t16;
+  real t33 = S_K[1] - t14 * t18;
+  real t34 = turn[1] * t33;
+  real t35 = turn[0] * t30 - t34;
+  real t37 = turn[0] * t33;
+  real t40 = b[0] + S_K[6] - t17 * t18;
+  real t42 = t37 - turn[1] * t40;
+  real t44 = turn[0] * t35 - turn[1] * t42;
+  S_I[0] = t44;
+  real t47 = turn[1] * t35 + turn[0] * t42;
+  real t50 = S_K[2] - t14 * t19;
+  real t53 = S_K[7] - t17 * t19;
+  real t55 = turn[0] * t50 - turn[1] * t53;
+  real t57 = link[0] * t47 - link[1] * t55;
+  S_I[1] = t57;
+  real t60 = link[1] * t47 + link[0] * t55;
+  S_I[2] = t60;
+  real t62 = S_K[3] - t14 * t21;
+  real t66 = S_K[8] - b[3] - t17 * t21;
+  real t68 = turn[0] * t62 - turn[1] * t66;
+  real t72 = b[3] + S_K[4] - t14 * t23;
+  real t75 = S_K[9] - t17 * t23;
+  real t77 = turn[0] * t72 - turn[1] * t75;
+  real t79 = turn[0] * t68 - turn[1] * t77;
+  real t80 = d[0] * t47;
+  S_I[3] = t79 - t80;
+  real t84 = turn[1] * t68 + turn[0] * t77;
+  real t86 = t84 + d[0] * t44;
+  real t89 = t14 - t14 * t24;
+  real t92 = t17 - t17 * t24;
+  real t94 = turn[0] * t89 - turn[1] * t92;
+  S_I[4] = link[0] * t86 - link[1] * t94 - link[2] * t60;
+  S_I[5] = link[1] * t86 + link[0] * t94 + link[2] * t57;
+  real t110 = turn[1] * (t37 + turn[1] * t30) + turn[0] * (t34 + turn[0] * t40);
+  real t114 = turn[1] * t50 + turn[0] * t53;
+  real t115 = link[1] * t114;
+  real t116 = link[0] * t110 - t115;
+  real t118 = link[0] * t114;
+  real t121 = b[0] + S_K[11] - S_K[14] * t19;
+  real t123 = t118 - link[1] * t121;
+  real t125 = link[0] * t116 - link[1] * t123;
+  S_I[6] = t125;
+  real t128 = link[1] * t116 + link[0] * t123;
+  S_I[7] = t128;
+  real t131 = turn[1] * t62 + turn[0] * t66;
+  real t135 = turn[1] * t72 + turn[0] * t75;
+  real t137 = turn[0] * t131 - turn[1] * t135;
+  real t139 = t137 - d[0] * t110;
+  real t143 = b[2] + S_K[12] - S_K[14] * t21;
+  real t147 = S_K[13] - b[1] - S_K[14] * t23;
+  real t151 = turn[0] * t143 - turn[1] * t147 - d[0] * t114;
+  real t153 = link[0] * t139 - link[1] * t151;
+  S_I[8] = t153;
+  real t157 = turn[1] * t131 + turn[0] * t135 + t80;
+  real t163 = turn[1] * t143 + turn[0] * t147 + d[0] * t55;
+  real t165 = link[0] * t157 - link[1] * t163;
+  real t169 = turn[1] * t89 + turn[0] * t92;
+  real t172 = S_K[14] - S_K[14] * t24;
+  real t174 = link[0] * t169 - link[1] * t172;
+  real t176 = link[0] * t165 - link[1] * t174;
+  real t177 = link[2] * t128;
+  S_I[9] = t176 - t177;
+  real t181 = link[1] * t165 + link[0] * t174;
+  real t183 = t181 + link[2] * t125;
+  S_I[10] = t183;
+  real t190 = link[1] * (t118 + link[1] * t110) + link[0] * (t115 + link[0] * t121);
+  S_I[11] = t190;
+  real t193 = link[1] * t139 + link[0] * t151;
+  S_I[12] = t193;
+  real t196 = link[1] * t157 + link[0] * t163;
+  real t200 = link[1] * t169 + link[0] * t172;
+  real t202 = link[0] * t196 - link[1] * t200;
+  real t204 = t202 - link[2] * t190;
+  S_I[13] = t204;
+  real t208 = link[1] * t196 + link[0] * t200 + t177;
+  S_I[14] = t208;
+  real t210 = t7 - t20 * t21;
+  real t214 = b[5] + S_K[16] - t20 * t23;
+  real t215 = turn[1] * t214;
+  real t216 = turn[0] * t210 - t215;
+  real t218 = turn[0] * t214;
+  real t220 = t8 - t22 * t23;
+  real t222 = t218 - turn[1] * t220;
+  S_I[15] = turn[0] * t216 - turn[1] * t222 - d[0] * (t137 + t139);
+  real t233 = turn[1] * t216 + turn[0] * t222 + d[0] * (t79 - t157);
+  real t236 = t20 - t20 * t24;
+  real t239 = t22 - t22 * t24;
+  real t243 = turn[0] * t236 - turn[1] * t239 - d[0] * t169;
+  S_I[16] = link[0] * t233 - link[1] * t243 - link[2] * t193;
+  S_I[17] = link[1] * t233 + link[0] * t243 + link[2] * t153;
+  real t262 = turn[1] * (t218 + turn[1] * t210) + turn[0] * (t215 + turn[0] * t220) + d[0] * (t84 +
+    t86);
+  real t268 = turn[1] * t236 + turn[0] * t239 + d[0] * t94;
+  real t269 = link[1] * t268;
+  real t270 = link[0] * t262 - t269;
+  real t272 = link[0] * t268;
+  real t274 = t0 - t0 * t24;
+  real t276 = t272 - link[1] * t274;
+  S_I[18] = link[0] * t270 - link[1] * t276 - link[2] * (t202 + t204);
+  S_I[19] = link[1] * t270 + link[0] * t276 + link[2] * (t176 - t208);
+  S_I[20] = link[1] * (t272 + link[1] * t262) + link[0] * (t269 + link[0] * t274) + link[2] * (t181
+    + t183);
+  real t300 = e_K[0] + e_B[0] + t16 * t26;
+  real t304 = e_K[1] + e_B[1] + t18 * t26;
+  real t306 = turn[0] * t300 - turn[1] * t304;
+  e_I[0] = t306;
+  real t309 = turn[1] * t300 + turn[0] * t304;
+  real t313 = e_K[2] + e_B[2] + t19 * t26;
+  real t315 = link[0] * t309 - link[1] * t313;
+  e_I[1] = t315;
+  real t318 = link[1] * t309 + link[0] * t313;
+  e_I[2] = t318;
+  real t321 = e_K[3] + e_B[3] + t21 * t26;
+  real t325 = e_K[4] + e_B[4] + t23 * t26;
+  e_I[3] = turn[0] * t321 - turn[1] * t325 - d[0] * t309;
+  real t334 = turn[1] * t321 + turn[0] * t325 + d[0] * t306;
+  real t337 = t25 + t24 * t26;
+  e_I[4] = link[0] * t334 - link[1] * t337 - link[2] * t318;
+  e_I[5] = link[1] * t334 + link[0] * t337 + link[2] * t315;
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_rotor_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_rotor_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_pin_rotor_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_rotor_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the pin hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -730,143 +285,65 @@ static const mstmm_guard mstmm_sweep_link_pin_rotor_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_pin_rotor_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_pin_rotor_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = link[0] * delta_I[4];
-    const real t1 = link[1] * delta_I[5];
-    const real t2 = t0 + t1;
-    const real t3 = d[0] * t2;
-    const real t4 = delta_I[0] + t3;
-    const real t5 = turn[0] * t4;
-    const real t6 = link[2] * delta_I[5];
-    const real t7 = delta_I[1] + t6;
-    const real t8 = link[0] * t7;
-    const real t9 = link[2] * delta_I[4];
-    const real t10 = delta_I[2] - t9;
-    const real t11 = link[1] * t10;
-    const real t12 = t8 + t11;
-    const real t13 = d[0] * delta_I[3];
-    const real t14 = t12 - t13;
-    const real t15 = turn[1] * t14;
-    const real t16 = t5 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = turn[0] * t14;
-    const real t19 = turn[1] * t4;
-    const real t20 = t18 - t19;
-    const real t21 = G[1] * t20;
-    const real t22 = t17 + t21;
-    const real t23 = link[0] * t10;
-    const real t24 = link[1] * t7;
-    const real t25 = t23 - t24;
-    const real t26 = G[2] * t25;
-    const real t27 = t22 + t26;
-    const real t28 = turn[0] * delta_I[3];
-    const real t29 = turn[1] * t2;
-    const real t30 = t28 + t29;
-    const real t31 = G[3] * t30;
-    const real t32 = t27 + t31;
-    const real t33 = turn[0] * t2;
-    const real t34 = turn[1] * delta_I[3];
-    const real t35 = t33 - t34;
-    const real t36 = G[4] * t35;
-    const real t37 = t32 + t36;
-    const real t38 = link[0] * delta_I[5];
-    const real t39 = link[1] * delta_I[4];
-    const real t40 = t38 - t39;
-    const real t41 = G[5] * t40;
-    const real t42 = t37 + t41;
-    const real t43 = g[0] - t42;
-    udot[0] = t43;
-    delta[0] = t16;
-    delta[1] = t20;
-    delta[2] = t25;
-    delta[3] = t30;
-    delta[4] = t35;
-    const real t44 = t40 + t43;
-    delta[5] = t44;
-    return 0;
+  (void)p;
+  real t2 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t4 = delta_I[0] + d[0] * t2;
+  real t7 = delta_I[1] + link[2] * delta_I[5];
+  real t10 = delta_I[2] - link[2] * delta_I[4];
+  real t14 = link[0] * t7 + link[1] * t10 - d[0] * delta_I[3];
+  real t16 = turn[0] * t4 + turn[1] * t14;
+  real t20 = turn[0] * t14 - turn[1] * t4;
+  real t25 = link[0] * t10 - link[1] * t7;
+  real t30 = turn[0] * delta_I[3] + turn[1] * t2;
+  real t35 = turn[0] * t2 - turn[1] * delta_I[3];
+  real t40 = link[0] * delta_I[5] - link[1] * delta_I[4];
+  real t43 = g[0] - (G[0] * t16 + G[1] * t20 + G[2] * t25 + G[3] * t30 + G[4] * t35 + G[5] * t40);
+  udot[0] = t43;
+  delta[0] = t16;
+  delta[1] = t20;
+  delta[2] = t25;
+  delta[3] = t30;
+  delta[4] = t35;
+  delta[5] = t40 + t43;
+  return 0;
 }
 
-static int mstmm_sweep_link_pin_rotor_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_pin_rotor_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_pin_rotor_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_pin_rotor_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_pin_rotor_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_pin_rotor_turn,
-        .call = mstmm_sweep_link_pin_rotor_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_pin_rotor_turn_inputs,
-        .outputs = mstmm_sweep_link_pin_rotor_turn_outputs,
-        .ir_hash = "b4d0fb94384dc25e8aaecb25276338d5743b5e74b90b3a275fd2982011293d60",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_pin_rotor_forward,
-        .call = mstmm_sweep_link_pin_rotor_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_pin_rotor_forward_inputs,
-        .outputs = mstmm_sweep_link_pin_rotor_forward_outputs,
-        .ir_hash = "88955d9fbb8cd6d10bf536140145f42a881482370993172f3421fd09a365930d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_pin_rotor_condense,
-        .call = mstmm_sweep_link_pin_rotor_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_pin_rotor_condense_inputs,
-        .outputs = mstmm_sweep_link_pin_rotor_condense_outputs,
-        .ir_hash = "9f15edb62d2ffdf24e77431ee6be3af5867eec5699deca9e3e9cabf010b11af3",
-        .n_guards = 3,
-        .guards = mstmm_sweep_link_pin_rotor_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_pin_rotor_recover,
-        .call = mstmm_sweep_link_pin_rotor_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_pin_rotor_recover_inputs,
-        .outputs = mstmm_sweep_link_pin_rotor_recover_outputs,
-        .ir_hash = "0cc6f99ca1f24e915304956bf6b598ee9ae11c30082b7860c0e6ad7cd86db4e2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_rotor_turn), 2, 1, (const mstmm_port[]){{"link", 5,
+    "", 0, 0}, {"q", 1, "", 0, 0}}, (const mstmm_port[]){{"turn", 1, "rad", 0, 0}},
+    "d9de6da27ebd8ce60784323c8a95f3cdefd76f4213bd2995beb2ec48efe2a60c", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_rotor_forward), 7, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0,
+    0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d", 1, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot",
+    1, "", 0, 0}}, "2e85558da835d561902b0a755298d61ae469935da31bcad519d1e0e141435501", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_rotor_condense), 9, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "",
+    0, 0}, {"p", 0, "", 0, 0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6,
+    "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1,
+    "", 0, 0}, {"S_I", 21, "", 0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "4efc8a8764e18e11f1c179dfdb921c2b4f9f6b46bd68f20333d110e1e4d41826", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_pin_rotor_recover), 7, 2, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 0, "", 0,
+    0}, {"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "e87349c4da807c302ae9cb431999e175ac6aa4b03629cdf433383298b261be11", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_link_pin_rotor = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_pin_rotor",
-    .hash = "756f377523094526417caef9fae63d92bfb48f58a760f6809bf8507446eb920c",
+    .hash = "9daaac52c8dbaf3abbf17d8b86ca837142eea57f72ef91b493ab787729e586ab",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,49 +7,19 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_prismatic;
-int mstmm_sweep_link_prismatic_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_prismatic_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the prismatic hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[1] coordinates: displacement [m]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_prismatic_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_prismatic_turn(in_t link, in_t q, out_t turn)
 {
-    (void)q;
-    turn[0] = link[3];
-    return 0;
+  (void)q;
+  turn[0] = link[3];
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,215 +36,65 @@ static const mstmm_port mstmm_sweep_link_prismatic_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_prismatic_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_prismatic_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    (void)p;
-    const real t0 = link[4] + q[0];
-    d[0] = t0;
-    const real t1 = turn[0] * motion_I[0];
-    const real t2 = link[0] * motion_I[1];
-    const real t3 = link[1] * motion_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = turn[1] * t4;
-    const real t6 = t1 + t5;
-    motion[0] = t6;
-    const real t7 = turn[0] * t4;
-    const real t8 = turn[1] * motion_I[0];
-    const real t9 = t7 - t8;
-    motion[1] = t9;
-    const real t10 = link[0] * motion_I[2];
-    const real t11 = link[1] * motion_I[1];
-    const real t12 = t10 - t11;
-    motion[2] = t12;
-    const real t13 = turn[0] * motion_I[3];
-    const real t14 = link[0] * motion_I[4];
-    const real t15 = link[1] * motion_I[5];
-    const real t16 = t14 + t15;
-    const real t17 = turn[1] * t16;
-    const real t18 = t13 + t17;
-    motion[3] = t18;
-    const real t19 = turn[0] * t16;
-    const real t20 = turn[1] * motion_I[3];
-    const real t21 = t19 - t20;
-    motion[4] = t21;
-    const real t22 = link[0] * motion_I[5];
-    const real t23 = link[1] * motion_I[4];
-    const real t24 = t22 - t23;
-    motion[5] = t24;
-    const real t25 = motion_I[1] * motion_I[1];
-    const real t26 = motion_I[2] * motion_I[2];
-    const real t27 = t25 + t26;
-    const real t28 = link[2] * t27;
-    const real t29 = motion_I[6] - t28;
-    const real t30 = motion_I[0] * t12;
-    const real t31 = t16 + t30;
-    const real t32 = t0 * t31;
-    const real t33 = t29 + t32;
-    const real t34 = turn[0] * t33;
-    const real t35 = motion_I[0] * motion_I[1];
-    const real t36 = motion_I[5] + t35;
-    const real t37 = link[2] * t36;
-    const real t38 = motion_I[7] + t37;
-    const real t39 = link[0] * t38;
-    const real t40 = motion_I[0] * motion_I[2];
-    const real t41 = t40 - motion_I[4];
-    const real t42 = link[2] * t41;
-    const real t43 = motion_I[8] + t42;
-    const real t44 = link[1] * t43;
-    const real t45 = t39 + t44;
-    const real t46 = t4 * t12;
-    const real t47 = t46 - motion_I[3];
-    const real t48 = t0 * t47;
-    const real t49 = t45 + t48;
-    const real t50 = turn[1] * t49;
-    const real t51 = t34 + t50;
-    const real t52 = u[0] * t9;
-    const real t53 = 2.0 * t52;
-    const real t54 = t51 + t53;
-    motion[6] = t54;
-    const real t55 = turn[0] * t49;
-    const real t56 = turn[1] * t33;
-    const real t57 = t55 - t56;
-    const real t58 = u[0] * t6;
-    const real t59 = 2.0 * t58;
-    const real t60 = t57 - t59;
-    motion[7] = t60;
-    const real t61 = link[0] * t43;
-    const real t62 = link[1] * t38;
-    const real t63 = t61 - t62;
-    const real t64 = motion_I[0] * motion_I[0];
-    const real t65 = t4 * t4;
-    const real t66 = t64 + t65;
-    const real t67 = t0 * t66;
-    const real t68 = t63 - t67;
-    motion[8] = t68;
-    const real t69 = b[0] * t54;
-    const real t70 = t23 - t22;
-    const real t71 = t6 * t9;
-    const real t72 = t70 + t71;
-    const real t73 = b[2] * t72;
-    const real t74 = t12 * t6;
-    const real t75 = t21 + t74;
-    const real t76 = b[3] * t75;
-    const real t77 = t73 + t76;
-    const real t78 = t12 * t12;
-    const real t79 = t9 * t9;
-    const real t80 = t78 + t79;
-    const real t81 = b[1] * t80;
-    const real t82 = t77 - t81;
-    const real t83 = t69 + t82;
-    e_B[0] = t83;
-    const real t84 = b[0] * t60;
-    const real t85 = t24 + t71;
-    const real t86 = b[1] * t85;
-    const real t87 = t12 * t9;
-    const real t88 = t87 - t18;
-    const real t89 = b[3] * t88;
-    const real t90 = t86 + t89;
-    const real t91 = t6 * t6;
-    const real t92 = t78 + t91;
-    const real t93 = b[2] * t92;
-    const real t94 = t90 - t93;
-    const real t95 = t84 + t94;
-    e_B[1] = t95;
-    const real t96 = b[0] * t68;
-    const real t97 = t20 - t19;
-    const real t98 = t74 + t97;
-    const real t99 = b[1] * t98;
-    const real t100 = t18 + t87;
-    const real t101 = b[2] * t100;
-    const real t102 = t99 + t101;
-    const real t103 = t79 + t91;
-    const real t104 = b[3] * t103;
-    const real t105 = t102 - t104;
-    const real t106 = t96 + t105;
-    e_B[2] = t106;
-    const real t107 = b[6] * t24;
-    const real t108 = b[5] * t21;
-    const real t109 = b[4] * t18;
-    const real t110 = b[2] * t68;
-    const real t111 = b[9] * t12;
-    const real t112 = b[6] * t6;
-    const real t113 = b[8] * t9;
-    const real t114 = t112 + t113;
-    const real t115 = t111 + t114;
-    const real t116 = t9 * t115;
-    const real t117 = b[8] * t12;
-    const real t118 = b[5] * t6;
-    const real t119 = b[7] * t9;
-    const real t120 = t118 + t119;
-    const real t121 = t117 + t120;
-    const real t122 = t12 * t121;
-    const real t123 = t116 - t122;
-    const real t124 = t110 + t123;
-    const real t125 = b[3] * t60;
-    const real t126 = t124 - t125;
-    const real t127 = t109 + t126;
-    const real t128 = t108 + t127;
-    const real t129 = t107 + t128;
-    e_B[3] = t129;
-    const real t130 = b[8] * t24;
-    const real t131 = b[7] * t21;
-    const real t132 = b[5] * t18;
-    const real t133 = b[3] * t54;
-    const real t134 = b[6] * t12;
-    const real t135 = b[4] * t6;
-    const real t136 = b[5] * t9;
-    const real t137 = t135 + t136;
-    const real t138 = t134 + t137;
-    const real t139 = t12 * t138;
-    const real t140 = t6 * t115;
-    const real t141 = t139 - t140;
-    const real t142 = b[1] * t68;
-    const real t143 = t141 - t142;
-    const real t144 = t133 + t143;
-    const real t145 = t132 + t144;
-    const real t146 = t131 + t145;
-    const real t147 = t130 + t146;
-    e_B[4] = t147;
-    const real t148 = b[9] * t24;
-    const real t149 = b[8] * t21;
-    const real t150 = b[6] * t18;
-    const real t151 = b[1] * t60;
-    const real t152 = t6 * t121;
-    const real t153 = t9 * t138;
-    const real t154 = t152 - t153;
-    const real t155 = t151 + t154;
-    const real t156 = b[2] * t54;
-    const real t157 = t155 - t156;
-    const real t158 = t150 + t157;
-    const real t159 = t149 + t158;
-    const real t160 = t148 + t159;
-    e_B[5] = t160;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  real t0 = link[4] + q[0];
+  d[0] = t0;
+  real t4 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t6 = turn[0] * motion_I[0] + turn[1] * t4;
+  motion[0] = t6;
+  real t9 = turn[0] * t4 - turn[1] * motion_I[0];
+  motion[1] = t9;
+  real t12 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  motion[2] = t12;
+  real t16 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t18 = turn[0] * motion_I[3] + turn[1] * t16;
+  motion[3] = t18;
+  real t19 = turn[0] * t16;
+  real t20 = turn[1] * motion_I[3];
+  real t21 = t19 - t20;
+  motion[4] = t21;
+  real t22 = link[0] * motion_I[5];
+  real t23 = link[1] * motion_I[4];
+  real t24 = t22 - t23;
+  motion[5] = t24;
+  real t33 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) + t0 *
+    (t16 + motion_I[0] * t12);
+  real t38 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t43 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t49 = link[0] * t38 + link[1] * t43 + t0 * (t4 * t12 - motion_I[3]);
+  real t54 = turn[0] * t33 + turn[1] * t49 + 2.0 * (u[0] * t9);
+  motion[6] = t54;
+  real t60 = turn[0] * t49 - turn[1] * t33 - 2.0 * (u[0] * t6);
+  motion[7] = t60;
+  real t68 = link[0] * t43 - link[1] * t38 - t0 * (motion_I[0] * motion_I[0] + t4 * t4);
+  motion[8] = t68;
+  real t71 = t6 * t9;
+  real t74 = t12 * t6;
+  real t78 = t12 * t12;
+  real t79 = t9 * t9;
+  e_B[0] = b[0] * t54 + (b[2] * (t23 - t22 + t71) + b[3] * (t21 + t74) - b[1] * (t78 + t79));
+  real t87 = t12 * t9;
+  real t91 = t6 * t6;
+  e_B[1] = b[0] * t60 + (b[1] * (t24 + t71) + b[3] * (t87 - t18) - b[2] * (t78 + t91));
+  e_B[2] = b[0] * t68 + (b[1] * (t74 + (t20 - t19)) + b[2] * (t18 + t87) - b[3] * (t79 + t91));
+  real t115 = b[9] * t12 + (b[6] * t6 + b[8] * t9);
+  real t121 = b[8] * t12 + (b[5] * t6 + b[7] * t9);
+  e_B[3] = b[6] * t24 + (b[5] * t21 + (b[4] * t18 + (b[2] * t68 + (t9 * t115 - t12 * t121) - b[3] *
+    t60)));
+  real t138 = b[6] * t12 + (b[4] * t6 + b[5] * t9);
+  e_B[4] = b[8] * t24 + (b[7] * t21 + (b[5] * t18 + (b[3] * t54 + (t12 * t138 - t6 * t115 - b[1] *
+    t68))));
+  e_B[5] = b[9] * t24 + (b[8] * t21 + (b[6] * t18 + (b[1] * t60 + (t6 * t121 - t9 * t138) - b[2] *
+    t54)));
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -293,366 +113,145 @@ static const mstmm_port mstmm_sweep_link_prismatic_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_prismatic_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_prismatic_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K,
+    in_t e_K, in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = b[0] + S_K[11];
-    const real t1 = 0.0 < t0;
-    if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t2 = 0.0 < b[0];
-    const real t3 = b[0] * ((real)1 / (real)100000000000000);
-    const real t4 = b[0] + S_K[0];
-    const real t5 = b[0] + S_K[6];
-    const real t6 = t4 + t5;
-    const real t7 = t0 + t6;
-    const real t8 = ((real)1 / (real)300000000000000) * t7;
-    const real t9 = t2 != 0 ? t3 : t8;
-    const real t10 = t9 < t0;
-    if (!(t10 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t11 = 1.0 / t0;
-    const real t12 = S_K[2] * t11;
-    G[0] = t12;
-    const real t13 = S_K[7] * t11;
-    G[1] = t13;
-    G[2] = 1.0;
-    const real t14 = b[2] + S_K[12];
-    const real t15 = t14 * t11;
-    G[3] = t15;
-    const real t16 = S_K[13] - b[1];
-    const real t17 = t16 * t11;
-    G[4] = t17;
-    const real t18 = S_K[14] * t11;
-    G[5] = t18;
-    const real t19 = e_K[2] + e_B[2];
-    const real t20 = tau[0] - t19;
-    const real t21 = t11 * t20;
-    g[0] = t21;
-    const real t22 = S_K[2] * t12;
-    const real t23 = t4 - t22;
-    const real t24 = turn[0] * t23;
-    const real t25 = S_K[2] * t13;
-    const real t26 = S_K[1] - t25;
-    const real t27 = turn[1] * t26;
-    const real t28 = t24 - t27;
-    const real t29 = turn[0] * t28;
-    const real t30 = turn[0] * t26;
-    const real t31 = S_K[7] * t13;
-    const real t32 = t5 - t31;
-    const real t33 = turn[1] * t32;
-    const real t34 = t30 - t33;
-    const real t35 = turn[1] * t34;
-    const real t36 = t29 - t35;
-    S_I[0] = t36;
-    const real t37 = turn[1] * t28;
-    const real t38 = turn[0] * t34;
-    const real t39 = t37 + t38;
-    const real t40 = link[0] * t39;
-    S_I[1] = t40;
-    const real t41 = link[1] * t39;
-    S_I[2] = t41;
-    const real t42 = S_K[2] * t15;
-    const real t43 = S_K[3] - t42;
-    const real t44 = turn[0] * t43;
-    const real t45 = S_K[8] - b[3];
-    const real t46 = S_K[7] * t15;
-    const real t47 = t45 - t46;
-    const real t48 = turn[1] * t47;
-    const real t49 = t44 - t48;
-    const real t50 = turn[0] * t49;
-    const real t51 = b[3] + S_K[4];
-    const real t52 = S_K[2] * t17;
-    const real t53 = t51 - t52;
-    const real t54 = turn[0] * t53;
-    const real t55 = S_K[7] * t17;
-    const real t56 = S_K[9] - t55;
-    const real t57 = turn[1] * t56;
-    const real t58 = t54 - t57;
-    const real t59 = turn[1] * t58;
-    const real t60 = t50 - t59;
-    const real t61 = d[0] * t39;
-    const real t62 = t60 - t61;
-    S_I[3] = t62;
-    const real t63 = turn[1] * t49;
-    const real t64 = turn[0] * t58;
-    const real t65 = t63 + t64;
-    const real t66 = d[0] * t36;
-    const real t67 = t65 + t66;
-    const real t68 = link[0] * t67;
-    const real t69 = S_K[5] - b[2];
-    const real t70 = S_K[2] * t18;
-    const real t71 = t69 - t70;
-    const real t72 = turn[0] * t71;
-    const real t73 = b[1] + S_K[10];
-    const real t74 = S_K[7] * t18;
-    const real t75 = t73 - t74;
-    const real t76 = turn[1] * t75;
-    const real t77 = t72 - t76;
-    const real t78 = link[1] * t77;
-    const real t79 = t68 - t78;
-    const real t80 = link[2] * t41;
-    const real t81 = t79 - t80;
-    S_I[4] = t81;
-    const real t82 = link[1] * t67;
-    const real t83 = link[0] * t77;
-    const real t84 = t82 + t83;
-    const real t85 = link[2] * t40;
-    const real t86 = t84 + t85;
-    S_I[5] = t86;
-    const real t87 = turn[1] * t23;
-    const real t88 = t30 + t87;
-    const real t89 = turn[1] * t88;
-    const real t90 = turn[0] * t32;
-    const real t91 = t27 + t90;
-    const real t92 = turn[0] * t91;
-    const real t93 = t89 + t92;
-    const real t94 = link[0] * t93;
-    const real t95 = link[0] * t94;
-    S_I[6] = t95;
-    const real t96 = link[1] * t94;
-    S_I[7] = t96;
-    const real t97 = turn[1] * t43;
-    const real t98 = turn[0] * t47;
-    const real t99 = t97 + t98;
-    const real t100 = turn[0] * t99;
-    const real t101 = turn[1] * t53;
-    const real t102 = turn[0] * t56;
-    const real t103 = t101 + t102;
-    const real t104 = turn[1] * t103;
-    const real t105 = t100 - t104;
-    const real t106 = d[0] * t93;
-    const real t107 = t105 - t106;
-    const real t108 = link[0] * t107;
-    S_I[8] = t108;
-    const real t109 = turn[1] * t99;
-    const real t110 = turn[0] * t103;
-    const real t111 = t109 + t110;
-    const real t112 = t111 + t61;
-    const real t113 = link[0] * t112;
-    const real t114 = link[0] * t113;
-    const real t115 = turn[1] * t71;
-    const real t116 = turn[0] * t75;
-    const real t117 = t115 + t116;
-    const real t118 = link[0] * t117;
-    const real t119 = link[1] * t118;
-    const real t120 = t114 - t119;
-    const real t121 = link[2] * t96;
-    const real t122 = t120 - t121;
-    S_I[9] = t122;
-    const real t123 = link[1] * t113;
-    const real t124 = link[0] * t118;
-    const real t125 = t123 + t124;
-    const real t126 = link[2] * t95;
-    const real t127 = t125 + t126;
-    S_I[10] = t127;
-    const real t128 = link[1] * t93;
-    const real t129 = link[1] * t128;
-    S_I[11] = t129;
-    const real t130 = link[1] * t107;
-    S_I[12] = t130;
-    const real t131 = link[1] * t112;
-    const real t132 = link[0] * t131;
-    const real t133 = link[1] * t117;
-    const real t134 = link[1] * t133;
-    const real t135 = t132 - t134;
-    const real t136 = link[2] * t129;
-    const real t137 = t135 - t136;
-    S_I[13] = t137;
-    const real t138 = link[1] * t131;
-    const real t139 = link[0] * t133;
-    const real t140 = t138 + t139;
-    const real t141 = t140 + t121;
-    S_I[14] = t141;
-    const real t142 = b[4] + S_K[15];
-    const real t143 = t14 * t15;
-    const real t144 = t142 - t143;
-    const real t145 = turn[0] * t144;
-    const real t146 = b[5] + S_K[16];
-    const real t147 = t14 * t17;
-    const real t148 = t146 - t147;
-    const real t149 = turn[1] * t148;
-    const real t150 = t145 - t149;
-    const real t151 = turn[0] * t150;
-    const real t152 = turn[0] * t148;
-    const real t153 = b[7] + S_K[18];
-    const real t154 = t16 * t17;
-    const real t155 = t153 - t154;
-    const real t156 = turn[1] * t155;
-    const real t157 = t152 - t156;
-    const real t158 = turn[1] * t157;
-    const real t159 = t151 - t158;
-    const real t160 = t105 + t107;
-    const real t161 = d[0] * t160;
-    const real t162 = t159 - t161;
-    S_I[15] = t162;
-    const real t163 = turn[1] * t150;
-    const real t164 = turn[0] * t157;
-    const real t165 = t163 + t164;
-    const real t166 = t60 - t112;
-    const real t167 = d[0] * t166;
-    const real t168 = t165 + t167;
-    const real t169 = link[0] * t168;
-    const real t170 = b[6] + S_K[17];
-    const real t171 = t14 * t18;
-    const real t172 = t170 - t171;
-    const real t173 = turn[0] * t172;
-    const real t174 = b[8] + S_K[19];
-    const real t175 = t16 * t18;
-    const real t176 = t174 - t175;
-    const real t177 = turn[1] * t176;
-    const real t178 = t173 - t177;
-    const real t179 = d[0] * t117;
-    const real t180 = t178 - t179;
-    const real t181 = link[1] * t180;
-    const real t182 = t169 - t181;
-    const real t183 = link[2] * t130;
-    const real t184 = t182 - t183;
-    S_I[16] = t184;
-    const real t185 = link[1] * t168;
-    const real t186 = link[0] * t180;
-    const real t187 = t185 + t186;
-    const real t188 = link[2] * t108;
-    const real t189 = t187 + t188;
-    S_I[17] = t189;
-    const real t190 = turn[1] * t144;
-    const real t191 = t152 + t190;
-    const real t192 = turn[1] * t191;
-    const real t193 = turn[0] * t155;
-    const real t194 = t149 + t193;
-    const real t195 = turn[0] * t194;
-    const real t196 = t192 + t195;
-    const real t197 = t65 + t67;
-    const real t198 = d[0] * t197;
-    const real t199 = t196 + t198;
-    const real t200 = link[0] * t199;
-    const real t201 = turn[1] * t172;
-    const real t202 = turn[0] * t176;
-    const real t203 = t201 + t202;
-    const real t204 = d[0] * t77;
-    const real t205 = t203 + t204;
-    const real t206 = link[1] * t205;
-    const real t207 = t200 - t206;
-    const real t208 = link[0] * t207;
-    const real t209 = link[0] * t205;
-    const real t210 = b[9] + S_K[20];
-    const real t211 = S_K[14] * t18;
-    const real t212 = t210 - t211;
-    const real t213 = link[1] * t212;
-    const real t214 = t209 - t213;
-    const real t215 = link[1] * t214;
-    const real t216 = t208 - t215;
-    const real t217 = t135 + t137;
-    const real t218 = link[2] * t217;
-    const real t219 = t216 - t218;
-    S_I[18] = t219;
-    const real t220 = link[1] * t207;
-    const real t221 = link[0] * t214;
-    const real t222 = t220 + t221;
-    const real t223 = t120 - t141;
-    const real t224 = link[2] * t223;
-    const real t225 = t222 + t224;
-    S_I[19] = t225;
-    const real t226 = link[1] * t199;
-    const real t227 = t209 + t226;
-    const real t228 = link[1] * t227;
-    const real t229 = link[0] * t212;
-    const real t230 = t206 + t229;
-    const real t231 = link[0] * t230;
-    const real t232 = t228 + t231;
-    const real t233 = t125 + t127;
-    const real t234 = link[2] * t233;
-    const real t235 = t232 + t234;
-    S_I[20] = t235;
-    const real t236 = e_K[0] + e_B[0];
-    const real t237 = t12 * t20;
-    const real t238 = t236 + t237;
-    const real t239 = turn[0] * t238;
-    const real t240 = e_K[1] + e_B[1];
-    const real t241 = t13 * t20;
-    const real t242 = t240 + t241;
-    const real t243 = turn[1] * t242;
-    const real t244 = t239 - t243;
-    e_I[0] = t244;
-    const real t245 = turn[1] * t238;
-    const real t246 = turn[0] * t242;
-    const real t247 = t245 + t246;
-    const real t248 = link[0] * t247;
-    const real t249 = link[1] * tau[0];
-    const real t250 = t248 - t249;
-    e_I[1] = t250;
-    const real t251 = link[1] * t247;
-    const real t252 = link[0] * tau[0];
-    const real t253 = t251 + t252;
-    e_I[2] = t253;
-    const real t254 = e_K[3] + e_B[3];
-    const real t255 = t15 * t20;
-    const real t256 = t254 + t255;
-    const real t257 = turn[0] * t256;
-    const real t258 = e_K[4] + e_B[4];
-    const real t259 = t17 * t20;
-    const real t260 = t258 + t259;
-    const real t261 = turn[1] * t260;
-    const real t262 = t257 - t261;
-    const real t263 = d[0] * t247;
-    const real t264 = t262 - t263;
-    e_I[3] = t264;
-    const real t265 = turn[1] * t256;
-    const real t266 = turn[0] * t260;
-    const real t267 = t265 + t266;
-    const real t268 = d[0] * t244;
-    const real t269 = t267 + t268;
-    const real t270 = link[0] * t269;
-    const real t271 = e_K[5] + e_B[5];
-    const real t272 = t18 * t20;
-    const real t273 = t271 + t272;
-    const real t274 = link[1] * t273;
-    const real t275 = t270 - t274;
-    const real t276 = link[2] * t253;
-    const real t277 = t275 - t276;
-    e_I[4] = t277;
-    const real t278 = link[1] * t269;
-    const real t279 = link[0] * t273;
-    const real t280 = t278 + t279;
-    const real t281 = link[2] * t250;
-    const real t282 = t280 + t281;
-    e_I[5] = t282;
-    return 0;
+  (void)p;
+  real t0 = b[0] + S_K[11];
+  real t1 = 0.0 < t0;
+  if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t3 = b[0] * ((real)1 / (real)100000000000000);
+  real t4 = b[0] + S_K[0];
+  real t5 = b[0] + S_K[6];
+  real t8 = ((real)1 / (real)300000000000000) * (t0 + (t4 + t5));
+  if (!((((0.0 < b[0]) ? t3 : t8) < t0))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t11 = 1.0 / t0;
+  real t12 = S_K[2] * t11;
+  G[0] = t12;
+  real t13 = S_K[7] * t11;
+  G[1] = t13;
+  G[2] = 1.0;
+  real t14 = b[2] + S_K[12];
+  real t15 = t14 * t11;
+  G[3] = t15;
+  real t16 = S_K[13] - b[1];
+  real t17 = t16 * t11;
+  G[4] = t17;
+  real t18 = S_K[14] * t11;
+  G[5] = t18;
+  real t20 = tau[0] - (e_K[2] + e_B[2]);
+  g[0] = t11 * t20;
+  real t23 = t4 - S_K[2] * t12;
+  real t26 = S_K[1] - S_K[2] * t13;
+  real t27 = turn[1] * t26;
+  real t28 = turn[0] * t23 - t27;
+  real t30 = turn[0] * t26;
+  real t32 = t5 - S_K[7] * t13;
+  real t34 = t30 - turn[1] * t32;
+  real t36 = turn[0] * t28 - turn[1] * t34;
+  S_I[0] = t36;
+  real t39 = turn[1] * t28 + turn[0] * t34;
+  real t40 = link[0] * t39;
+  S_I[1] = t40;
+  real t41 = link[1] * t39;
+  S_I[2] = t41;
+  real t43 = S_K[3] - S_K[2] * t15;
+  real t47 = S_K[8] - b[3] - S_K[7] * t15;
+  real t49 = turn[0] * t43 - turn[1] * t47;
+  real t53 = b[3] + S_K[4] - S_K[2] * t17;
+  real t56 = S_K[9] - S_K[7] * t17;
+  real t58 = turn[0] * t53 - turn[1] * t56;
+  real t60 = turn[0] * t49 - turn[1] * t58;
+  real t61 = d[0] * t39;
+  S_I[3] = t60 - t61;
+  real t65 = turn[1] * t49 + turn[0] * t58;
+  real t67 = t65 + d[0] * t36;
+  real t71 = S_K[5] - b[2] - S_K[2] * t18;
+  real t75 = b[1] + S_K[10] - S_K[7] * t18;
+  real t77 = turn[0] * t71 - turn[1] * t75;
+  S_I[4] = link[0] * t67 - link[1] * t77 - link[2] * t41;
+  S_I[5] = link[1] * t67 + link[0] * t77 + link[2] * t40;
+  real t93 = turn[1] * (t30 + turn[1] * t23) + turn[0] * (t27 + turn[0] * t32);
+  real t94 = link[0] * t93;
+  real t95 = link[0] * t94;
+  S_I[6] = t95;
+  real t96 = link[1] * t94;
+  S_I[7] = t96;
+  real t99 = turn[1] * t43 + turn[0] * t47;
+  real t103 = turn[1] * t53 + turn[0] * t56;
+  real t105 = turn[0] * t99 - turn[1] * t103;
+  real t107 = t105 - d[0] * t93;
+  real t108 = link[0] * t107;
+  S_I[8] = t108;
+  real t112 = turn[1] * t99 + turn[0] * t103 + t61;
+  real t113 = link[0] * t112;
+  real t117 = turn[1] * t71 + turn[0] * t75;
+  real t118 = link[0] * t117;
+  real t120 = link[0] * t113 - link[1] * t118;
+  real t121 = link[2] * t96;
+  S_I[9] = t120 - t121;
+  real t125 = link[1] * t113 + link[0] * t118;
+  real t127 = t125 + link[2] * t95;
+  S_I[10] = t127;
+  real t129 = link[1] * (link[1] * t93);
+  S_I[11] = t129;
+  real t130 = link[1] * t107;
+  S_I[12] = t130;
+  real t131 = link[1] * t112;
+  real t133 = link[1] * t117;
+  real t135 = link[0] * t131 - link[1] * t133;
+  real t137 = t135 - link[2] * t129;
+  S_I[13] = t137;
+  real t141 = link[1] * t131 + link[0] * t133 + t121;
+  S_I[14] = t141;
+  real t144 = b[4] + S_K[15] - t14 * t15;
+  real t148 = b[5] + S_K[16] - t14 * t17;
+  real t149 = turn[1] * t148;
+  real t150 = turn[0] * t144 - t149;
+  real t152 = turn[0] * t148;
+  real t155 = b[7] + S_K[18] - t16 * t17;
+  real t157 = t152 - turn[1] * t155;
+  S_I[15] = turn[0] * t150 - turn[1] * t157 - d[0] * (t105 + t107);
+  real t168 = turn[1] * t150 + turn[0] * t157 + d[0] * (t60 - t112);
+  real t172 = b[6] + S_K[17] - t14 * t18;
+  real t176 = b[8] + S_K[19] - t16 * t18;
+  real t180 = turn[0] * t172 - turn[1] * t176 - d[0] * t117;
+  S_I[16] = link[0] * t168 - link[1] * t180 - link[2] * t130;
+  S_I[17] = link[1] * t168 + link[0] * t180 + link[2] * t108;
+  real t199 = turn[1] * (t152 + turn[1] * t144) + turn[0] * (t149 + turn[0] * t155) + d[0] * (t65 +
+    t67);
+  real t205 = turn[1] * t172 + turn[0] * t176 + d[0] * t77;
+  real t206 = link[1] * t205;
+  real t207 = link[0] * t199 - t206;
+  real t209 = link[0] * t205;
+  real t212 = b[9] + S_K[20] - S_K[14] * t18;
+  real t214 = t209 - link[1] * t212;
+  S_I[18] = link[0] * t207 - link[1] * t214 - link[2] * (t135 + t137);
+  S_I[19] = link[1] * t207 + link[0] * t214 + link[2] * (t120 - t141);
+  S_I[20] = link[1] * (t209 + link[1] * t199) + link[0] * (t206 + link[0] * t212) + link[2] * (t125
+    + t127);
+  real t238 = e_K[0] + e_B[0] + t12 * t20;
+  real t242 = e_K[1] + e_B[1] + t13 * t20;
+  real t244 = turn[0] * t238 - turn[1] * t242;
+  e_I[0] = t244;
+  real t247 = turn[1] * t238 + turn[0] * t242;
+  real t250 = link[0] * t247 - link[1] * tau[0];
+  e_I[1] = t250;
+  real t253 = link[1] * t247 + link[0] * tau[0];
+  e_I[2] = t253;
+  real t256 = e_K[3] + e_B[3] + t15 * t20;
+  real t260 = e_K[4] + e_B[4] + t17 * t20;
+  e_I[3] = turn[0] * t256 - turn[1] * t260 - d[0] * t247;
+  real t269 = turn[1] * t256 + turn[0] * t260 + d[0] * t244;
+  real t273 = e_K[5] + e_B[5] + t18 * t20;
+  e_I[4] = link[0] * t269 - link[1] * t273 - link[2] * t253;
+  e_I[5] = link[1] * t269 + link[0] * t273 + link[2] * t250;
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_prismatic_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -667,143 +266,66 @@ static const mstmm_guard mstmm_sweep_link_prismatic_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_prismatic_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_prismatic_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = link[2] * delta_I[5];
-    const real t1 = delta_I[1] + t0;
-    const real t2 = link[1] * t1;
-    const real t3 = link[2] * delta_I[4];
-    const real t4 = delta_I[2] - t3;
-    const real t5 = link[0] * t4;
-    const real t6 = t2 - t5;
-    const real t7 = link[0] * delta_I[4];
-    const real t8 = link[1] * delta_I[5];
-    const real t9 = t7 + t8;
-    const real t10 = d[0] * t9;
-    const real t11 = delta_I[0] + t10;
-    const real t12 = turn[0] * t11;
-    const real t13 = link[0] * t1;
-    const real t14 = link[1] * t4;
-    const real t15 = t13 + t14;
-    const real t16 = d[0] * delta_I[3];
-    const real t17 = t15 - t16;
-    const real t18 = turn[1] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = G[0] * t19;
-    const real t21 = turn[0] * t17;
-    const real t22 = turn[1] * t11;
-    const real t23 = t21 - t22;
-    const real t24 = G[1] * t23;
-    const real t25 = t20 + t24;
-    const real t26 = t6 - t25;
-    const real t27 = turn[0] * delta_I[3];
-    const real t28 = turn[1] * t9;
-    const real t29 = t27 + t28;
-    const real t30 = G[3] * t29;
-    const real t31 = t26 - t30;
-    const real t32 = turn[0] * t9;
-    const real t33 = turn[1] * delta_I[3];
-    const real t34 = t32 - t33;
-    const real t35 = G[4] * t34;
-    const real t36 = t31 - t35;
-    const real t37 = link[0] * delta_I[5];
-    const real t38 = link[1] * delta_I[4];
-    const real t39 = t37 - t38;
-    const real t40 = G[5] * t39;
-    const real t41 = t36 - t40;
-    const real t42 = g[0] + t41;
-    udot[0] = t42;
-    delta[0] = t19;
-    delta[1] = t23;
-    const real t43 = t5 - t2;
-    const real t44 = t43 + t42;
-    delta[2] = t44;
-    delta[3] = t29;
-    delta[4] = t34;
-    delta[5] = t39;
-    return 0;
+  (void)p;
+  real t1 = delta_I[1] + link[2] * delta_I[5];
+  real t2 = link[1] * t1;
+  real t4 = delta_I[2] - link[2] * delta_I[4];
+  real t5 = link[0] * t4;
+  real t9 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t11 = delta_I[0] + d[0] * t9;
+  real t17 = link[0] * t1 + link[1] * t4 - d[0] * delta_I[3];
+  real t19 = turn[0] * t11 + turn[1] * t17;
+  real t23 = turn[0] * t17 - turn[1] * t11;
+  real t29 = turn[0] * delta_I[3] + turn[1] * t9;
+  real t34 = turn[0] * t9 - turn[1] * delta_I[3];
+  real t39 = link[0] * delta_I[5] - link[1] * delta_I[4];
+  real t42 = g[0] + (t2 - t5 - (G[0] * t19 + G[1] * t23) - G[3] * t29 - G[4] * t34 - G[5] * t39);
+  udot[0] = t42;
+  delta[0] = t19;
+  delta[1] = t23;
+  delta[2] = t5 - t2 + t42;
+  delta[3] = t29;
+  delta[4] = t34;
+  delta[5] = t39;
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_prismatic_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_turn,
-        .call = mstmm_sweep_link_prismatic_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_prismatic_turn_inputs,
-        .outputs = mstmm_sweep_link_prismatic_turn_outputs,
-        .ir_hash = "bab9e9f3e40768807bd8188627264609a88b743a08d228e70b1c50aaf0bb51d0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_forward,
-        .call = mstmm_sweep_link_prismatic_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_prismatic_forward_inputs,
-        .outputs = mstmm_sweep_link_prismatic_forward_outputs,
-        .ir_hash = "2be8e75c3051c5e78def388ee82b6e5e1f176984d0c6a74d87f2e401f0df89b0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_condense,
-        .call = mstmm_sweep_link_prismatic_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_prismatic_condense_inputs,
-        .outputs = mstmm_sweep_link_prismatic_condense_outputs,
-        .ir_hash = "ef16e281c3d217f01d0f5651fef9a9056f50aca3723d692dc363f7decdbd5877",
-        .n_guards = 3,
-        .guards = mstmm_sweep_link_prismatic_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_recover,
-        .call = mstmm_sweep_link_prismatic_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_prismatic_recover_inputs,
-        .outputs = mstmm_sweep_link_prismatic_recover_outputs,
-        .ir_hash = "64f7624ea000ea59dfd4b77f741efd92d7827c72012ad3f5f399f15b53ad181c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_turn), 2, 1, (const mstmm_port[]){{"link", 5,
+    "", 0, 0}, {"q", 1, "", 0, 0}}, (const mstmm_port[]){{"turn", 1, "rad", 0, 0}},
+    "931a92193cb28554a5b77b04041a9e6aad675494b2f4df1b73e88255c793f43a", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_forward), 7, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0,
+    0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d", 1, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot",
+    1, "", 0, 0}}, "80f0718d28a5f223c3cfb8116c8e576e150c628e8a4fdcc1632d35e206b5f37b", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_condense), 9, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "",
+    0, 0}, {"p", 0, "", 0, 0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6,
+    "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1,
+    "", 0, 0}, {"S_I", 21, "", 0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "5075c5f90c446b84b52335a68f0652aa8ab15bdcac1cbd9a9421cee5aeb0f439", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_recover), 7, 2, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 0, "", 0,
+    0}, {"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "126f64a15b91afb6597d5d4009f09d2bb5dbc064eef30e9b441add1b6c07bcde", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_link_prismatic = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_prismatic",
-    .hash = "a5af4e0f27d3710ceb96dd93a6e02225e121c22263bd66d9b94513f8454d6d33",
+    .hash = "70a5ec5f3d55ad178931d5522073ba16e712aa2fff507c9ff6248f6a10426012",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,49 +7,19 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_prismatic_rotor;
-int mstmm_sweep_link_prismatic_rotor_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_prismatic_rotor_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_prismatic_rotor_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_prismatic_rotor_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the prismatic hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[1] coordinates: displacement [m]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_prismatic_rotor_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_prismatic_rotor_turn(in_t link, in_t q, out_t turn)
 {
-    (void)q;
-    turn[0] = link[3];
-    return 0;
+  (void)q;
+  turn[0] = link[3];
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_rotor_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_rotor_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_rotor_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,215 +36,65 @@ static const mstmm_port mstmm_sweep_link_prismatic_rotor_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_prismatic_rotor_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_prismatic_rotor_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    (void)p;
-    const real t0 = link[4] + q[0];
-    d[0] = t0;
-    const real t1 = turn[0] * motion_I[0];
-    const real t2 = link[0] * motion_I[1];
-    const real t3 = link[1] * motion_I[2];
-    const real t4 = t2 + t3;
-    const real t5 = turn[1] * t4;
-    const real t6 = t1 + t5;
-    motion[0] = t6;
-    const real t7 = turn[0] * t4;
-    const real t8 = turn[1] * motion_I[0];
-    const real t9 = t7 - t8;
-    motion[1] = t9;
-    const real t10 = link[0] * motion_I[2];
-    const real t11 = link[1] * motion_I[1];
-    const real t12 = t10 - t11;
-    motion[2] = t12;
-    const real t13 = turn[0] * motion_I[3];
-    const real t14 = link[0] * motion_I[4];
-    const real t15 = link[1] * motion_I[5];
-    const real t16 = t14 + t15;
-    const real t17 = turn[1] * t16;
-    const real t18 = t13 + t17;
-    motion[3] = t18;
-    const real t19 = turn[0] * t16;
-    const real t20 = turn[1] * motion_I[3];
-    const real t21 = t19 - t20;
-    motion[4] = t21;
-    const real t22 = link[0] * motion_I[5];
-    const real t23 = link[1] * motion_I[4];
-    const real t24 = t22 - t23;
-    motion[5] = t24;
-    const real t25 = motion_I[1] * motion_I[1];
-    const real t26 = motion_I[2] * motion_I[2];
-    const real t27 = t25 + t26;
-    const real t28 = link[2] * t27;
-    const real t29 = motion_I[6] - t28;
-    const real t30 = motion_I[0] * t12;
-    const real t31 = t16 + t30;
-    const real t32 = t0 * t31;
-    const real t33 = t29 + t32;
-    const real t34 = turn[0] * t33;
-    const real t35 = motion_I[0] * motion_I[1];
-    const real t36 = motion_I[5] + t35;
-    const real t37 = link[2] * t36;
-    const real t38 = motion_I[7] + t37;
-    const real t39 = link[0] * t38;
-    const real t40 = motion_I[0] * motion_I[2];
-    const real t41 = t40 - motion_I[4];
-    const real t42 = link[2] * t41;
-    const real t43 = motion_I[8] + t42;
-    const real t44 = link[1] * t43;
-    const real t45 = t39 + t44;
-    const real t46 = t4 * t12;
-    const real t47 = t46 - motion_I[3];
-    const real t48 = t0 * t47;
-    const real t49 = t45 + t48;
-    const real t50 = turn[1] * t49;
-    const real t51 = t34 + t50;
-    const real t52 = u[0] * t9;
-    const real t53 = 2.0 * t52;
-    const real t54 = t51 + t53;
-    motion[6] = t54;
-    const real t55 = turn[0] * t49;
-    const real t56 = turn[1] * t33;
-    const real t57 = t55 - t56;
-    const real t58 = u[0] * t6;
-    const real t59 = 2.0 * t58;
-    const real t60 = t57 - t59;
-    motion[7] = t60;
-    const real t61 = link[0] * t43;
-    const real t62 = link[1] * t38;
-    const real t63 = t61 - t62;
-    const real t64 = motion_I[0] * motion_I[0];
-    const real t65 = t4 * t4;
-    const real t66 = t64 + t65;
-    const real t67 = t0 * t66;
-    const real t68 = t63 - t67;
-    motion[8] = t68;
-    const real t69 = b[0] * t54;
-    const real t70 = t23 - t22;
-    const real t71 = t6 * t9;
-    const real t72 = t70 + t71;
-    const real t73 = b[2] * t72;
-    const real t74 = t12 * t6;
-    const real t75 = t21 + t74;
-    const real t76 = b[3] * t75;
-    const real t77 = t73 + t76;
-    const real t78 = t12 * t12;
-    const real t79 = t9 * t9;
-    const real t80 = t78 + t79;
-    const real t81 = b[1] * t80;
-    const real t82 = t77 - t81;
-    const real t83 = t69 + t82;
-    e_B[0] = t83;
-    const real t84 = b[0] * t60;
-    const real t85 = t24 + t71;
-    const real t86 = b[1] * t85;
-    const real t87 = t12 * t9;
-    const real t88 = t87 - t18;
-    const real t89 = b[3] * t88;
-    const real t90 = t86 + t89;
-    const real t91 = t6 * t6;
-    const real t92 = t78 + t91;
-    const real t93 = b[2] * t92;
-    const real t94 = t90 - t93;
-    const real t95 = t84 + t94;
-    e_B[1] = t95;
-    const real t96 = b[0] * t68;
-    const real t97 = t20 - t19;
-    const real t98 = t74 + t97;
-    const real t99 = b[1] * t98;
-    const real t100 = t18 + t87;
-    const real t101 = b[2] * t100;
-    const real t102 = t99 + t101;
-    const real t103 = t79 + t91;
-    const real t104 = b[3] * t103;
-    const real t105 = t102 - t104;
-    const real t106 = t96 + t105;
-    e_B[2] = t106;
-    const real t107 = b[6] * t24;
-    const real t108 = b[5] * t21;
-    const real t109 = b[4] * t18;
-    const real t110 = b[2] * t68;
-    const real t111 = b[9] * t12;
-    const real t112 = b[6] * t6;
-    const real t113 = b[8] * t9;
-    const real t114 = t112 + t113;
-    const real t115 = t111 + t114;
-    const real t116 = t9 * t115;
-    const real t117 = b[8] * t12;
-    const real t118 = b[5] * t6;
-    const real t119 = b[7] * t9;
-    const real t120 = t118 + t119;
-    const real t121 = t117 + t120;
-    const real t122 = t12 * t121;
-    const real t123 = t116 - t122;
-    const real t124 = t110 + t123;
-    const real t125 = b[3] * t60;
-    const real t126 = t124 - t125;
-    const real t127 = t109 + t126;
-    const real t128 = t108 + t127;
-    const real t129 = t107 + t128;
-    e_B[3] = t129;
-    const real t130 = b[8] * t24;
-    const real t131 = b[7] * t21;
-    const real t132 = b[5] * t18;
-    const real t133 = b[3] * t54;
-    const real t134 = b[6] * t12;
-    const real t135 = b[4] * t6;
-    const real t136 = b[5] * t9;
-    const real t137 = t135 + t136;
-    const real t138 = t134 + t137;
-    const real t139 = t12 * t138;
-    const real t140 = t6 * t115;
-    const real t141 = t139 - t140;
-    const real t142 = b[1] * t68;
-    const real t143 = t141 - t142;
-    const real t144 = t133 + t143;
-    const real t145 = t132 + t144;
-    const real t146 = t131 + t145;
-    const real t147 = t130 + t146;
-    e_B[4] = t147;
-    const real t148 = b[9] * t24;
-    const real t149 = b[8] * t21;
-    const real t150 = b[6] * t18;
-    const real t151 = b[1] * t60;
-    const real t152 = t6 * t121;
-    const real t153 = t9 * t138;
-    const real t154 = t152 - t153;
-    const real t155 = t151 + t154;
-    const real t156 = b[2] * t54;
-    const real t157 = t155 - t156;
-    const real t158 = t150 + t157;
-    const real t159 = t149 + t158;
-    const real t160 = t148 + t159;
-    e_B[5] = t160;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  real t0 = link[4] + q[0];
+  d[0] = t0;
+  real t4 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t6 = turn[0] * motion_I[0] + turn[1] * t4;
+  motion[0] = t6;
+  real t9 = turn[0] * t4 - turn[1] * motion_I[0];
+  motion[1] = t9;
+  real t12 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  motion[2] = t12;
+  real t16 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t18 = turn[0] * motion_I[3] + turn[1] * t16;
+  motion[3] = t18;
+  real t19 = turn[0] * t16;
+  real t20 = turn[1] * motion_I[3];
+  real t21 = t19 - t20;
+  motion[4] = t21;
+  real t22 = link[0] * motion_I[5];
+  real t23 = link[1] * motion_I[4];
+  real t24 = t22 - t23;
+  motion[5] = t24;
+  real t33 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) + t0 *
+    (t16 + motion_I[0] * t12);
+  real t38 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t43 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t49 = link[0] * t38 + link[1] * t43 + t0 * (t4 * t12 - motion_I[3]);
+  real t54 = turn[0] * t33 + turn[1] * t49 + 2.0 * (u[0] * t9);
+  motion[6] = t54;
+  real t60 = turn[0] * t49 - turn[1] * t33 - 2.0 * (u[0] * t6);
+  motion[7] = t60;
+  real t68 = link[0] * t43 - link[1] * t38 - t0 * (motion_I[0] * motion_I[0] + t4 * t4);
+  motion[8] = t68;
+  real t71 = t6 * t9;
+  real t74 = t12 * t6;
+  real t78 = t12 * t12;
+  real t79 = t9 * t9;
+  e_B[0] = b[0] * t54 + (b[2] * (t23 - t22 + t71) + b[3] * (t21 + t74) - b[1] * (t78 + t79));
+  real t87 = t12 * t9;
+  real t91 = t6 * t6;
+  e_B[1] = b[0] * t60 + (b[1] * (t24 + t71) + b[3] * (t87 - t18) - b[2] * (t78 + t91));
+  e_B[2] = b[0] * t68 + (b[1] * (t74 + (t20 - t19)) + b[2] * (t18 + t87) - b[3] * (t79 + t91));
+  real t115 = b[9] * t12 + (b[6] * t6 + b[8] * t9);
+  real t121 = b[8] * t12 + (b[5] * t6 + b[7] * t9);
+  e_B[3] = b[6] * t24 + (b[5] * t21 + (b[4] * t18 + (b[2] * t68 + (t9 * t115 - t12 * t121) - b[3] *
+    t60)));
+  real t138 = b[6] * t12 + (b[4] * t6 + b[5] * t9);
+  e_B[4] = b[8] * t24 + (b[7] * t21 + (b[5] * t18 + (b[3] * t54 + (t12 * t138 - t6 * t115 - b[1] *
+    t68))));
+  e_B[5] = b[9] * t24 + (b[8] * t21 + (b[6] * t18 + (b[1] * t60 + (t6 * t121 - t9 * t138) - b[2] *
+    t54)));
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_rotor_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_rotor_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_rotor_forward, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -293,428 +113,162 @@ static const mstmm_port mstmm_sweep_link_prismatic_rotor_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_prismatic_rotor_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_prismatic_rotor_condense(in_t link, in_t turn, in_t d, in_t b, in_t p,
+    in_t S_K, in_t e_K, in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    (void)p;
-    const real t0 = b[0] + S_K[11];
-    const real t1 = b[10] + t0;
-    const real t2 = 0.0 < t1;
-    if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t3 = 0.0 < b[0];
-    const real t4 = b[0] * ((real)1 / (real)100000000000000);
-    const real t5 = b[0] + S_K[0];
-    const real t6 = b[0] + S_K[6];
-    const real t7 = t5 + t6;
-    const real t8 = t0 + t7;
-    const real t9 = ((real)1 / (real)300000000000000) * t8;
-    const real t10 = t3 != 0 ? t4 : t9;
-    const real t11 = t10 < t1;
-    if (!(t11 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t12 = 1.0 / t1;
-    const real t13 = S_K[2] * t12;
-    G[0] = t13;
-    const real t14 = S_K[7] * t12;
-    G[1] = t14;
-    const real t15 = t0 * t12;
-    G[2] = t15;
-    const real t16 = b[2] + S_K[12];
-    const real t17 = t16 * t12;
-    G[3] = t17;
-    const real t18 = S_K[13] - b[1];
-    const real t19 = t18 * t12;
-    G[4] = t19;
-    const real t20 = S_K[14] * t12;
-    G[5] = t20;
-    const real t21 = e_K[2] + e_B[2];
-    const real t22 = tau[0] - t21;
-    const real t23 = t12 * t22;
-    g[0] = t23;
-    const real t24 = S_K[2] * t13;
-    const real t25 = t5 - t24;
-    const real t26 = turn[0] * t25;
-    const real t27 = S_K[2] * t14;
-    const real t28 = S_K[1] - t27;
-    const real t29 = turn[1] * t28;
-    const real t30 = t26 - t29;
-    const real t31 = turn[0] * t30;
-    const real t32 = turn[0] * t28;
-    const real t33 = S_K[7] * t14;
-    const real t34 = t6 - t33;
-    const real t35 = turn[1] * t34;
-    const real t36 = t32 - t35;
-    const real t37 = turn[1] * t36;
-    const real t38 = t31 - t37;
-    S_I[0] = t38;
-    const real t39 = turn[1] * t30;
-    const real t40 = turn[0] * t36;
-    const real t41 = t39 + t40;
-    const real t42 = link[0] * t41;
-    const real t43 = S_K[2] * t15;
-    const real t44 = S_K[2] - t43;
-    const real t45 = turn[0] * t44;
-    const real t46 = S_K[7] * t15;
-    const real t47 = S_K[7] - t46;
-    const real t48 = turn[1] * t47;
-    const real t49 = t45 - t48;
-    const real t50 = link[1] * t49;
-    const real t51 = t42 - t50;
-    S_I[1] = t51;
-    const real t52 = link[1] * t41;
-    const real t53 = link[0] * t49;
-    const real t54 = t52 + t53;
-    S_I[2] = t54;
-    const real t55 = S_K[2] * t17;
-    const real t56 = S_K[3] - t55;
-    const real t57 = turn[0] * t56;
-    const real t58 = S_K[8] - b[3];
-    const real t59 = S_K[7] * t17;
-    const real t60 = t58 - t59;
-    const real t61 = turn[1] * t60;
-    const real t62 = t57 - t61;
-    const real t63 = turn[0] * t62;
-    const real t64 = b[3] + S_K[4];
-    const real t65 = S_K[2] * t19;
-    const real t66 = t64 - t65;
-    const real t67 = turn[0] * t66;
-    const real t68 = S_K[7] * t19;
-    const real t69 = S_K[9] - t68;
-    const real t70 = turn[1] * t69;
-    const real t71 = t67 - t70;
-    const real t72 = turn[1] * t71;
-    const real t73 = t63 - t72;
-    const real t74 = d[0] * t41;
-    const real t75 = t73 - t74;
-    S_I[3] = t75;
-    const real t76 = turn[1] * t62;
-    const real t77 = turn[0] * t71;
-    const real t78 = t76 + t77;
-    const real t79 = d[0] * t38;
-    const real t80 = t78 + t79;
-    const real t81 = link[0] * t80;
-    const real t82 = S_K[5] - b[2];
-    const real t83 = S_K[2] * t20;
-    const real t84 = t82 - t83;
-    const real t85 = turn[0] * t84;
-    const real t86 = b[1] + S_K[10];
-    const real t87 = S_K[7] * t20;
-    const real t88 = t86 - t87;
-    const real t89 = turn[1] * t88;
-    const real t90 = t85 - t89;
-    const real t91 = link[1] * t90;
-    const real t92 = t81 - t91;
-    const real t93 = link[2] * t54;
-    const real t94 = t92 - t93;
-    S_I[4] = t94;
-    const real t95 = link[1] * t80;
-    const real t96 = link[0] * t90;
-    const real t97 = t95 + t96;
-    const real t98 = link[2] * t51;
-    const real t99 = t97 + t98;
-    S_I[5] = t99;
-    const real t100 = turn[1] * t25;
-    const real t101 = t32 + t100;
-    const real t102 = turn[1] * t101;
-    const real t103 = turn[0] * t34;
-    const real t104 = t29 + t103;
-    const real t105 = turn[0] * t104;
-    const real t106 = t102 + t105;
-    const real t107 = link[0] * t106;
-    const real t108 = turn[1] * t44;
-    const real t109 = turn[0] * t47;
-    const real t110 = t108 + t109;
-    const real t111 = link[1] * t110;
-    const real t112 = t107 - t111;
-    const real t113 = link[0] * t112;
-    const real t114 = link[0] * t110;
-    const real t115 = t0 * t15;
-    const real t116 = t0 - t115;
-    const real t117 = link[1] * t116;
-    const real t118 = t114 - t117;
-    const real t119 = link[1] * t118;
-    const real t120 = t113 - t119;
-    S_I[6] = t120;
-    const real t121 = link[1] * t112;
-    const real t122 = link[0] * t118;
-    const real t123 = t121 + t122;
-    S_I[7] = t123;
-    const real t124 = turn[1] * t56;
-    const real t125 = turn[0] * t60;
-    const real t126 = t124 + t125;
-    const real t127 = turn[0] * t126;
-    const real t128 = turn[1] * t66;
-    const real t129 = turn[0] * t69;
-    const real t130 = t128 + t129;
-    const real t131 = turn[1] * t130;
-    const real t132 = t127 - t131;
-    const real t133 = d[0] * t106;
-    const real t134 = t132 - t133;
-    const real t135 = link[0] * t134;
-    const real t136 = t0 * t17;
-    const real t137 = t16 - t136;
-    const real t138 = turn[0] * t137;
-    const real t139 = t0 * t19;
-    const real t140 = t18 - t139;
-    const real t141 = turn[1] * t140;
-    const real t142 = t138 - t141;
-    const real t143 = d[0] * t110;
-    const real t144 = t142 - t143;
-    const real t145 = link[1] * t144;
-    const real t146 = t135 - t145;
-    S_I[8] = t146;
-    const real t147 = turn[1] * t126;
-    const real t148 = turn[0] * t130;
-    const real t149 = t147 + t148;
-    const real t150 = t149 + t74;
-    const real t151 = link[0] * t150;
-    const real t152 = turn[1] * t137;
-    const real t153 = turn[0] * t140;
-    const real t154 = t152 + t153;
-    const real t155 = d[0] * t49;
-    const real t156 = t154 + t155;
-    const real t157 = link[1] * t156;
-    const real t158 = t151 - t157;
-    const real t159 = link[0] * t158;
-    const real t160 = turn[1] * t84;
-    const real t161 = turn[0] * t88;
-    const real t162 = t160 + t161;
-    const real t163 = link[0] * t162;
-    const real t164 = t0 * t20;
-    const real t165 = S_K[14] - t164;
-    const real t166 = link[1] * t165;
-    const real t167 = t163 - t166;
-    const real t168 = link[1] * t167;
-    const real t169 = t159 - t168;
-    const real t170 = link[2] * t123;
-    const real t171 = t169 - t170;
-    S_I[9] = t171;
-    const real t172 = link[1] * t158;
-    const real t173 = link[0] * t167;
-    const real t174 = t172 + t173;
-    const real t175 = link[2] * t120;
-    const real t176 = t174 + t175;
-    S_I[10] = t176;
-    const real t177 = link[1] * t106;
-    const real t178 = t114 + t177;
-    const real t179 = link[1] * t178;
-    const real t180 = link[0] * t116;
-    const real t181 = t111 + t180;
-    const real t182 = link[0] * t181;
-    const real t183 = t179 + t182;
-    S_I[11] = t183;
-    const real t184 = link[1] * t134;
-    const real t185 = link[0] * t144;
-    const real t186 = t184 + t185;
-    S_I[12] = t186;
-    const real t187 = link[1] * t150;
-    const real t188 = link[0] * t156;
-    const real t189 = t187 + t188;
-    const real t190 = link[0] * t189;
-    const real t191 = link[1] * t162;
-    const real t192 = link[0] * t165;
-    const real t193 = t191 + t192;
-    const real t194 = link[1] * t193;
-    const real t195 = t190 - t194;
-    const real t196 = link[2] * t183;
-    const real t197 = t195 - t196;
-    S_I[13] = t197;
-    const real t198 = link[1] * t189;
-    const real t199 = link[0] * t193;
-    const real t200 = t198 + t199;
-    const real t201 = t200 + t170;
-    S_I[14] = t201;
-    const real t202 = b[4] + S_K[15];
-    const real t203 = t16 * t17;
-    const real t204 = t202 - t203;
-    const real t205 = turn[0] * t204;
-    const real t206 = b[5] + S_K[16];
-    const real t207 = t16 * t19;
-    const real t208 = t206 - t207;
-    const real t209 = turn[1] * t208;
-    const real t210 = t205 - t209;
-    const real t211 = turn[0] * t210;
-    const real t212 = turn[0] * t208;
-    const real t213 = b[7] + S_K[18];
-    const real t214 = t18 * t19;
-    const real t215 = t213 - t214;
-    const real t216 = turn[1] * t215;
-    const real t217 = t212 - t216;
-    const real t218 = turn[1] * t217;
-    const real t219 = t211 - t218;
-    const real t220 = t132 + t134;
-    const real t221 = d[0] * t220;
-    const real t222 = t219 - t221;
-    S_I[15] = t222;
-    const real t223 = turn[1] * t210;
-    const real t224 = turn[0] * t217;
-    const real t225 = t223 + t224;
-    const real t226 = t73 - t150;
-    const real t227 = d[0] * t226;
-    const real t228 = t225 + t227;
-    const real t229 = link[0] * t228;
-    const real t230 = b[6] + S_K[17];
-    const real t231 = t16 * t20;
-    const real t232 = t230 - t231;
-    const real t233 = turn[0] * t232;
-    const real t234 = b[8] + S_K[19];
-    const real t235 = t18 * t20;
-    const real t236 = t234 - t235;
-    const real t237 = turn[1] * t236;
-    const real t238 = t233 - t237;
-    const real t239 = d[0] * t162;
-    const real t240 = t238 - t239;
-    const real t241 = link[1] * t240;
-    const real t242 = t229 - t241;
-    const real t243 = link[2] * t186;
-    const real t244 = t242 - t243;
-    S_I[16] = t244;
-    const real t245 = link[1] * t228;
-    const real t246 = link[0] * t240;
-    const real t247 = t245 + t246;
-    const real t248 = link[2] * t146;
-    const real t249 = t247 + t248;
-    S_I[17] = t249;
-    const real t250 = turn[1] * t204;
-    const real t251 = t212 + t250;
-    const real t252 = turn[1] * t251;
-    const real t253 = turn[0] * t215;
-    const real t254 = t209 + t253;
-    const real t255 = turn[0] * t254;
-    const real t256 = t252 + t255;
-    const real t257 = t78 + t80;
-    const real t258 = d[0] * t257;
-    const real t259 = t256 + t258;
-    const real t260 = link[0] * t259;
-    const real t261 = turn[1] * t232;
-    const real t262 = turn[0] * t236;
-    const real t263 = t261 + t262;
-    const real t264 = d[0] * t90;
-    const real t265 = t263 + t264;
-    const real t266 = link[1] * t265;
-    const real t267 = t260 - t266;
-    const real t268 = link[0] * t267;
-    const real t269 = link[0] * t265;
-    const real t270 = b[9] + S_K[20];
-    const real t271 = S_K[14] * t20;
-    const real t272 = t270 - t271;
-    const real t273 = link[1] * t272;
-    const real t274 = t269 - t273;
-    const real t275 = link[1] * t274;
-    const real t276 = t268 - t275;
-    const real t277 = t195 + t197;
-    const real t278 = link[2] * t277;
-    const real t279 = t276 - t278;
-    S_I[18] = t279;
-    const real t280 = link[1] * t267;
-    const real t281 = link[0] * t274;
-    const real t282 = t280 + t281;
-    const real t283 = t169 - t201;
-    const real t284 = link[2] * t283;
-    const real t285 = t282 + t284;
-    S_I[19] = t285;
-    const real t286 = link[1] * t259;
-    const real t287 = t269 + t286;
-    const real t288 = link[1] * t287;
-    const real t289 = link[0] * t272;
-    const real t290 = t266 + t289;
-    const real t291 = link[0] * t290;
-    const real t292 = t288 + t291;
-    const real t293 = t174 + t176;
-    const real t294 = link[2] * t293;
-    const real t295 = t292 + t294;
-    S_I[20] = t295;
-    const real t296 = e_K[0] + e_B[0];
-    const real t297 = t13 * t22;
-    const real t298 = t296 + t297;
-    const real t299 = turn[0] * t298;
-    const real t300 = e_K[1] + e_B[1];
-    const real t301 = t14 * t22;
-    const real t302 = t300 + t301;
-    const real t303 = turn[1] * t302;
-    const real t304 = t299 - t303;
-    e_I[0] = t304;
-    const real t305 = turn[1] * t298;
-    const real t306 = turn[0] * t302;
-    const real t307 = t305 + t306;
-    const real t308 = link[0] * t307;
-    const real t309 = t15 * t22;
-    const real t310 = t21 + t309;
-    const real t311 = link[1] * t310;
-    const real t312 = t308 - t311;
-    e_I[1] = t312;
-    const real t313 = link[1] * t307;
-    const real t314 = link[0] * t310;
-    const real t315 = t313 + t314;
-    e_I[2] = t315;
-    const real t316 = e_K[3] + e_B[3];
-    const real t317 = t17 * t22;
-    const real t318 = t316 + t317;
-    const real t319 = turn[0] * t318;
-    const real t320 = e_K[4] + e_B[4];
-    const real t321 = t19 * t22;
-    const real t322 = t320 + t321;
-    const real t323 = turn[1] * t322;
-    const real t324 = t319 - t323;
-    const real t325 = d[0] * t307;
-    const real t326 = t324 - t325;
-    e_I[3] = t326;
-    const real t327 = turn[1] * t318;
-    const real t328 = turn[0] * t322;
-    const real t329 = t327 + t328;
-    const real t330 = d[0] * t304;
-    const real t331 = t329 + t330;
-    const real t332 = link[0] * t331;
-    const real t333 = e_K[5] + e_B[5];
-    const real t334 = t20 * t22;
-    const real t335 = t333 + t334;
-    const real t336 = link[1] * t335;
-    const real t337 = t332 - t336;
-    const real t338 = link[2] * t315;
-    const real t339 = t337 - t338;
-    e_I[4] = t339;
-    const real t340 = link[1] * t331;
-    const real t341 = link[0] * t335;
-    const real t342 = t340 + t341;
-    const real t343 = link[2] * t312;
-    const real t344 = t342 + t343;
-    e_I[5] = t344;
-    return 0;
+  (void)p;
+  real t0 = b[0] + S_K[11];
+  real t1 = b[10] + t0;
+  real t2 = 0.0 < t1;
+  if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t2 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t4 = b[0] * ((real)1 / (real)100000000000000);
+  real t5 = b[0] + S_K[0];
+  real t6 = b[0] + S_K[6];
+  real t9 = ((real)1 / (real)300000000000000) * (t0 + (t5 + t6));
+  if (!((((0.0 < b[0]) ? t4 : t9) < t1))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t12 = 1.0 / t1;
+  real t13 = S_K[2] * t12;
+  G[0] = t13;
+  real t14 = S_K[7] * t12;
+  G[1] = t14;
+  real t15 = t0 * t12;
+  G[2] = t15;
+  real t16 = b[2] + S_K[12];
+  real t17 = t16 * t12;
+  G[3] = t17;
+  real t18 = S_K[13] - b[1];
+  real t19 = t18 * t12;
+  G[4] = t19;
+  real t20 = S_K[14] * t12;
+  G[5] = t20;
+  real t21 = e_K[2] + e_B[2];
+  real t22 = tau[0] - t21;
+  g[0] = t12 * t22;
+  real t25 = t5 - S_K[2] * t13;
+  real t28 = S_K[1] - S_K[2] * t14;
+  real t29 = turn[1] * t28;
+  real t30 = turn[0] * t25 - t29;
+  real t32 = turn[0] * t28;
+  real t34 = t6 - S_K[7] * t14;
+  real t36 = t32 - turn[1] * t34;
+  real t38 = turn[0] * t30 - turn[1] * t36;
+  S_I[0] = t38;
+  real t41 = turn[1] * t30 + turn[0] * t36;
+  real t44 = S_K[2] - S_K[2] * t15;
+  real t47 = S_K[7] - S_K[7] * t15;
+  real t49 = turn[0] * t44 - turn[1] * t47;
+  real t51 = link[0] * t41 - link[1] * t49;
+  S_I[1] = t51;
+  real t54 = link[1] * t41 + link[0] * t49;
+  S_I[2] = t54;
+  real t56 = S_K[3] - S_K[2] * t17;
+  real t60 = S_K[8] - b[3] - S_K[7] * t17;
+  real t62 = turn[0] * t56 - turn[1] * t60;
+  real t66 = b[3] + S_K[4] - S_K[2] * t19;
+  real t69 = S_K[9] - S_K[7] * t19;
+  real t71 = turn[0] * t66 - turn[1] * t69;
+  real t73 = turn[0] * t62 - turn[1] * t71;
+  real t74 = d[0] * t41;
+  S_I[3] = t73 - t74;
+  real t78 = turn[1] * t62 + turn[0] * t71;
+  real t80 = t78 + d[0] * t38;
+  real t84 = S_K[5] - b[2] - S_K[2] * t20;
+  real t88 = b[1] + S_K[10] - S_K[7] * t20;
+  real t90 = turn[0] * t84 - turn[1] * t88;
+  S_I[4] = link[0] * t80 - link[1] * t90 - link[2] * t54;
+  S_I[5] = link[1] * t80 + link[0] * t90 + link[2] * t51;
+  real t106 = turn[1] * (t32 + turn[1] * t25) + turn[0] * (t29 + turn[0] * t34);
+  real t110 = turn[1] * t44 + turn[0] * t47;
+  real t111 = link[1] * t110;
+  real t112 = link[0] * t106 - t111;
+  real t114 = link[0] * t110;
+  real t116 = t0 - t0 * t15;
+  real t118 = t114 - link[1] * t116;
+  real t120 = link[0] * t112 - link[1] * t118;
+  S_I[6] = t120;
+  real t123 = link[1] * t112 + link[0] * t118;
+  S_I[7] = t123;
+  real t126 = turn[1] * t56 + turn[0] * t60;
+  real t130 = turn[1] * t66 + turn[0] * t69;
+  real t132 = turn[0] * t126 - turn[1] * t130;
+  real t134 = t132 - d[0] * t106;
+  real t137 = t16 - t0 * t17;
+  real t140 = t18 - t0 * t19;
+  real t144 = turn[0] * t137 - turn[1] * t140 - d[0] * t110;
+  real t146 = link[0] * t134 - link[1] * t144;
+  S_I[8] = t146;
+  real t150 = turn[1] * t126 + turn[0] * t130 + t74;
+  real t156 = turn[1] * t137 + turn[0] * t140 + d[0] * t49;
+  real t158 = link[0] * t150 - link[1] * t156;
+  real t162 = turn[1] * t84 + turn[0] * t88;
+  real t165 = S_K[14] - t0 * t20;
+  real t167 = link[0] * t162 - link[1] * t165;
+  real t169 = link[0] * t158 - link[1] * t167;
+  real t170 = link[2] * t123;
+  S_I[9] = t169 - t170;
+  real t174 = link[1] * t158 + link[0] * t167;
+  real t176 = t174 + link[2] * t120;
+  S_I[10] = t176;
+  real t183 = link[1] * (t114 + link[1] * t106) + link[0] * (t111 + link[0] * t116);
+  S_I[11] = t183;
+  real t186 = link[1] * t134 + link[0] * t144;
+  S_I[12] = t186;
+  real t189 = link[1] * t150 + link[0] * t156;
+  real t193 = link[1] * t162 + link[0] * t165;
+  real t195 = link[0] * t189 - link[1] * t193;
+  real t197 = t195 - link[2] * t183;
+  S_I[13] = t197;
+  real t201 = link[1] * t189 + link[0] * t193 + t170;
+  S_I[14] = t201;
+  real t204 = b[4] + S_K[15] - t16 * t17;
+  real t208 = b[5] + S_K[16] - t16 * t19;
+  real t209 = turn[1] * t208;
+  real t210 = turn[0] * t204 - t209;
+  real t212 = turn[0] * t208;
+  real t215 = b[7] + S_K[18] - t18 * t19;
+  real t217 = t212 - turn[1] * t215;
+  S_I[15] = turn[0] * t210 - turn[1] * t217 - d[0] * (t132 + t134);
+  real t228 = turn[1] * t210 + turn[0] * t217 + d[0] * (t73 - t150);
+  real t232 = b[6] + S_K[17] - t16 * t20;
+  real t236 = b[8] + S_K[19] - t18 * t20;
+  real t240 = turn[0] * t232 - turn[1] * t236 - d[0] * t162;
+  S_I[16] = link[0] * t228 - link[1] * t240 - link[2] * t186;
+  S_I[17] = link[1] * t228 + link[0] * t240 + link[2] * t146;
+  real t259 = turn[1] * (t212 + turn[1] * t204) + turn[0] * (t209 + turn[0] * t215) + d[0] * (t78 +
+    t80);
+  real t265 = turn[1] * t232 + turn[0] * t236 + d[0] * t90;
+  real t266 = link[1] * t265;
+  real t267 = link[0] * t259 - t266;
+  real t269 = link[0] * t265;
+  real t272 = b[9] + S_K[20] - S_K[14] * t20;
+  real t274 = t269 - link[1] * t272;
+  S_I[18] = link[0] * t267 - link[1] * t274 - link[2] * (t195 + t197);
+  S_I[19] = link[1] * t267 + link[0] * t274 + link[2] * (t169 - t201);
+  S_I[20] = link[1] * (t269 + link[1] * t259) + link[0] * (t266 + link[0] * t272) + link[2] * (t174
+    + t176);
+  real t298 = e_K[0] + e_B[0] + t13 * t22;
+  real t302 = e_K[1] + e_B[1] + t14 * t22;
+  real t304 = turn[0] * t298 - turn[1] * t302;
+  e_I[0] = t304;
+  real t307 = turn[1] * t298 + turn[0] * t302;
+  real t310 = t21 + t15 * t22;
+  real t312 = link[0] * t307 - link[1] * t310;
+  e_I[1] = t312;
+  real t315 = link[1] * t307 + link[0] * t310;
+  e_I[2] = t315;
+  real t318 = e_K[3] + e_B[3] + t17 * t22;
+  real t322 = e_K[4] + e_B[4] + t19 * t22;
+  e_I[3] = turn[0] * t318 - turn[1] * t322 - d[0] * t307;
+  real t331 = turn[1] * t318 + turn[0] * t322 + d[0] * t304;
+  real t335 = e_K[5] + e_B[5] + t20 * t22;
+  e_I[4] = link[0] * t331 - link[1] * t335 - link[2] * t315;
+  e_I[5] = link[1] * t331 + link[0] * t335 + link[2] * t312;
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_rotor_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_rotor_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_prismatic_rotor_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_rotor_condense, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], in[7], in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the prismatic hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -729,143 +283,65 @@ static const mstmm_guard mstmm_sweep_link_prismatic_rotor_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_prismatic_rotor_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_prismatic_rotor_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    (void)p;
-    const real t0 = link[0] * delta_I[4];
-    const real t1 = link[1] * delta_I[5];
-    const real t2 = t0 + t1;
-    const real t3 = d[0] * t2;
-    const real t4 = delta_I[0] + t3;
-    const real t5 = turn[0] * t4;
-    const real t6 = link[2] * delta_I[5];
-    const real t7 = delta_I[1] + t6;
-    const real t8 = link[0] * t7;
-    const real t9 = link[2] * delta_I[4];
-    const real t10 = delta_I[2] - t9;
-    const real t11 = link[1] * t10;
-    const real t12 = t8 + t11;
-    const real t13 = d[0] * delta_I[3];
-    const real t14 = t12 - t13;
-    const real t15 = turn[1] * t14;
-    const real t16 = t5 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = turn[0] * t14;
-    const real t19 = turn[1] * t4;
-    const real t20 = t18 - t19;
-    const real t21 = G[1] * t20;
-    const real t22 = t17 + t21;
-    const real t23 = link[0] * t10;
-    const real t24 = link[1] * t7;
-    const real t25 = t23 - t24;
-    const real t26 = G[2] * t25;
-    const real t27 = t22 + t26;
-    const real t28 = turn[0] * delta_I[3];
-    const real t29 = turn[1] * t2;
-    const real t30 = t28 + t29;
-    const real t31 = G[3] * t30;
-    const real t32 = t27 + t31;
-    const real t33 = turn[0] * t2;
-    const real t34 = turn[1] * delta_I[3];
-    const real t35 = t33 - t34;
-    const real t36 = G[4] * t35;
-    const real t37 = t32 + t36;
-    const real t38 = link[0] * delta_I[5];
-    const real t39 = link[1] * delta_I[4];
-    const real t40 = t38 - t39;
-    const real t41 = G[5] * t40;
-    const real t42 = t37 + t41;
-    const real t43 = g[0] - t42;
-    udot[0] = t43;
-    delta[0] = t16;
-    delta[1] = t20;
-    const real t44 = t25 + t43;
-    delta[2] = t44;
-    delta[3] = t30;
-    delta[4] = t35;
-    delta[5] = t40;
-    return 0;
+  (void)p;
+  real t2 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t4 = delta_I[0] + d[0] * t2;
+  real t7 = delta_I[1] + link[2] * delta_I[5];
+  real t10 = delta_I[2] - link[2] * delta_I[4];
+  real t14 = link[0] * t7 + link[1] * t10 - d[0] * delta_I[3];
+  real t16 = turn[0] * t4 + turn[1] * t14;
+  real t20 = turn[0] * t14 - turn[1] * t4;
+  real t25 = link[0] * t10 - link[1] * t7;
+  real t30 = turn[0] * delta_I[3] + turn[1] * t2;
+  real t35 = turn[0] * t2 - turn[1] * delta_I[3];
+  real t40 = link[0] * delta_I[5] - link[1] * delta_I[4];
+  real t43 = g[0] - (G[0] * t16 + G[1] * t20 + G[2] * t25 + G[3] * t30 + G[4] * t35 + G[5] * t40);
+  udot[0] = t43;
+  delta[0] = t16;
+  delta[1] = t20;
+  delta[2] = t25 + t43;
+  delta[3] = t30;
+  delta[4] = t35;
+  delta[5] = t40;
+  return 0;
 }
 
-static int mstmm_sweep_link_prismatic_rotor_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_prismatic_rotor_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_prismatic_rotor_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_prismatic_rotor_recover, (in[0], in[1], in[2], in[3], in[4], in[5],
+  in[6], out[0], out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_prismatic_rotor_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_rotor_turn,
-        .call = mstmm_sweep_link_prismatic_rotor_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_prismatic_rotor_turn_inputs,
-        .outputs = mstmm_sweep_link_prismatic_rotor_turn_outputs,
-        .ir_hash = "bab9e9f3e40768807bd8188627264609a88b743a08d228e70b1c50aaf0bb51d0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_rotor_forward,
-        .call = mstmm_sweep_link_prismatic_rotor_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_prismatic_rotor_forward_inputs,
-        .outputs = mstmm_sweep_link_prismatic_rotor_forward_outputs,
-        .ir_hash = "2be8e75c3051c5e78def388ee82b6e5e1f176984d0c6a74d87f2e401f0df89b0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_rotor_condense,
-        .call = mstmm_sweep_link_prismatic_rotor_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_prismatic_rotor_condense_inputs,
-        .outputs = mstmm_sweep_link_prismatic_rotor_condense_outputs,
-        .ir_hash = "a9d7c9a373a566f653556e6a453ddd401a65cc44bcd581d27fc7e51d3605bcd6",
-        .n_guards = 3,
-        .guards = mstmm_sweep_link_prismatic_rotor_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_prismatic_rotor_recover,
-        .call = mstmm_sweep_link_prismatic_rotor_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_prismatic_rotor_recover_inputs,
-        .outputs = mstmm_sweep_link_prismatic_rotor_recover_outputs,
-        .ir_hash = "09d870d8f87a950c945292054854cc09163a04f0a99cdeb314686ec6fdd07aaa",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_rotor_turn), 2, 1, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"q", 1, "", 0, 0}}, (const mstmm_port[]){{"turn", 1,
+    "rad", 0, 0}}, "931a92193cb28554a5b77b04041a9e6aad675494b2f4df1b73e88255c793f43a", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_rotor_forward), 7, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 0, "", 0,
+    0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d", 1, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot",
+    1, "", 0, 0}}, "80f0718d28a5f223c3cfb8116c8e576e150c628e8a4fdcc1632d35e206b5f37b", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_rotor_condense), 9, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "",
+    0, 0}, {"p", 0, "", 0, 0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6,
+    "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1,
+    "", 0, 0}, {"S_I", 21, "", 0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "67b4a9423c12c2d96c50d0bb021b8ed22adef14010026a92fa380b84d4104296", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_prismatic_rotor_recover), 7, 2, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 0, "", 0,
+    0}, {"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "4207b87d1cb1f3b748b9bf783ab8379451bb5224ff30d36008f58e830b0d18b0", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_link_prismatic_rotor = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_prismatic_rotor",
-    .hash = "702190ef63aee50d8b4b33fbc490fac0268fa4af615aa72bb58198aa968d6bf0",
+    .hash = "f2c819545ced8c1ebaacdb38f71d9c3624d8cd844817ef563f3cd35d84b729b2",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,49 +7,18 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_screw;
-int mstmm_sweep_link_screw_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the screw hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[1] coordinates: angle [rad]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_screw_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_screw_turn(in_t link, in_t q, out_t turn)
 {
-    const real t0 = link[3] + q[0];
-    turn[0] = t0;
-    return 0;
+  turn[0] = link[3] + q[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,226 +35,66 @@ static const mstmm_port mstmm_sweep_link_screw_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_screw_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_screw_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    const real t0 = p[0] * q[0];
-    const real t1 = 2.0 * MSTMM_PI;
-    const real t2 = 1.0 / t1;
-    const real t3 = t0 * t2;
-    const real t4 = link[4] + t3;
-    d[0] = t4;
-    const real t5 = turn[0] * motion_I[0];
-    const real t6 = link[0] * motion_I[1];
-    const real t7 = link[1] * motion_I[2];
-    const real t8 = t6 + t7;
-    const real t9 = turn[1] * t8;
-    const real t10 = t5 + t9;
-    motion[0] = t10;
-    const real t11 = turn[0] * t8;
-    const real t12 = turn[1] * motion_I[0];
-    const real t13 = t11 - t12;
-    motion[1] = t13;
-    const real t14 = link[0] * motion_I[2];
-    const real t15 = link[1] * motion_I[1];
-    const real t16 = t14 - t15;
-    const real t17 = u[0] + t16;
-    motion[2] = t17;
-    const real t18 = turn[0] * motion_I[3];
-    const real t19 = link[0] * motion_I[4];
-    const real t20 = link[1] * motion_I[5];
-    const real t21 = t19 + t20;
-    const real t22 = turn[1] * t21;
-    const real t23 = t18 + t22;
-    const real t24 = u[0] * t13;
-    const real t25 = t23 + t24;
-    motion[3] = t25;
-    const real t26 = turn[0] * t21;
-    const real t27 = turn[1] * motion_I[3];
-    const real t28 = t26 - t27;
-    const real t29 = u[0] * t10;
-    const real t30 = t28 - t29;
-    motion[4] = t30;
-    const real t31 = link[0] * motion_I[5];
-    const real t32 = link[1] * motion_I[4];
-    const real t33 = t31 - t32;
-    motion[5] = t33;
-    const real t34 = motion_I[1] * motion_I[1];
-    const real t35 = motion_I[2] * motion_I[2];
-    const real t36 = t34 + t35;
-    const real t37 = link[2] * t36;
-    const real t38 = motion_I[6] - t37;
-    const real t39 = motion_I[0] * t16;
-    const real t40 = t21 + t39;
-    const real t41 = t4 * t40;
-    const real t42 = t38 + t41;
-    const real t43 = turn[0] * t42;
-    const real t44 = motion_I[0] * motion_I[1];
-    const real t45 = motion_I[5] + t44;
-    const real t46 = link[2] * t45;
-    const real t47 = motion_I[7] + t46;
-    const real t48 = link[0] * t47;
-    const real t49 = motion_I[0] * motion_I[2];
-    const real t50 = t49 - motion_I[4];
-    const real t51 = link[2] * t50;
-    const real t52 = motion_I[8] + t51;
-    const real t53 = link[1] * t52;
-    const real t54 = t48 + t53;
-    const real t55 = t8 * t16;
-    const real t56 = t55 - motion_I[3];
-    const real t57 = t4 * t56;
-    const real t58 = t54 + t57;
-    const real t59 = turn[1] * t58;
-    const real t60 = t43 + t59;
-    const real t61 = p[0] * t13;
-    const real t62 = u[0] * t61;
-    const real t63 = 1.0 / MSTMM_PI;
-    const real t64 = t62 * t63;
-    const real t65 = t60 + t64;
-    motion[6] = t65;
-    const real t66 = turn[0] * t58;
-    const real t67 = turn[1] * t42;
-    const real t68 = t66 - t67;
-    const real t69 = p[0] * t10;
-    const real t70 = u[0] * t69;
-    const real t71 = t63 * t70;
-    const real t72 = t68 - t71;
-    motion[7] = t72;
-    const real t73 = link[0] * t52;
-    const real t74 = link[1] * t47;
-    const real t75 = t73 - t74;
-    const real t76 = motion_I[0] * motion_I[0];
-    const real t77 = t8 * t8;
-    const real t78 = t76 + t77;
-    const real t79 = t4 * t78;
-    const real t80 = t75 - t79;
-    motion[8] = t80;
-    const real t81 = b[0] * t65;
-    const real t82 = t32 - t31;
-    const real t83 = t10 * t13;
-    const real t84 = t82 + t83;
-    const real t85 = b[2] * t84;
-    const real t86 = t10 * t17;
-    const real t87 = t30 + t86;
-    const real t88 = b[3] * t87;
-    const real t89 = t85 + t88;
-    const real t90 = t13 * t13;
-    const real t91 = t17 * t17;
-    const real t92 = t90 + t91;
-    const real t93 = b[1] * t92;
-    const real t94 = t89 - t93;
-    const real t95 = t81 + t94;
-    e_B[0] = t95;
-    const real t96 = b[0] * t72;
-    const real t97 = t33 + t83;
-    const real t98 = b[1] * t97;
-    const real t99 = t13 * t17;
-    const real t100 = t99 - t25;
-    const real t101 = b[3] * t100;
-    const real t102 = t98 + t101;
-    const real t103 = t10 * t10;
-    const real t104 = t91 + t103;
-    const real t105 = b[2] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = t96 + t106;
-    e_B[1] = t107;
-    const real t108 = b[0] * t80;
-    const real t109 = t29 - t28;
-    const real t110 = t86 + t109;
-    const real t111 = b[1] * t110;
-    const real t112 = t25 + t99;
-    const real t113 = b[2] * t112;
-    const real t114 = t111 + t113;
-    const real t115 = t90 + t103;
-    const real t116 = b[3] * t115;
-    const real t117 = t114 - t116;
-    const real t118 = t108 + t117;
-    e_B[2] = t118;
-    const real t119 = b[6] * t33;
-    const real t120 = b[5] * t30;
-    const real t121 = b[4] * t25;
-    const real t122 = b[2] * t80;
-    const real t123 = b[9] * t17;
-    const real t124 = b[6] * t10;
-    const real t125 = b[8] * t13;
-    const real t126 = t124 + t125;
-    const real t127 = t123 + t126;
-    const real t128 = t13 * t127;
-    const real t129 = b[8] * t17;
-    const real t130 = b[5] * t10;
-    const real t131 = b[7] * t13;
-    const real t132 = t130 + t131;
-    const real t133 = t129 + t132;
-    const real t134 = t17 * t133;
-    const real t135 = t128 - t134;
-    const real t136 = t122 + t135;
-    const real t137 = b[3] * t72;
-    const real t138 = t136 - t137;
-    const real t139 = t121 + t138;
-    const real t140 = t120 + t139;
-    const real t141 = t119 + t140;
-    e_B[3] = t141;
-    const real t142 = b[8] * t33;
-    const real t143 = b[7] * t30;
-    const real t144 = b[5] * t25;
-    const real t145 = b[3] * t65;
-    const real t146 = b[6] * t17;
-    const real t147 = b[4] * t10;
-    const real t148 = b[5] * t13;
-    const real t149 = t147 + t148;
-    const real t150 = t146 + t149;
-    const real t151 = t17 * t150;
-    const real t152 = t10 * t127;
-    const real t153 = t151 - t152;
-    const real t154 = b[1] * t80;
-    const real t155 = t153 - t154;
-    const real t156 = t145 + t155;
-    const real t157 = t144 + t156;
-    const real t158 = t143 + t157;
-    const real t159 = t142 + t158;
-    e_B[4] = t159;
-    const real t160 = b[9] * t33;
-    const real t161 = b[8] * t30;
-    const real t162 = b[6] * t25;
-    const real t163 = b[1] * t72;
-    const real t164 = t10 * t133;
-    const real t165 = t13 * t150;
-    const real t166 = t164 - t165;
-    const real t167 = t163 + t166;
-    const real t168 = b[2] * t65;
-    const real t169 = t167 - t168;
-    const real t170 = t162 + t169;
-    const real t171 = t161 + t170;
-    const real t172 = t160 + t171;
-    e_B[5] = t172;
-    qdot[0] = u[0];
-    return 0;
+  real t4 = link[4] + p[0] * q[0] * (1.0 / (2.0 * MSTMM_PI));
+  d[0] = t4;
+  real t8 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t10 = turn[0] * motion_I[0] + turn[1] * t8;
+  motion[0] = t10;
+  real t13 = turn[0] * t8 - turn[1] * motion_I[0];
+  motion[1] = t13;
+  real t16 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  real t17 = u[0] + t16;
+  motion[2] = t17;
+  real t21 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t25 = turn[0] * motion_I[3] + turn[1] * t21 + u[0] * t13;
+  motion[3] = t25;
+  real t28 = turn[0] * t21 - turn[1] * motion_I[3];
+  real t29 = u[0] * t10;
+  real t30 = t28 - t29;
+  motion[4] = t30;
+  real t31 = link[0] * motion_I[5];
+  real t32 = link[1] * motion_I[4];
+  real t33 = t31 - t32;
+  motion[5] = t33;
+  real t42 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) + t4 *
+    (t21 + motion_I[0] * t16);
+  real t47 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t52 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t58 = link[0] * t47 + link[1] * t52 + t4 * (t8 * t16 - motion_I[3]);
+  real t63 = 1.0 / MSTMM_PI;
+  real t65 = turn[0] * t42 + turn[1] * t58 + u[0] * (p[0] * t13) * t63;
+  motion[6] = t65;
+  real t72 = turn[0] * t58 - turn[1] * t42 - t63 * (u[0] * (p[0] * t10));
+  motion[7] = t72;
+  real t80 = link[0] * t52 - link[1] * t47 - t4 * (motion_I[0] * motion_I[0] + t8 * t8);
+  motion[8] = t80;
+  real t83 = t10 * t13;
+  real t86 = t10 * t17;
+  real t90 = t13 * t13;
+  real t91 = t17 * t17;
+  e_B[0] = b[0] * t65 + (b[2] * (t32 - t31 + t83) + b[3] * (t30 + t86) - b[1] * (t90 + t91));
+  real t99 = t13 * t17;
+  real t103 = t10 * t10;
+  e_B[1] = b[0] * t72 + (b[1] * (t33 + t83) + b[3] * (t99 - t25) - b[2] * (t91 + t103));
+  e_B[2] = b[0] * t80 + (b[1] * (t86 + (t29 - t28)) + b[2] * (t25 + t99) - b[3] * (t90 + t103));
+  real t127 = b[9] * t17 + (b[6] * t10 + b[8] * t13);
+  real t133 = b[8] * t17 + (b[5] * t10 + b[7] * t13);
+  e_B[3] = b[6] * t33 + (b[5] * t30 + (b[4] * t25 + (b[2] * t80 + (t13 * t127 - t17 * t133) - b[3] *
+    t72)));
+  real t150 = b[6] * t17 + (b[4] * t10 + b[5] * t13);
+  e_B[4] = b[8] * t33 + (b[7] * t30 + (b[5] * t25 + (b[3] * t65 + (t17 * t150 - t10 * t127 - b[1] *
+    t80))));
+  e_B[5] = b[9] * t33 + (b[8] * t30 + (b[6] * t25 + (b[1] * t72 + (t10 * t133 - t13 * t150) - b[2] *
+    t65)));
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -304,460 +113,178 @@ static const mstmm_port mstmm_sweep_link_screw_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_screw_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_screw_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K,
+    in_t e_K, in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = b[9] + S_K[20];
-    const real t1 = MSTMM_PI * 2.0;
-    const real t2 = 1.0 / t1;
-    const real t3 = p[0] * t2;
-    const real t4 = S_K[14] * t3;
-    const real t5 = t0 + t4;
-    const real t6 = b[0] + S_K[11];
-    const real t7 = t6 * t3;
-    const real t8 = S_K[14] + t7;
-    const real t9 = t3 * t8;
-    const real t10 = t5 + t9;
-    const real t11 = 0.0 < t10;
-    if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t12 = 0.0 < b[0];
-    const real t13 = b[0] * ((real)1 / (real)100000000000000);
-    const real t14 = b[0] + S_K[0];
-    const real t15 = b[0] + S_K[6];
-    const real t16 = t14 + t15;
-    const real t17 = t6 + t16;
-    const real t18 = ((real)1 / (real)300000000000000) * t17;
-    const real t19 = t12 != 0 ? t13 : t18;
-    const real t20 = p[0] * p[0];
-    const real t21 = t19 * t20;
-    const real t22 = MSTMM_PI * MSTMM_PI;
-    const real t23 = t22 * 4.0;
-    const real t24 = 1.0 / t23;
-    const real t25 = t21 * t24;
-    const real t26 = b[4] + b[7];
-    const real t27 = b[9] + t26;
-    const real t28 = ((real)1 / (real)300000000000000) * t27;
-    const real t29 = 0.0 < t28;
-    const real t30 = b[4] + S_K[15];
-    const real t31 = b[7] + S_K[18];
-    const real t32 = t30 + t31;
-    const real t33 = t0 + t32;
-    const real t34 = ((real)1 / (real)300000000000000) * t33;
-    const real t35 = t29 != 0 ? t28 : t34;
-    const real t36 = t25 + t35;
-    const real t37 = t36 < t10;
-    if (!(t37 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t38 = S_K[5] - b[2];
-    const real t39 = S_K[2] * t3;
-    const real t40 = t38 + t39;
-    const real t41 = 1.0 / t10;
-    const real t42 = t40 * t41;
-    G[0] = t42;
-    const real t43 = b[1] + S_K[10];
-    const real t44 = S_K[7] * t3;
-    const real t45 = t43 + t44;
-    const real t46 = t45 * t41;
-    G[1] = t46;
-    const real t47 = t8 * t41;
-    G[2] = t47;
-    const real t48 = b[6] + S_K[17];
-    const real t49 = b[2] + S_K[12];
-    const real t50 = t49 * t3;
-    const real t51 = t48 + t50;
-    const real t52 = t51 * t41;
-    G[3] = t52;
-    const real t53 = b[8] + S_K[19];
-    const real t54 = S_K[13] - b[1];
-    const real t55 = t54 * t3;
-    const real t56 = t53 + t55;
-    const real t57 = t56 * t41;
-    G[4] = t57;
-    const real t58 = t5 * t41;
-    G[5] = t58;
-    const real t59 = e_K[5] + e_B[5];
-    const real t60 = e_K[2] + e_B[2];
-    const real t61 = t60 * t3;
-    const real t62 = t59 + t61;
-    const real t63 = tau[0] - t62;
-    const real t64 = t41 * t63;
-    g[0] = t64;
-    const real t65 = t40 * t42;
-    const real t66 = t14 - t65;
-    const real t67 = turn[0] * t66;
-    const real t68 = t40 * t46;
-    const real t69 = S_K[1] - t68;
-    const real t70 = turn[1] * t69;
-    const real t71 = t67 - t70;
-    const real t72 = turn[0] * t71;
-    const real t73 = turn[0] * t69;
-    const real t74 = t45 * t46;
-    const real t75 = t15 - t74;
-    const real t76 = turn[1] * t75;
-    const real t77 = t73 - t76;
-    const real t78 = turn[1] * t77;
-    const real t79 = t72 - t78;
-    S_I[0] = t79;
-    const real t80 = turn[1] * t71;
-    const real t81 = turn[0] * t77;
-    const real t82 = t80 + t81;
-    const real t83 = link[0] * t82;
-    const real t84 = t40 * t47;
-    const real t85 = S_K[2] - t84;
-    const real t86 = turn[0] * t85;
-    const real t87 = t45 * t47;
-    const real t88 = S_K[7] - t87;
-    const real t89 = turn[1] * t88;
-    const real t90 = t86 - t89;
-    const real t91 = link[1] * t90;
-    const real t92 = t83 - t91;
-    S_I[1] = t92;
-    const real t93 = link[1] * t82;
-    const real t94 = link[0] * t90;
-    const real t95 = t93 + t94;
-    S_I[2] = t95;
-    const real t96 = t40 * t52;
-    const real t97 = S_K[3] - t96;
-    const real t98 = turn[0] * t97;
-    const real t99 = S_K[8] - b[3];
-    const real t100 = t45 * t52;
-    const real t101 = t99 - t100;
-    const real t102 = turn[1] * t101;
-    const real t103 = t98 - t102;
-    const real t104 = turn[0] * t103;
-    const real t105 = b[3] + S_K[4];
-    const real t106 = t40 * t57;
-    const real t107 = t105 - t106;
-    const real t108 = turn[0] * t107;
-    const real t109 = t45 * t57;
-    const real t110 = S_K[9] - t109;
-    const real t111 = turn[1] * t110;
-    const real t112 = t108 - t111;
-    const real t113 = turn[1] * t112;
-    const real t114 = t104 - t113;
-    const real t115 = d[0] * t82;
-    const real t116 = t114 - t115;
-    S_I[3] = t116;
-    const real t117 = turn[1] * t103;
-    const real t118 = turn[0] * t112;
-    const real t119 = t117 + t118;
-    const real t120 = d[0] * t79;
-    const real t121 = t119 + t120;
-    const real t122 = link[0] * t121;
-    const real t123 = t40 * t58;
-    const real t124 = t38 - t123;
-    const real t125 = turn[0] * t124;
-    const real t126 = t45 * t58;
-    const real t127 = t43 - t126;
-    const real t128 = turn[1] * t127;
-    const real t129 = t125 - t128;
-    const real t130 = link[1] * t129;
-    const real t131 = t122 - t130;
-    const real t132 = link[2] * t95;
-    const real t133 = t131 - t132;
-    S_I[4] = t133;
-    const real t134 = link[1] * t121;
-    const real t135 = link[0] * t129;
-    const real t136 = t134 + t135;
-    const real t137 = link[2] * t92;
-    const real t138 = t136 + t137;
-    S_I[5] = t138;
-    const real t139 = turn[1] * t66;
-    const real t140 = t73 + t139;
-    const real t141 = turn[1] * t140;
-    const real t142 = turn[0] * t75;
-    const real t143 = t70 + t142;
-    const real t144 = turn[0] * t143;
-    const real t145 = t141 + t144;
-    const real t146 = link[0] * t145;
-    const real t147 = turn[1] * t85;
-    const real t148 = turn[0] * t88;
-    const real t149 = t147 + t148;
-    const real t150 = link[1] * t149;
-    const real t151 = t146 - t150;
-    const real t152 = link[0] * t151;
-    const real t153 = link[0] * t149;
-    const real t154 = t8 * t47;
-    const real t155 = t6 - t154;
-    const real t156 = link[1] * t155;
-    const real t157 = t153 - t156;
-    const real t158 = link[1] * t157;
-    const real t159 = t152 - t158;
-    S_I[6] = t159;
-    const real t160 = link[1] * t151;
-    const real t161 = link[0] * t157;
-    const real t162 = t160 + t161;
-    S_I[7] = t162;
-    const real t163 = turn[1] * t97;
-    const real t164 = turn[0] * t101;
-    const real t165 = t163 + t164;
-    const real t166 = turn[0] * t165;
-    const real t167 = turn[1] * t107;
-    const real t168 = turn[0] * t110;
-    const real t169 = t167 + t168;
-    const real t170 = turn[1] * t169;
-    const real t171 = t166 - t170;
-    const real t172 = d[0] * t145;
-    const real t173 = t171 - t172;
-    const real t174 = link[0] * t173;
-    const real t175 = t8 * t52;
-    const real t176 = t49 - t175;
-    const real t177 = turn[0] * t176;
-    const real t178 = t8 * t57;
-    const real t179 = t54 - t178;
-    const real t180 = turn[1] * t179;
-    const real t181 = t177 - t180;
-    const real t182 = d[0] * t149;
-    const real t183 = t181 - t182;
-    const real t184 = link[1] * t183;
-    const real t185 = t174 - t184;
-    S_I[8] = t185;
-    const real t186 = turn[1] * t165;
-    const real t187 = turn[0] * t169;
-    const real t188 = t186 + t187;
-    const real t189 = t188 + t115;
-    const real t190 = link[0] * t189;
-    const real t191 = turn[1] * t176;
-    const real t192 = turn[0] * t179;
-    const real t193 = t191 + t192;
-    const real t194 = d[0] * t90;
-    const real t195 = t193 + t194;
-    const real t196 = link[1] * t195;
-    const real t197 = t190 - t196;
-    const real t198 = link[0] * t197;
-    const real t199 = turn[1] * t124;
-    const real t200 = turn[0] * t127;
-    const real t201 = t199 + t200;
-    const real t202 = link[0] * t201;
-    const real t203 = t8 * t58;
-    const real t204 = S_K[14] - t203;
-    const real t205 = link[1] * t204;
-    const real t206 = t202 - t205;
-    const real t207 = link[1] * t206;
-    const real t208 = t198 - t207;
-    const real t209 = link[2] * t162;
-    const real t210 = t208 - t209;
-    S_I[9] = t210;
-    const real t211 = link[1] * t197;
-    const real t212 = link[0] * t206;
-    const real t213 = t211 + t212;
-    const real t214 = link[2] * t159;
-    const real t215 = t213 + t214;
-    S_I[10] = t215;
-    const real t216 = link[1] * t145;
-    const real t217 = t153 + t216;
-    const real t218 = link[1] * t217;
-    const real t219 = link[0] * t155;
-    const real t220 = t150 + t219;
-    const real t221 = link[0] * t220;
-    const real t222 = t218 + t221;
-    S_I[11] = t222;
-    const real t223 = link[1] * t173;
-    const real t224 = link[0] * t183;
-    const real t225 = t223 + t224;
-    S_I[12] = t225;
-    const real t226 = link[1] * t189;
-    const real t227 = link[0] * t195;
-    const real t228 = t226 + t227;
-    const real t229 = link[0] * t228;
-    const real t230 = link[1] * t201;
-    const real t231 = link[0] * t204;
-    const real t232 = t230 + t231;
-    const real t233 = link[1] * t232;
-    const real t234 = t229 - t233;
-    const real t235 = link[2] * t222;
-    const real t236 = t234 - t235;
-    S_I[13] = t236;
-    const real t237 = link[1] * t228;
-    const real t238 = link[0] * t232;
-    const real t239 = t237 + t238;
-    const real t240 = t239 + t209;
-    S_I[14] = t240;
-    const real t241 = t51 * t52;
-    const real t242 = t30 - t241;
-    const real t243 = turn[0] * t242;
-    const real t244 = b[5] + S_K[16];
-    const real t245 = t51 * t57;
-    const real t246 = t244 - t245;
-    const real t247 = turn[1] * t246;
-    const real t248 = t243 - t247;
-    const real t249 = turn[0] * t248;
-    const real t250 = turn[0] * t246;
-    const real t251 = t56 * t57;
-    const real t252 = t31 - t251;
-    const real t253 = turn[1] * t252;
-    const real t254 = t250 - t253;
-    const real t255 = turn[1] * t254;
-    const real t256 = t249 - t255;
-    const real t257 = t171 + t173;
-    const real t258 = d[0] * t257;
-    const real t259 = t256 - t258;
-    S_I[15] = t259;
-    const real t260 = turn[1] * t248;
-    const real t261 = turn[0] * t254;
-    const real t262 = t260 + t261;
-    const real t263 = t114 - t189;
-    const real t264 = d[0] * t263;
-    const real t265 = t262 + t264;
-    const real t266 = link[0] * t265;
-    const real t267 = t51 * t58;
-    const real t268 = t48 - t267;
-    const real t269 = turn[0] * t268;
-    const real t270 = t56 * t58;
-    const real t271 = t53 - t270;
-    const real t272 = turn[1] * t271;
-    const real t273 = t269 - t272;
-    const real t274 = d[0] * t201;
-    const real t275 = t273 - t274;
-    const real t276 = link[1] * t275;
-    const real t277 = t266 - t276;
-    const real t278 = link[2] * t225;
-    const real t279 = t277 - t278;
-    S_I[16] = t279;
-    const real t280 = link[1] * t265;
-    const real t281 = link[0] * t275;
-    const real t282 = t280 + t281;
-    const real t283 = link[2] * t185;
-    const real t284 = t282 + t283;
-    S_I[17] = t284;
-    const real t285 = turn[1] * t242;
-    const real t286 = t250 + t285;
-    const real t287 = turn[1] * t286;
-    const real t288 = turn[0] * t252;
-    const real t289 = t247 + t288;
-    const real t290 = turn[0] * t289;
-    const real t291 = t287 + t290;
-    const real t292 = t119 + t121;
-    const real t293 = d[0] * t292;
-    const real t294 = t291 + t293;
-    const real t295 = link[0] * t294;
-    const real t296 = turn[1] * t268;
-    const real t297 = turn[0] * t271;
-    const real t298 = t296 + t297;
-    const real t299 = d[0] * t129;
-    const real t300 = t298 + t299;
-    const real t301 = link[1] * t300;
-    const real t302 = t295 - t301;
-    const real t303 = link[0] * t302;
-    const real t304 = link[0] * t300;
-    const real t305 = t5 * t58;
-    const real t306 = t0 - t305;
-    const real t307 = link[1] * t306;
-    const real t308 = t304 - t307;
-    const real t309 = link[1] * t308;
-    const real t310 = t303 - t309;
-    const real t311 = t234 + t236;
-    const real t312 = link[2] * t311;
-    const real t313 = t310 - t312;
-    S_I[18] = t313;
-    const real t314 = link[1] * t302;
-    const real t315 = link[0] * t308;
-    const real t316 = t314 + t315;
-    const real t317 = t208 - t240;
-    const real t318 = link[2] * t317;
-    const real t319 = t316 + t318;
-    S_I[19] = t319;
-    const real t320 = link[1] * t294;
-    const real t321 = t304 + t320;
-    const real t322 = link[1] * t321;
-    const real t323 = link[0] * t306;
-    const real t324 = t301 + t323;
-    const real t325 = link[0] * t324;
-    const real t326 = t322 + t325;
-    const real t327 = t213 + t215;
-    const real t328 = link[2] * t327;
-    const real t329 = t326 + t328;
-    S_I[20] = t329;
-    const real t330 = e_K[0] + e_B[0];
-    const real t331 = t42 * t63;
-    const real t332 = t330 + t331;
-    const real t333 = turn[0] * t332;
-    const real t334 = e_K[1] + e_B[1];
-    const real t335 = t46 * t63;
-    const real t336 = t334 + t335;
-    const real t337 = turn[1] * t336;
-    const real t338 = t333 - t337;
-    e_I[0] = t338;
-    const real t339 = turn[1] * t332;
-    const real t340 = turn[0] * t336;
-    const real t341 = t339 + t340;
-    const real t342 = link[0] * t341;
-    const real t343 = t47 * t63;
-    const real t344 = t60 + t343;
-    const real t345 = link[1] * t344;
-    const real t346 = t342 - t345;
-    e_I[1] = t346;
-    const real t347 = link[1] * t341;
-    const real t348 = link[0] * t344;
-    const real t349 = t347 + t348;
-    e_I[2] = t349;
-    const real t350 = e_K[3] + e_B[3];
-    const real t351 = t52 * t63;
-    const real t352 = t350 + t351;
-    const real t353 = turn[0] * t352;
-    const real t354 = e_K[4] + e_B[4];
-    const real t355 = t57 * t63;
-    const real t356 = t354 + t355;
-    const real t357 = turn[1] * t356;
-    const real t358 = t353 - t357;
-    const real t359 = d[0] * t341;
-    const real t360 = t358 - t359;
-    e_I[3] = t360;
-    const real t361 = turn[1] * t352;
-    const real t362 = turn[0] * t356;
-    const real t363 = t361 + t362;
-    const real t364 = d[0] * t338;
-    const real t365 = t363 + t364;
-    const real t366 = link[0] * t365;
-    const real t367 = t58 * t63;
-    const real t368 = t59 + t367;
-    const real t369 = link[1] * t368;
-    const real t370 = t366 - t369;
-    const real t371 = link[2] * t349;
-    const real t372 = t370 - t371;
-    e_I[4] = t372;
-    const real t373 = link[1] * t365;
-    const real t374 = link[0] * t368;
-    const real t375 = t373 + t374;
-    const real t376 = link[2] * t346;
-    const real t377 = t375 + t376;
-    e_I[5] = t377;
-    return 0;
+  real t0 = b[9] + S_K[20];
+  real t3 = p[0] * (1.0 / (MSTMM_PI * 2.0));
+  real t5 = t0 + S_K[14] * t3;
+  real t6 = b[0] + S_K[11];
+  real t8 = S_K[14] + t6 * t3;
+  real t10 = t5 + t3 * t8;
+  real t11 = 0.0 < t10;
+  if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t11 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t13 = b[0] * ((real)1 / (real)100000000000000);
+  real t14 = b[0] + S_K[0];
+  real t15 = b[0] + S_K[6];
+  real t18 = ((real)1 / (real)300000000000000) * (t6 + (t14 + t15));
+  real t28 = ((real)1 / (real)300000000000000) * (b[9] + (b[4] + b[7]));
+  real t30 = b[4] + S_K[15];
+  real t31 = b[7] + S_K[18];
+  real t34 = ((real)1 / (real)300000000000000) * (t0 + (t30 + t31));
+  if (!((((0.0 < b[0]) ? t13 : t18) * (p[0] * p[0]) * (1.0 / (MSTMM_PI * MSTMM_PI * 4.0)) + ((0.0 < t28) ? t28 : t34) < t10))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t38 = S_K[5] - b[2];
+  real t40 = t38 + S_K[2] * t3;
+  real t41 = 1.0 / t10;
+  real t42 = t40 * t41;
+  G[0] = t42;
+  real t43 = b[1] + S_K[10];
+  real t45 = t43 + S_K[7] * t3;
+  real t46 = t45 * t41;
+  G[1] = t46;
+  real t47 = t8 * t41;
+  G[2] = t47;
+  real t48 = b[6] + S_K[17];
+  real t49 = b[2] + S_K[12];
+  real t51 = t48 + t49 * t3;
+  real t52 = t51 * t41;
+  G[3] = t52;
+  real t53 = b[8] + S_K[19];
+  real t54 = S_K[13] - b[1];
+  real t56 = t53 + t54 * t3;
+  real t57 = t56 * t41;
+  G[4] = t57;
+  real t58 = t5 * t41;
+  G[5] = t58;
+  real t59 = e_K[5] + e_B[5];
+  real t60 = e_K[2] + e_B[2];
+  real t63 = tau[0] - (t59 + t60 * t3);
+  g[0] = t41 * t63;
+  real t66 = t14 - t40 * t42;
+  real t69 = S_K[1] - t40 * t46;
+  real t70 = turn[1] * t69;
+  real t71 = turn[0] * t66 - t70;
+  real t73 = turn[0] * t69;
+  real t75 = t15 - t45 * t46;
+  real t77 = t73 - turn[1] * t75;
+  real t79 = turn[0] * t71 - turn[1] * t77;
+  S_I[0] = t79;
+  real t82 = turn[1] * t71 + turn[0] * t77;
+  real t85 = S_K[2] - t40 * t47;
+  real t88 = S_K[7] - t45 * t47;
+  real t90 = turn[0] * t85 - turn[1] * t88;
+  real t92 = link[0] * t82 - link[1] * t90;
+  S_I[1] = t92;
+  real t95 = link[1] * t82 + link[0] * t90;
+  S_I[2] = t95;
+  real t97 = S_K[3] - t40 * t52;
+  real t101 = S_K[8] - b[3] - t45 * t52;
+  real t103 = turn[0] * t97 - turn[1] * t101;
+  real t107 = b[3] + S_K[4] - t40 * t57;
+  real t110 = S_K[9] - t45 * t57;
+  real t112 = turn[0] * t107 - turn[1] * t110;
+  real t114 = turn[0] * t103 - turn[1] * t112;
+  real t115 = d[0] * t82;
+  S_I[3] = t114 - t115;
+  real t119 = turn[1] * t103 + turn[0] * t112;
+  real t121 = t119 + d[0] * t79;
+  real t124 = t38 - t40 * t58;
+  real t127 = t43 - t45 * t58;
+  real t129 = turn[0] * t124 - turn[1] * t127;
+  S_I[4] = link[0] * t121 - link[1] * t129 - link[2] * t95;
+  S_I[5] = link[1] * t121 + link[0] * t129 + link[2] * t92;
+  real t145 = turn[1] * (t73 + turn[1] * t66) + turn[0] * (t70 + turn[0] * t75);
+  real t149 = turn[1] * t85 + turn[0] * t88;
+  real t150 = link[1] * t149;
+  real t151 = link[0] * t145 - t150;
+  real t153 = link[0] * t149;
+  real t155 = t6 - t8 * t47;
+  real t157 = t153 - link[1] * t155;
+  real t159 = link[0] * t151 - link[1] * t157;
+  S_I[6] = t159;
+  real t162 = link[1] * t151 + link[0] * t157;
+  S_I[7] = t162;
+  real t165 = turn[1] * t97 + turn[0] * t101;
+  real t169 = turn[1] * t107 + turn[0] * t110;
+  real t171 = turn[0] * t165 - turn[1] * t169;
+  real t173 = t171 - d[0] * t145;
+  real t176 = t49 - t8 * t52;
+  real t179 = t54 - t8 * t57;
+  real t183 = turn[0] * t176 - turn[1] * t179 - d[0] * t149;
+  real t185 = link[0] * t173 - link[1] * t183;
+  S_I[8] = t185;
+  real t189 = turn[1] * t165 + turn[0] * t169 + t115;
+  real t195 = turn[1] * t176 + turn[0] * t179 + d[0] * t90;
+  real t197 = link[0] * t189 - link[1] * t195;
+  real t201 = turn[1] * t124 + turn[0] * t127;
+  real t204 = S_K[14] - t8 * t58;
+  real t206 = link[0] * t201 - link[1] * t204;
+  real t208 = link[0] * t197 - link[1] * t206;
+  real t209 = link[2] * t162;
+  S_I[9] = t208 - t209;
+  real t213 = link[1] * t197 + link[0] * t206;
+  real t215 = t213 + link[2] * t159;
+  S_I[10] = t215;
+  real t222 = link[1] * (t153 + link[1] * t145) + link[0] * (t150 + link[0] * t155);
+  S_I[11] = t222;
+  real t225 = link[1] * t173 + link[0] * t183;
+  S_I[12] = t225;
+  real t228 = link[1] * t189 + link[0] * t195;
+  real t232 = link[1] * t201 + link[0] * t204;
+  real t234 = link[0] * t228 - link[1] * t232;
+  real t236 = t234 - link[2] * t222;
+  S_I[13] = t236;
+  real t240 = link[1] * t228 + link[0] * t232 + t209;
+  S_I[14] = t240;
+  real t242 = t30 - t51 * t52;
+  real t246 = b[5] + S_K[16] - t51 * t57;
+  real t247 = turn[1] * t246;
+  real t248 = turn[0] * t242 - t247;
+  real t250 = turn[0] * t246;
+  real t252 = t31 - t56 * t57;
+  real t254 = t250 - turn[1] * t252;
+  S_I[15] = turn[0] * t248 - turn[1] * t254 - d[0] * (t171 + t173);
+  real t265 = turn[1] * t248 + turn[0] * t254 + d[0] * (t114 - t189);
+  real t268 = t48 - t51 * t58;
+  real t271 = t53 - t56 * t58;
+  real t275 = turn[0] * t268 - turn[1] * t271 - d[0] * t201;
+  S_I[16] = link[0] * t265 - link[1] * t275 - link[2] * t225;
+  S_I[17] = link[1] * t265 + link[0] * t275 + link[2] * t185;
+  real t294 = turn[1] * (t250 + turn[1] * t242) + turn[0] * (t247 + turn[0] * t252) + d[0] * (t119 +
+    t121);
+  real t300 = turn[1] * t268 + turn[0] * t271 + d[0] * t129;
+  real t301 = link[1] * t300;
+  real t302 = link[0] * t294 - t301;
+  real t304 = link[0] * t300;
+  real t306 = t0 - t5 * t58;
+  real t308 = t304 - link[1] * t306;
+  S_I[18] = link[0] * t302 - link[1] * t308 - link[2] * (t234 + t236);
+  S_I[19] = link[1] * t302 + link[0] * t308 + link[2] * (t208 - t240);
+  S_I[20] = link[1] * (t304 + link[1] * t294) + link[0] * (t301 + link[0] * t306) + link[2] * (t213
+    + t215);
+  real t332 = e_K[0] + e_B[0] + t42 * t63;
+  real t336 = e_K[1] + e_B[1] + t46 * t63;
+  real t338 = turn[0] * t332 - turn[1] * t336;
+  e_I[0] = t338;
+  real t341 = turn[1] * t332 + turn[0] * t336;
+  real t344 = t60 + t47 * t63;
+  real t346 = link[0] * t341 - link[1] * t344;
+  e_I[1] = t346;
+  real t349 = link[1] * t341 + link[0] * t344;
+  e_I[2] = t349;
+  real t352 = e_K[3] + e_B[3] + t52 * t63;
+  real t356 = e_K[4] + e_B[4] + t57 * t63;
+  e_I[3] = turn[0] * t352 - turn[1] * t356 - d[0] * t341;
+  real t365 = turn[1] * t352 + turn[0] * t356 + d[0] * t338;
+  real t368 = t59 + t58 * t63;
+  e_I[4] = link[0] * t365 - link[1] * t368 - link[2] * t349;
+  e_I[5] = link[1] * t365 + link[0] * t368 + link[2] * t346;
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_screw_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -772,147 +299,64 @@ static const mstmm_guard mstmm_sweep_link_screw_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_screw_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_screw_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = link[0] * delta_I[4];
-    const real t1 = link[1] * delta_I[5];
-    const real t2 = t0 + t1;
-    const real t3 = d[0] * t2;
-    const real t4 = delta_I[0] + t3;
-    const real t5 = turn[0] * t4;
-    const real t6 = link[2] * delta_I[5];
-    const real t7 = delta_I[1] + t6;
-    const real t8 = link[0] * t7;
-    const real t9 = link[2] * delta_I[4];
-    const real t10 = delta_I[2] - t9;
-    const real t11 = link[1] * t10;
-    const real t12 = t8 + t11;
-    const real t13 = d[0] * delta_I[3];
-    const real t14 = t12 - t13;
-    const real t15 = turn[1] * t14;
-    const real t16 = t5 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = turn[0] * t14;
-    const real t19 = turn[1] * t4;
-    const real t20 = t18 - t19;
-    const real t21 = G[1] * t20;
-    const real t22 = t17 + t21;
-    const real t23 = link[0] * t10;
-    const real t24 = link[1] * t7;
-    const real t25 = t23 - t24;
-    const real t26 = G[2] * t25;
-    const real t27 = t22 + t26;
-    const real t28 = turn[0] * delta_I[3];
-    const real t29 = turn[1] * t2;
-    const real t30 = t28 + t29;
-    const real t31 = G[3] * t30;
-    const real t32 = t27 + t31;
-    const real t33 = turn[0] * t2;
-    const real t34 = turn[1] * delta_I[3];
-    const real t35 = t33 - t34;
-    const real t36 = G[4] * t35;
-    const real t37 = t32 + t36;
-    const real t38 = link[0] * delta_I[5];
-    const real t39 = link[1] * delta_I[4];
-    const real t40 = t38 - t39;
-    const real t41 = G[5] * t40;
-    const real t42 = t37 + t41;
-    const real t43 = g[0] - t42;
-    udot[0] = t43;
-    delta[0] = t16;
-    delta[1] = t20;
-    const real t44 = MSTMM_PI * 2.0;
-    const real t45 = 1.0 / t44;
-    const real t46 = p[0] * t45;
-    const real t47 = t43 * t46;
-    const real t48 = t25 + t47;
-    delta[2] = t48;
-    delta[3] = t30;
-    delta[4] = t35;
-    const real t49 = t40 + t43;
-    delta[5] = t49;
-    return 0;
+  real t2 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t4 = delta_I[0] + d[0] * t2;
+  real t7 = delta_I[1] + link[2] * delta_I[5];
+  real t10 = delta_I[2] - link[2] * delta_I[4];
+  real t14 = link[0] * t7 + link[1] * t10 - d[0] * delta_I[3];
+  real t16 = turn[0] * t4 + turn[1] * t14;
+  real t20 = turn[0] * t14 - turn[1] * t4;
+  real t25 = link[0] * t10 - link[1] * t7;
+  real t30 = turn[0] * delta_I[3] + turn[1] * t2;
+  real t35 = turn[0] * t2 - turn[1] * delta_I[3];
+  real t40 = link[0] * delta_I[5] - link[1] * delta_I[4];
+  real t43 = g[0] - (G[0] * t16 + G[1] * t20 + G[2] * t25 + G[3] * t30 + G[4] * t35 + G[5] * t40);
+  udot[0] = t43;
+  delta[0] = t16;
+  delta[1] = t20;
+  delta[2] = t25 + t43 * (p[0] * (1.0 / (MSTMM_PI * 2.0)));
+  delta[3] = t30;
+  delta[4] = t35;
+  delta[5] = t40 + t43;
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_screw_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_screw_turn,
-        .call = mstmm_sweep_link_screw_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_screw_turn_inputs,
-        .outputs = mstmm_sweep_link_screw_turn_outputs,
-        .ir_hash = "a89b1a6f0729eb98a8b6b7002e09df453abaf18a1cf04a89a2f9a7e250f57eb3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_screw_forward,
-        .call = mstmm_sweep_link_screw_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_screw_forward_inputs,
-        .outputs = mstmm_sweep_link_screw_forward_outputs,
-        .ir_hash = "b8f6a79a5105db61659aa320c7b916c59b24aaf0b198a9c57a96c1f540b198ce",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_screw_condense,
-        .call = mstmm_sweep_link_screw_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_screw_condense_inputs,
-        .outputs = mstmm_sweep_link_screw_condense_outputs,
-        .ir_hash = "1d5abd431783759f02bf9762429d6767ba322ee308a90aba9889f3d64df84802",
-        .n_guards = 3,
-        .guards = mstmm_sweep_link_screw_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_screw_recover,
-        .call = mstmm_sweep_link_screw_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_screw_recover_inputs,
-        .outputs = mstmm_sweep_link_screw_recover_outputs,
-        .ir_hash = "33fb0b1cf257e75ae812dcd64d31c25d756d7acce72211d43f0dbdac002f88ee",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_turn), 2, 1, (const mstmm_port[]){{"link", 5, "",
+    0, 0}, {"q", 1, "", 0, 0}}, (const mstmm_port[]){{"turn", 1, "rad", 0, 0}},
+    "26c119c72ce037a1add8706885c66c32a55d090aedc167be9e8eed2a6eb4c133", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_forward), 7, 4, (const mstmm_port[]){{"link",
+    5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 1, "", 0, 0}, {"q", 1, "", 0,
+    0}, {"u", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const mstmm_port[]){{"d", 1, "m", 0, 0},
+    {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot", 1, "", 0, 0}},
+    "f690b02ccfb7d64783f9023167adb787d046f300547e3ac2d8f4ba8c6c7ba187", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_condense), 9, 4, (const mstmm_port[]){{"link",
+    5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "", 0, 0}, {"p", 1, "", 0,
+    0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"tau", 1,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"S_I", 21, "",
+    0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "d7b077d3624dc51b44a493f9435e12c0597233b234f73fce0348f904f841578e", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_recover), 7, 2, (const mstmm_port[]){{"link",
+    5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 1, "", 0, 0}, {"G", 6, "", 0,
+    0}, {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0},
+    {"delta", 6, "", 0, 0}}, "66e2cd68ad3be7e3a3a268b0eaa746e401f8ad6cb47d9e82d417dca699ae7eb5", 0,
+    NULL},
 };
 
 const mstmm_element mstmm_sweep_link_screw = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_screw",
-    .hash = "fa13cc04164f606c6f27b2f6a7b87fe70be000fb820c013535f21428323212af",
+    .hash = "73e8ab7a757c482255c36c2f6ebaded85e7c31d073f586ac9e053c77ee73b0a1",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,49 +7,18 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_link_screw_rotor;
-int mstmm_sweep_link_screw_rotor_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn);
-int mstmm_sweep_link_screw_rotor_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot);
-int mstmm_sweep_link_screw_rotor_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I);
-int mstmm_sweep_link_screw_rotor_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-
 /* angle of the screw hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0
  * in  q[1] coordinates: angle [rad]
  * out turn[1] (rad) angle about z instead of its cosine and sine
  */
-int mstmm_sweep_link_screw_rotor_turn(const real *restrict link, const real *restrict q,
-    real *restrict turn)
+int mstmm_sweep_link_screw_rotor_turn(in_t link, in_t q, out_t turn)
 {
-    const real t0 = link[3] + q[0];
-    turn[0] = t0;
-    return 0;
+  turn[0] = link[3] + q[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_rotor_turn_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_rotor_turn(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_turn_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_turn_outputs[] = {
-    {"turn", 1, "rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_rotor_turn, (in[0], in[1], out[0]))
 
 /* bias motion of a rigid body outboard of the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -66,226 +35,66 @@ static const mstmm_port mstmm_sweep_link_screw_rotor_turn_outputs[] = {
  * out e_B[6] (N, N*m) load required by the bias motion of the body
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_link_screw_rotor_forward(const real *restrict link, const real *restrict turn,
-    const real *restrict b, const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict d, real *restrict motion, real *restrict e_B,
-    real *restrict qdot)
+int mstmm_sweep_link_screw_rotor_forward(in_t link, in_t turn, in_t b, in_t p, in_t q, in_t u,
+    in_t motion_I, out_t d, out_t motion, out_t e_B, out_t qdot)
 {
-    const real t0 = p[0] * q[0];
-    const real t1 = 2.0 * MSTMM_PI;
-    const real t2 = 1.0 / t1;
-    const real t3 = t0 * t2;
-    const real t4 = link[4] + t3;
-    d[0] = t4;
-    const real t5 = turn[0] * motion_I[0];
-    const real t6 = link[0] * motion_I[1];
-    const real t7 = link[1] * motion_I[2];
-    const real t8 = t6 + t7;
-    const real t9 = turn[1] * t8;
-    const real t10 = t5 + t9;
-    motion[0] = t10;
-    const real t11 = turn[0] * t8;
-    const real t12 = turn[1] * motion_I[0];
-    const real t13 = t11 - t12;
-    motion[1] = t13;
-    const real t14 = link[0] * motion_I[2];
-    const real t15 = link[1] * motion_I[1];
-    const real t16 = t14 - t15;
-    const real t17 = u[0] + t16;
-    motion[2] = t17;
-    const real t18 = turn[0] * motion_I[3];
-    const real t19 = link[0] * motion_I[4];
-    const real t20 = link[1] * motion_I[5];
-    const real t21 = t19 + t20;
-    const real t22 = turn[1] * t21;
-    const real t23 = t18 + t22;
-    const real t24 = u[0] * t13;
-    const real t25 = t23 + t24;
-    motion[3] = t25;
-    const real t26 = turn[0] * t21;
-    const real t27 = turn[1] * motion_I[3];
-    const real t28 = t26 - t27;
-    const real t29 = u[0] * t10;
-    const real t30 = t28 - t29;
-    motion[4] = t30;
-    const real t31 = link[0] * motion_I[5];
-    const real t32 = link[1] * motion_I[4];
-    const real t33 = t31 - t32;
-    motion[5] = t33;
-    const real t34 = motion_I[1] * motion_I[1];
-    const real t35 = motion_I[2] * motion_I[2];
-    const real t36 = t34 + t35;
-    const real t37 = link[2] * t36;
-    const real t38 = motion_I[6] - t37;
-    const real t39 = motion_I[0] * t16;
-    const real t40 = t21 + t39;
-    const real t41 = t4 * t40;
-    const real t42 = t38 + t41;
-    const real t43 = turn[0] * t42;
-    const real t44 = motion_I[0] * motion_I[1];
-    const real t45 = motion_I[5] + t44;
-    const real t46 = link[2] * t45;
-    const real t47 = motion_I[7] + t46;
-    const real t48 = link[0] * t47;
-    const real t49 = motion_I[0] * motion_I[2];
-    const real t50 = t49 - motion_I[4];
-    const real t51 = link[2] * t50;
-    const real t52 = motion_I[8] + t51;
-    const real t53 = link[1] * t52;
-    const real t54 = t48 + t53;
-    const real t55 = t8 * t16;
-    const real t56 = t55 - motion_I[3];
-    const real t57 = t4 * t56;
-    const real t58 = t54 + t57;
-    const real t59 = turn[1] * t58;
-    const real t60 = t43 + t59;
-    const real t61 = p[0] * t13;
-    const real t62 = u[0] * t61;
-    const real t63 = 1.0 / MSTMM_PI;
-    const real t64 = t62 * t63;
-    const real t65 = t60 + t64;
-    motion[6] = t65;
-    const real t66 = turn[0] * t58;
-    const real t67 = turn[1] * t42;
-    const real t68 = t66 - t67;
-    const real t69 = p[0] * t10;
-    const real t70 = u[0] * t69;
-    const real t71 = t63 * t70;
-    const real t72 = t68 - t71;
-    motion[7] = t72;
-    const real t73 = link[0] * t52;
-    const real t74 = link[1] * t47;
-    const real t75 = t73 - t74;
-    const real t76 = motion_I[0] * motion_I[0];
-    const real t77 = t8 * t8;
-    const real t78 = t76 + t77;
-    const real t79 = t4 * t78;
-    const real t80 = t75 - t79;
-    motion[8] = t80;
-    const real t81 = b[0] * t65;
-    const real t82 = t32 - t31;
-    const real t83 = t10 * t13;
-    const real t84 = t82 + t83;
-    const real t85 = b[2] * t84;
-    const real t86 = t10 * t17;
-    const real t87 = t30 + t86;
-    const real t88 = b[3] * t87;
-    const real t89 = t85 + t88;
-    const real t90 = t13 * t13;
-    const real t91 = t17 * t17;
-    const real t92 = t90 + t91;
-    const real t93 = b[1] * t92;
-    const real t94 = t89 - t93;
-    const real t95 = t81 + t94;
-    e_B[0] = t95;
-    const real t96 = b[0] * t72;
-    const real t97 = t33 + t83;
-    const real t98 = b[1] * t97;
-    const real t99 = t13 * t17;
-    const real t100 = t99 - t25;
-    const real t101 = b[3] * t100;
-    const real t102 = t98 + t101;
-    const real t103 = t10 * t10;
-    const real t104 = t91 + t103;
-    const real t105 = b[2] * t104;
-    const real t106 = t102 - t105;
-    const real t107 = t96 + t106;
-    e_B[1] = t107;
-    const real t108 = b[0] * t80;
-    const real t109 = t29 - t28;
-    const real t110 = t86 + t109;
-    const real t111 = b[1] * t110;
-    const real t112 = t25 + t99;
-    const real t113 = b[2] * t112;
-    const real t114 = t111 + t113;
-    const real t115 = t90 + t103;
-    const real t116 = b[3] * t115;
-    const real t117 = t114 - t116;
-    const real t118 = t108 + t117;
-    e_B[2] = t118;
-    const real t119 = b[6] * t33;
-    const real t120 = b[5] * t30;
-    const real t121 = b[4] * t25;
-    const real t122 = b[2] * t80;
-    const real t123 = b[9] * t17;
-    const real t124 = b[6] * t10;
-    const real t125 = b[8] * t13;
-    const real t126 = t124 + t125;
-    const real t127 = t123 + t126;
-    const real t128 = t13 * t127;
-    const real t129 = b[8] * t17;
-    const real t130 = b[5] * t10;
-    const real t131 = b[7] * t13;
-    const real t132 = t130 + t131;
-    const real t133 = t129 + t132;
-    const real t134 = t17 * t133;
-    const real t135 = t128 - t134;
-    const real t136 = t122 + t135;
-    const real t137 = b[3] * t72;
-    const real t138 = t136 - t137;
-    const real t139 = t121 + t138;
-    const real t140 = t120 + t139;
-    const real t141 = t119 + t140;
-    e_B[3] = t141;
-    const real t142 = b[8] * t33;
-    const real t143 = b[7] * t30;
-    const real t144 = b[5] * t25;
-    const real t145 = b[3] * t65;
-    const real t146 = b[6] * t17;
-    const real t147 = b[4] * t10;
-    const real t148 = b[5] * t13;
-    const real t149 = t147 + t148;
-    const real t150 = t146 + t149;
-    const real t151 = t17 * t150;
-    const real t152 = t10 * t127;
-    const real t153 = t151 - t152;
-    const real t154 = b[1] * t80;
-    const real t155 = t153 - t154;
-    const real t156 = t145 + t155;
-    const real t157 = t144 + t156;
-    const real t158 = t143 + t157;
-    const real t159 = t142 + t158;
-    e_B[4] = t159;
-    const real t160 = b[9] * t33;
-    const real t161 = b[8] * t30;
-    const real t162 = b[6] * t25;
-    const real t163 = b[1] * t72;
-    const real t164 = t10 * t133;
-    const real t165 = t13 * t150;
-    const real t166 = t164 - t165;
-    const real t167 = t163 + t166;
-    const real t168 = b[2] * t65;
-    const real t169 = t167 - t168;
-    const real t170 = t162 + t169;
-    const real t171 = t161 + t170;
-    const real t172 = t160 + t171;
-    e_B[5] = t172;
-    qdot[0] = u[0];
-    return 0;
+  real t4 = link[4] + p[0] * q[0] * (1.0 / (2.0 * MSTMM_PI));
+  d[0] = t4;
+  real t8 = link[0] * motion_I[1] + link[1] * motion_I[2];
+  real t10 = turn[0] * motion_I[0] + turn[1] * t8;
+  motion[0] = t10;
+  real t13 = turn[0] * t8 - turn[1] * motion_I[0];
+  motion[1] = t13;
+  real t16 = link[0] * motion_I[2] - link[1] * motion_I[1];
+  real t17 = u[0] + t16;
+  motion[2] = t17;
+  real t21 = link[0] * motion_I[4] + link[1] * motion_I[5];
+  real t25 = turn[0] * motion_I[3] + turn[1] * t21 + u[0] * t13;
+  motion[3] = t25;
+  real t28 = turn[0] * t21 - turn[1] * motion_I[3];
+  real t29 = u[0] * t10;
+  real t30 = t28 - t29;
+  motion[4] = t30;
+  real t31 = link[0] * motion_I[5];
+  real t32 = link[1] * motion_I[4];
+  real t33 = t31 - t32;
+  motion[5] = t33;
+  real t42 = motion_I[6] - link[2] * (motion_I[1] * motion_I[1] + motion_I[2] * motion_I[2]) + t4 *
+    (t21 + motion_I[0] * t16);
+  real t47 = motion_I[7] + link[2] * (motion_I[5] + motion_I[0] * motion_I[1]);
+  real t52 = motion_I[8] + link[2] * (motion_I[0] * motion_I[2] - motion_I[4]);
+  real t58 = link[0] * t47 + link[1] * t52 + t4 * (t8 * t16 - motion_I[3]);
+  real t63 = 1.0 / MSTMM_PI;
+  real t65 = turn[0] * t42 + turn[1] * t58 + u[0] * (p[0] * t13) * t63;
+  motion[6] = t65;
+  real t72 = turn[0] * t58 - turn[1] * t42 - t63 * (u[0] * (p[0] * t10));
+  motion[7] = t72;
+  real t80 = link[0] * t52 - link[1] * t47 - t4 * (motion_I[0] * motion_I[0] + t8 * t8);
+  motion[8] = t80;
+  real t83 = t10 * t13;
+  real t86 = t10 * t17;
+  real t90 = t13 * t13;
+  real t91 = t17 * t17;
+  e_B[0] = b[0] * t65 + (b[2] * (t32 - t31 + t83) + b[3] * (t30 + t86) - b[1] * (t90 + t91));
+  real t99 = t13 * t17;
+  real t103 = t10 * t10;
+  e_B[1] = b[0] * t72 + (b[1] * (t33 + t83) + b[3] * (t99 - t25) - b[2] * (t91 + t103));
+  e_B[2] = b[0] * t80 + (b[1] * (t86 + (t29 - t28)) + b[2] * (t25 + t99) - b[3] * (t90 + t103));
+  real t127 = b[9] * t17 + (b[6] * t10 + b[8] * t13);
+  real t133 = b[8] * t17 + (b[5] * t10 + b[7] * t13);
+  e_B[3] = b[6] * t33 + (b[5] * t30 + (b[4] * t25 + (b[2] * t80 + (t13 * t127 - t17 * t133) - b[3] *
+    t72)));
+  real t150 = b[6] * t17 + (b[4] * t10 + b[5] * t13);
+  e_B[4] = b[8] * t33 + (b[7] * t30 + (b[5] * t25 + (b[3] * t65 + (t17 * t150 - t10 * t127 - b[1] *
+    t80))));
+  e_B[5] = b[9] * t33 + (b[8] * t30 + (b[6] * t25 + (b[1] * t72 + (t10 * t133 - t13 * t150) - b[2] *
+    t65)));
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_rotor_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_rotor_forward(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_forward_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_forward_outputs[] = {
-    {"d", 1, "m", 0, 0},
-    {"motion", 9, "", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_rotor_forward, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3]))
 
 /* S and e of a rigid body carried across the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -304,461 +113,178 @@ static const mstmm_port mstmm_sweep_link_screw_rotor_forward_outputs[] = {
  * out S_I[21] f = S a + e at the inboard origin
  * out e_I[6] (N, N*m) force part at the inboard origin
  */
-int mstmm_sweep_link_screw_rotor_condense(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict b, const real *restrict p,
-    const real *restrict S_K, const real *restrict e_K, const real *restrict e_B,
-    const real *restrict tau, real *restrict G, real *restrict g, real *restrict S_I,
-    real *restrict e_I)
+int mstmm_sweep_link_screw_rotor_condense(in_t link, in_t turn, in_t d, in_t b, in_t p, in_t S_K,
+    in_t e_K, in_t e_B, in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
-    const real t0 = b[9] + S_K[20];
-    const real t1 = MSTMM_PI * 2.0;
-    const real t2 = 1.0 / t1;
-    const real t3 = p[0] * t2;
-    const real t4 = S_K[14] * t3;
-    const real t5 = t0 + t4;
-    const real t6 = b[0] + S_K[11];
-    const real t7 = t6 * t3;
-    const real t8 = S_K[14] + t7;
-    const real t9 = t3 * t8;
-    const real t10 = t5 + t9;
-    const real t11 = b[10] + t10;
-    const real t12 = 0.0 < t11;
-    if (!(t12 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    if (!(t12 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t13 = 0.0 < b[0];
-    const real t14 = b[0] * ((real)1 / (real)100000000000000);
-    const real t15 = b[0] + S_K[0];
-    const real t16 = b[0] + S_K[6];
-    const real t17 = t15 + t16;
-    const real t18 = t6 + t17;
-    const real t19 = ((real)1 / (real)300000000000000) * t18;
-    const real t20 = t13 != 0 ? t14 : t19;
-    const real t21 = p[0] * p[0];
-    const real t22 = t20 * t21;
-    const real t23 = MSTMM_PI * MSTMM_PI;
-    const real t24 = t23 * 4.0;
-    const real t25 = 1.0 / t24;
-    const real t26 = t22 * t25;
-    const real t27 = b[4] + b[7];
-    const real t28 = b[9] + t27;
-    const real t29 = ((real)1 / (real)300000000000000) * t28;
-    const real t30 = 0.0 < t29;
-    const real t31 = b[4] + S_K[15];
-    const real t32 = b[7] + S_K[18];
-    const real t33 = t31 + t32;
-    const real t34 = t0 + t33;
-    const real t35 = ((real)1 / (real)300000000000000) * t34;
-    const real t36 = t30 != 0 ? t29 : t35;
-    const real t37 = t26 + t36;
-    const real t38 = t37 < t11;
-    if (!(t38 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t39 = S_K[5] - b[2];
-    const real t40 = S_K[2] * t3;
-    const real t41 = t39 + t40;
-    const real t42 = 1.0 / t11;
-    const real t43 = t41 * t42;
-    G[0] = t43;
-    const real t44 = b[1] + S_K[10];
-    const real t45 = S_K[7] * t3;
-    const real t46 = t44 + t45;
-    const real t47 = t46 * t42;
-    G[1] = t47;
-    const real t48 = t8 * t42;
-    G[2] = t48;
-    const real t49 = b[6] + S_K[17];
-    const real t50 = b[2] + S_K[12];
-    const real t51 = t50 * t3;
-    const real t52 = t49 + t51;
-    const real t53 = t52 * t42;
-    G[3] = t53;
-    const real t54 = b[8] + S_K[19];
-    const real t55 = S_K[13] - b[1];
-    const real t56 = t55 * t3;
-    const real t57 = t54 + t56;
-    const real t58 = t57 * t42;
-    G[4] = t58;
-    const real t59 = t5 * t42;
-    G[5] = t59;
-    const real t60 = e_K[5] + e_B[5];
-    const real t61 = e_K[2] + e_B[2];
-    const real t62 = t61 * t3;
-    const real t63 = t60 + t62;
-    const real t64 = tau[0] - t63;
-    const real t65 = t42 * t64;
-    g[0] = t65;
-    const real t66 = t41 * t43;
-    const real t67 = t15 - t66;
-    const real t68 = turn[0] * t67;
-    const real t69 = t41 * t47;
-    const real t70 = S_K[1] - t69;
-    const real t71 = turn[1] * t70;
-    const real t72 = t68 - t71;
-    const real t73 = turn[0] * t72;
-    const real t74 = turn[0] * t70;
-    const real t75 = t46 * t47;
-    const real t76 = t16 - t75;
-    const real t77 = turn[1] * t76;
-    const real t78 = t74 - t77;
-    const real t79 = turn[1] * t78;
-    const real t80 = t73 - t79;
-    S_I[0] = t80;
-    const real t81 = turn[1] * t72;
-    const real t82 = turn[0] * t78;
-    const real t83 = t81 + t82;
-    const real t84 = link[0] * t83;
-    const real t85 = t41 * t48;
-    const real t86 = S_K[2] - t85;
-    const real t87 = turn[0] * t86;
-    const real t88 = t46 * t48;
-    const real t89 = S_K[7] - t88;
-    const real t90 = turn[1] * t89;
-    const real t91 = t87 - t90;
-    const real t92 = link[1] * t91;
-    const real t93 = t84 - t92;
-    S_I[1] = t93;
-    const real t94 = link[1] * t83;
-    const real t95 = link[0] * t91;
-    const real t96 = t94 + t95;
-    S_I[2] = t96;
-    const real t97 = t41 * t53;
-    const real t98 = S_K[3] - t97;
-    const real t99 = turn[0] * t98;
-    const real t100 = S_K[8] - b[3];
-    const real t101 = t46 * t53;
-    const real t102 = t100 - t101;
-    const real t103 = turn[1] * t102;
-    const real t104 = t99 - t103;
-    const real t105 = turn[0] * t104;
-    const real t106 = b[3] + S_K[4];
-    const real t107 = t41 * t58;
-    const real t108 = t106 - t107;
-    const real t109 = turn[0] * t108;
-    const real t110 = t46 * t58;
-    const real t111 = S_K[9] - t110;
-    const real t112 = turn[1] * t111;
-    const real t113 = t109 - t112;
-    const real t114 = turn[1] * t113;
-    const real t115 = t105 - t114;
-    const real t116 = d[0] * t83;
-    const real t117 = t115 - t116;
-    S_I[3] = t117;
-    const real t118 = turn[1] * t104;
-    const real t119 = turn[0] * t113;
-    const real t120 = t118 + t119;
-    const real t121 = d[0] * t80;
-    const real t122 = t120 + t121;
-    const real t123 = link[0] * t122;
-    const real t124 = t41 * t59;
-    const real t125 = t39 - t124;
-    const real t126 = turn[0] * t125;
-    const real t127 = t46 * t59;
-    const real t128 = t44 - t127;
-    const real t129 = turn[1] * t128;
-    const real t130 = t126 - t129;
-    const real t131 = link[1] * t130;
-    const real t132 = t123 - t131;
-    const real t133 = link[2] * t96;
-    const real t134 = t132 - t133;
-    S_I[4] = t134;
-    const real t135 = link[1] * t122;
-    const real t136 = link[0] * t130;
-    const real t137 = t135 + t136;
-    const real t138 = link[2] * t93;
-    const real t139 = t137 + t138;
-    S_I[5] = t139;
-    const real t140 = turn[1] * t67;
-    const real t141 = t74 + t140;
-    const real t142 = turn[1] * t141;
-    const real t143 = turn[0] * t76;
-    const real t144 = t71 + t143;
-    const real t145 = turn[0] * t144;
-    const real t146 = t142 + t145;
-    const real t147 = link[0] * t146;
-    const real t148 = turn[1] * t86;
-    const real t149 = turn[0] * t89;
-    const real t150 = t148 + t149;
-    const real t151 = link[1] * t150;
-    const real t152 = t147 - t151;
-    const real t153 = link[0] * t152;
-    const real t154 = link[0] * t150;
-    const real t155 = t8 * t48;
-    const real t156 = t6 - t155;
-    const real t157 = link[1] * t156;
-    const real t158 = t154 - t157;
-    const real t159 = link[1] * t158;
-    const real t160 = t153 - t159;
-    S_I[6] = t160;
-    const real t161 = link[1] * t152;
-    const real t162 = link[0] * t158;
-    const real t163 = t161 + t162;
-    S_I[7] = t163;
-    const real t164 = turn[1] * t98;
-    const real t165 = turn[0] * t102;
-    const real t166 = t164 + t165;
-    const real t167 = turn[0] * t166;
-    const real t168 = turn[1] * t108;
-    const real t169 = turn[0] * t111;
-    const real t170 = t168 + t169;
-    const real t171 = turn[1] * t170;
-    const real t172 = t167 - t171;
-    const real t173 = d[0] * t146;
-    const real t174 = t172 - t173;
-    const real t175 = link[0] * t174;
-    const real t176 = t8 * t53;
-    const real t177 = t50 - t176;
-    const real t178 = turn[0] * t177;
-    const real t179 = t8 * t58;
-    const real t180 = t55 - t179;
-    const real t181 = turn[1] * t180;
-    const real t182 = t178 - t181;
-    const real t183 = d[0] * t150;
-    const real t184 = t182 - t183;
-    const real t185 = link[1] * t184;
-    const real t186 = t175 - t185;
-    S_I[8] = t186;
-    const real t187 = turn[1] * t166;
-    const real t188 = turn[0] * t170;
-    const real t189 = t187 + t188;
-    const real t190 = t189 + t116;
-    const real t191 = link[0] * t190;
-    const real t192 = turn[1] * t177;
-    const real t193 = turn[0] * t180;
-    const real t194 = t192 + t193;
-    const real t195 = d[0] * t91;
-    const real t196 = t194 + t195;
-    const real t197 = link[1] * t196;
-    const real t198 = t191 - t197;
-    const real t199 = link[0] * t198;
-    const real t200 = turn[1] * t125;
-    const real t201 = turn[0] * t128;
-    const real t202 = t200 + t201;
-    const real t203 = link[0] * t202;
-    const real t204 = t8 * t59;
-    const real t205 = S_K[14] - t204;
-    const real t206 = link[1] * t205;
-    const real t207 = t203 - t206;
-    const real t208 = link[1] * t207;
-    const real t209 = t199 - t208;
-    const real t210 = link[2] * t163;
-    const real t211 = t209 - t210;
-    S_I[9] = t211;
-    const real t212 = link[1] * t198;
-    const real t213 = link[0] * t207;
-    const real t214 = t212 + t213;
-    const real t215 = link[2] * t160;
-    const real t216 = t214 + t215;
-    S_I[10] = t216;
-    const real t217 = link[1] * t146;
-    const real t218 = t154 + t217;
-    const real t219 = link[1] * t218;
-    const real t220 = link[0] * t156;
-    const real t221 = t151 + t220;
-    const real t222 = link[0] * t221;
-    const real t223 = t219 + t222;
-    S_I[11] = t223;
-    const real t224 = link[1] * t174;
-    const real t225 = link[0] * t184;
-    const real t226 = t224 + t225;
-    S_I[12] = t226;
-    const real t227 = link[1] * t190;
-    const real t228 = link[0] * t196;
-    const real t229 = t227 + t228;
-    const real t230 = link[0] * t229;
-    const real t231 = link[1] * t202;
-    const real t232 = link[0] * t205;
-    const real t233 = t231 + t232;
-    const real t234 = link[1] * t233;
-    const real t235 = t230 - t234;
-    const real t236 = link[2] * t223;
-    const real t237 = t235 - t236;
-    S_I[13] = t237;
-    const real t238 = link[1] * t229;
-    const real t239 = link[0] * t233;
-    const real t240 = t238 + t239;
-    const real t241 = t240 + t210;
-    S_I[14] = t241;
-    const real t242 = t52 * t53;
-    const real t243 = t31 - t242;
-    const real t244 = turn[0] * t243;
-    const real t245 = b[5] + S_K[16];
-    const real t246 = t52 * t58;
-    const real t247 = t245 - t246;
-    const real t248 = turn[1] * t247;
-    const real t249 = t244 - t248;
-    const real t250 = turn[0] * t249;
-    const real t251 = turn[0] * t247;
-    const real t252 = t57 * t58;
-    const real t253 = t32 - t252;
-    const real t254 = turn[1] * t253;
-    const real t255 = t251 - t254;
-    const real t256 = turn[1] * t255;
-    const real t257 = t250 - t256;
-    const real t258 = t172 + t174;
-    const real t259 = d[0] * t258;
-    const real t260 = t257 - t259;
-    S_I[15] = t260;
-    const real t261 = turn[1] * t249;
-    const real t262 = turn[0] * t255;
-    const real t263 = t261 + t262;
-    const real t264 = t115 - t190;
-    const real t265 = d[0] * t264;
-    const real t266 = t263 + t265;
-    const real t267 = link[0] * t266;
-    const real t268 = t52 * t59;
-    const real t269 = t49 - t268;
-    const real t270 = turn[0] * t269;
-    const real t271 = t57 * t59;
-    const real t272 = t54 - t271;
-    const real t273 = turn[1] * t272;
-    const real t274 = t270 - t273;
-    const real t275 = d[0] * t202;
-    const real t276 = t274 - t275;
-    const real t277 = link[1] * t276;
-    const real t278 = t267 - t277;
-    const real t279 = link[2] * t226;
-    const real t280 = t278 - t279;
-    S_I[16] = t280;
-    const real t281 = link[1] * t266;
-    const real t282 = link[0] * t276;
-    const real t283 = t281 + t282;
-    const real t284 = link[2] * t186;
-    const real t285 = t283 + t284;
-    S_I[17] = t285;
-    const real t286 = turn[1] * t243;
-    const real t287 = t251 + t286;
-    const real t288 = turn[1] * t287;
-    const real t289 = turn[0] * t253;
-    const real t290 = t248 + t289;
-    const real t291 = turn[0] * t290;
-    const real t292 = t288 + t291;
-    const real t293 = t120 + t122;
-    const real t294 = d[0] * t293;
-    const real t295 = t292 + t294;
-    const real t296 = link[0] * t295;
-    const real t297 = turn[1] * t269;
-    const real t298 = turn[0] * t272;
-    const real t299 = t297 + t298;
-    const real t300 = d[0] * t130;
-    const real t301 = t299 + t300;
-    const real t302 = link[1] * t301;
-    const real t303 = t296 - t302;
-    const real t304 = link[0] * t303;
-    const real t305 = link[0] * t301;
-    const real t306 = t5 * t59;
-    const real t307 = t0 - t306;
-    const real t308 = link[1] * t307;
-    const real t309 = t305 - t308;
-    const real t310 = link[1] * t309;
-    const real t311 = t304 - t310;
-    const real t312 = t235 + t237;
-    const real t313 = link[2] * t312;
-    const real t314 = t311 - t313;
-    S_I[18] = t314;
-    const real t315 = link[1] * t303;
-    const real t316 = link[0] * t309;
-    const real t317 = t315 + t316;
-    const real t318 = t209 - t241;
-    const real t319 = link[2] * t318;
-    const real t320 = t317 + t319;
-    S_I[19] = t320;
-    const real t321 = link[1] * t295;
-    const real t322 = t305 + t321;
-    const real t323 = link[1] * t322;
-    const real t324 = link[0] * t307;
-    const real t325 = t302 + t324;
-    const real t326 = link[0] * t325;
-    const real t327 = t323 + t326;
-    const real t328 = t214 + t216;
-    const real t329 = link[2] * t328;
-    const real t330 = t327 + t329;
-    S_I[20] = t330;
-    const real t331 = e_K[0] + e_B[0];
-    const real t332 = t43 * t64;
-    const real t333 = t331 + t332;
-    const real t334 = turn[0] * t333;
-    const real t335 = e_K[1] + e_B[1];
-    const real t336 = t47 * t64;
-    const real t337 = t335 + t336;
-    const real t338 = turn[1] * t337;
-    const real t339 = t334 - t338;
-    e_I[0] = t339;
-    const real t340 = turn[1] * t333;
-    const real t341 = turn[0] * t337;
-    const real t342 = t340 + t341;
-    const real t343 = link[0] * t342;
-    const real t344 = t48 * t64;
-    const real t345 = t61 + t344;
-    const real t346 = link[1] * t345;
-    const real t347 = t343 - t346;
-    e_I[1] = t347;
-    const real t348 = link[1] * t342;
-    const real t349 = link[0] * t345;
-    const real t350 = t348 + t349;
-    e_I[2] = t350;
-    const real t351 = e_K[3] + e_B[3];
-    const real t352 = t53 * t64;
-    const real t353 = t351 + t352;
-    const real t354 = turn[0] * t353;
-    const real t355 = e_K[4] + e_B[4];
-    const real t356 = t58 * t64;
-    const real t357 = t355 + t356;
-    const real t358 = turn[1] * t357;
-    const real t359 = t354 - t358;
-    const real t360 = d[0] * t342;
-    const real t361 = t359 - t360;
-    e_I[3] = t361;
-    const real t362 = turn[1] * t353;
-    const real t363 = turn[0] * t357;
-    const real t364 = t362 + t363;
-    const real t365 = d[0] * t339;
-    const real t366 = t364 + t365;
-    const real t367 = link[0] * t366;
-    const real t368 = t59 * t64;
-    const real t369 = t60 + t368;
-    const real t370 = link[1] * t369;
-    const real t371 = t367 - t370;
-    const real t372 = link[2] * t350;
-    const real t373 = t371 - t372;
-    e_I[4] = t373;
-    const real t374 = link[1] * t366;
-    const real t375 = link[0] * t369;
-    const real t376 = t374 + t375;
-    const real t377 = link[2] * t347;
-    const real t378 = t376 + t377;
-    e_I[5] = t378;
-    return 0;
+  real t0 = b[9] + S_K[20];
+  real t3 = p[0] * (1.0 / (MSTMM_PI * 2.0));
+  real t5 = t0 + S_K[14] * t3;
+  real t6 = b[0] + S_K[11];
+  real t8 = S_K[14] + t6 * t3;
+  real t11 = b[10] + (t5 + t3 * t8);
+  real t12 = 0.0 < t11;
+  if (!(t12 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  if (!(t12 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t14 = b[0] * ((real)1 / (real)100000000000000);
+  real t15 = b[0] + S_K[0];
+  real t16 = b[0] + S_K[6];
+  real t19 = ((real)1 / (real)300000000000000) * (t6 + (t15 + t16));
+  real t29 = ((real)1 / (real)300000000000000) * (b[9] + (b[4] + b[7]));
+  real t31 = b[4] + S_K[15];
+  real t32 = b[7] + S_K[18];
+  real t35 = ((real)1 / (real)300000000000000) * (t0 + (t31 + t32));
+  if (!((((0.0 < b[0]) ? t14 : t19) * (p[0] * p[0]) * (1.0 / (MSTMM_PI * MSTMM_PI * 4.0)) + ((0.0 < t29) ? t29 : t35) < t11))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t39 = S_K[5] - b[2];
+  real t41 = t39 + S_K[2] * t3;
+  real t42 = 1.0 / t11;
+  real t43 = t41 * t42;
+  G[0] = t43;
+  real t44 = b[1] + S_K[10];
+  real t46 = t44 + S_K[7] * t3;
+  real t47 = t46 * t42;
+  G[1] = t47;
+  real t48 = t8 * t42;
+  G[2] = t48;
+  real t49 = b[6] + S_K[17];
+  real t50 = b[2] + S_K[12];
+  real t52 = t49 + t50 * t3;
+  real t53 = t52 * t42;
+  G[3] = t53;
+  real t54 = b[8] + S_K[19];
+  real t55 = S_K[13] - b[1];
+  real t57 = t54 + t55 * t3;
+  real t58 = t57 * t42;
+  G[4] = t58;
+  real t59 = t5 * t42;
+  G[5] = t59;
+  real t60 = e_K[5] + e_B[5];
+  real t61 = e_K[2] + e_B[2];
+  real t64 = tau[0] - (t60 + t61 * t3);
+  g[0] = t42 * t64;
+  real t67 = t15 - t41 * t43;
+  real t70 = S_K[1] - t41 * t47;
+  real t71 = turn[1] * t70;
+  real t72 = turn[0] * t67 - t71;
+  real t74 = turn[0] * t70;
+  real t76 = t16 - t46 * t47;
+  real t78 = t74 - turn[1] * t76;
+  real t80 = turn[0] * t72 - turn[1] * t78;
+  S_I[0] = t80;
+  real t83 = turn[1] * t72 + turn[0] * t78;
+  real t86 = S_K[2] - t41 * t48;
+  real t89 = S_K[7] - t46 * t48;
+  real t91 = turn[0] * t86 - turn[1] * t89;
+  real t93 = link[0] * t83 - link[1] * t91;
+  S_I[1] = t93;
+  real t96 = link[1] * t83 + link[0] * t91;
+  S_I[2] = t96;
+  real t98 = S_K[3] - t41 * t53;
+  real t102 = S_K[8] - b[3] - t46 * t53;
+  real t104 = turn[0] * t98 - turn[1] * t102;
+  real t108 = b[3] + S_K[4] - t41 * t58;
+  real t111 = S_K[9] - t46 * t58;
+  real t113 = turn[0] * t108 - turn[1] * t111;
+  real t115 = turn[0] * t104 - turn[1] * t113;
+  real t116 = d[0] * t83;
+  S_I[3] = t115 - t116;
+  real t120 = turn[1] * t104 + turn[0] * t113;
+  real t122 = t120 + d[0] * t80;
+  real t125 = t39 - t41 * t59;
+  real t128 = t44 - t46 * t59;
+  real t130 = turn[0] * t125 - turn[1] * t128;
+  S_I[4] = link[0] * t122 - link[1] * t130 - link[2] * t96;
+  S_I[5] = link[1] * t122 + link[0] * t130 + link[2] * t93;
+  real t146 = turn[1] * (t74 + turn[1] * t67) + turn[0] * (t71 + turn[0] * t76);
+  real t150 = turn[1] * t86 + turn[0] * t89;
+  real t151 = link[1] * t150;
+  real t152 = link[0] * t146 - t151;
+  real t154 = link[0] * t150;
+  real t156 = t6 - t8 * t48;
+  real t158 = t154 - link[1] * t156;
+  real t160 = link[0] * t152 - link[1] * t158;
+  S_I[6] = t160;
+  real t163 = link[1] * t152 + link[0] * t158;
+  S_I[7] = t163;
+  real t166 = turn[1] * t98 + turn[0] * t102;
+  real t170 = turn[1] * t108 + turn[0] * t111;
+  real t172 = turn[0] * t166 - turn[1] * t170;
+  real t174 = t172 - d[0] * t146;
+  real t177 = t50 - t8 * t53;
+  real t180 = t55 - t8 * t58;
+  real t184 = turn[0] * t177 - turn[1] * t180 - d[0] * t150;
+  real t186 = link[0] * t174 - link[1] * t184;
+  S_I[8] = t186;
+  real t190 = turn[1] * t166 + turn[0] * t170 + t116;
+  real t196 = turn[1] * t177 + turn[0] * t180 + d[0] * t91;
+  real t198 = link[0] * t190 - link[1] * t196;
+  real t202 = turn[1] * t125 + turn[0] * t128;
+  real t205 = S_K[14] - t8 * t59;
+  real t207 = link[0] * t202 - link[1] * t205;
+  real t209 = link[0] * t198 - link[1] * t207;
+  real t210 = link[2] * t163;
+  S_I[9] = t209 - t210;
+  real t214 = link[1] * t198 + link[0] * t207;
+  real t216 = t214 + link[2] * t160;
+  S_I[10] = t216;
+  real t223 = link[1] * (t154 + link[1] * t146) + link[0] * (t151 + link[0] * t156);
+  S_I[11] = t223;
+  real t226 = link[1] * t174 + link[0] * t184;
+  S_I[12] = t226;
+  real t229 = link[1] * t190 + link[0] * t196;
+  real t233 = link[1] * t202 + link[0] * t205;
+  real t235 = link[0] * t229 - link[1] * t233;
+  real t237 = t235 - link[2] * t223;
+  S_I[13] = t237;
+  real t241 = link[1] * t229 + link[0] * t233 + t210;
+  S_I[14] = t241;
+  real t243 = t31 - t52 * t53;
+  real t247 = b[5] + S_K[16] - t52 * t58;
+  real t248 = turn[1] * t247;
+  real t249 = turn[0] * t243 - t248;
+  real t251 = turn[0] * t247;
+  real t253 = t32 - t57 * t58;
+  real t255 = t251 - turn[1] * t253;
+  S_I[15] = turn[0] * t249 - turn[1] * t255 - d[0] * (t172 + t174);
+  real t266 = turn[1] * t249 + turn[0] * t255 + d[0] * (t115 - t190);
+  real t269 = t49 - t52 * t59;
+  real t272 = t54 - t57 * t59;
+  real t276 = turn[0] * t269 - turn[1] * t272 - d[0] * t202;
+  S_I[16] = link[0] * t266 - link[1] * t276 - link[2] * t226;
+  S_I[17] = link[1] * t266 + link[0] * t276 + link[2] * t186;
+  real t295 = turn[1] * (t251 + turn[1] * t243) + turn[0] * (t248 + turn[0] * t253) + d[0] * (t120 +
+    t122);
+  real t301 = turn[1] * t269 + turn[0] * t272 + d[0] * t130;
+  real t302 = link[1] * t301;
+  real t303 = link[0] * t295 - t302;
+  real t305 = link[0] * t301;
+  real t307 = t0 - t5 * t59;
+  real t309 = t305 - link[1] * t307;
+  S_I[18] = link[0] * t303 - link[1] * t309 - link[2] * (t235 + t237);
+  S_I[19] = link[1] * t303 + link[0] * t309 + link[2] * (t209 - t241);
+  S_I[20] = link[1] * (t305 + link[1] * t295) + link[0] * (t302 + link[0] * t307) + link[2] * (t214
+    + t216);
+  real t333 = e_K[0] + e_B[0] + t43 * t64;
+  real t337 = e_K[1] + e_B[1] + t47 * t64;
+  real t339 = turn[0] * t333 - turn[1] * t337;
+  e_I[0] = t339;
+  real t342 = turn[1] * t333 + turn[0] * t337;
+  real t345 = t61 + t48 * t64;
+  real t347 = link[0] * t342 - link[1] * t345;
+  e_I[1] = t347;
+  real t350 = link[1] * t342 + link[0] * t345;
+  e_I[2] = t350;
+  real t353 = e_K[3] + e_B[3] + t53 * t64;
+  real t357 = e_K[4] + e_B[4] + t58 * t64;
+  e_I[3] = turn[0] * t353 - turn[1] * t357 - d[0] * t342;
+  real t366 = turn[1] * t353 + turn[0] * t357 + d[0] * t339;
+  real t369 = t60 + t59 * t64;
+  e_I[4] = link[0] * t366 - link[1] * t369 - link[2] * t350;
+  e_I[5] = link[1] * t366 + link[0] * t369 + link[2] * t347;
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_rotor_condense_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_rotor_condense(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_condense_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"b", 11, "", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"S_K", 21, "", 0, 0},
-    {"e_K", 6, "N, N*m", 0, 0},
-    {"e_B", 6, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_condense_outputs[] = {
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"S_I", 21, "", 0, 0},
-    {"e_I", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_link_screw_rotor_condense_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_rotor_condense, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1], out[2], out[3]))
 
 /* accelerations of a rigid body outboard of the screw hinge
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -773,147 +299,64 @@ static const mstmm_guard mstmm_sweep_link_screw_rotor_condense_guards[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_link_screw_rotor_recover(const real *restrict link, const real *restrict turn,
-    const real *restrict d, const real *restrict p, const real *restrict G, const real *restrict g,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_link_screw_rotor_recover(in_t link, in_t turn, in_t d, in_t p, in_t G, in_t g,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = link[0] * delta_I[4];
-    const real t1 = link[1] * delta_I[5];
-    const real t2 = t0 + t1;
-    const real t3 = d[0] * t2;
-    const real t4 = delta_I[0] + t3;
-    const real t5 = turn[0] * t4;
-    const real t6 = link[2] * delta_I[5];
-    const real t7 = delta_I[1] + t6;
-    const real t8 = link[0] * t7;
-    const real t9 = link[2] * delta_I[4];
-    const real t10 = delta_I[2] - t9;
-    const real t11 = link[1] * t10;
-    const real t12 = t8 + t11;
-    const real t13 = d[0] * delta_I[3];
-    const real t14 = t12 - t13;
-    const real t15 = turn[1] * t14;
-    const real t16 = t5 + t15;
-    const real t17 = G[0] * t16;
-    const real t18 = turn[0] * t14;
-    const real t19 = turn[1] * t4;
-    const real t20 = t18 - t19;
-    const real t21 = G[1] * t20;
-    const real t22 = t17 + t21;
-    const real t23 = link[0] * t10;
-    const real t24 = link[1] * t7;
-    const real t25 = t23 - t24;
-    const real t26 = G[2] * t25;
-    const real t27 = t22 + t26;
-    const real t28 = turn[0] * delta_I[3];
-    const real t29 = turn[1] * t2;
-    const real t30 = t28 + t29;
-    const real t31 = G[3] * t30;
-    const real t32 = t27 + t31;
-    const real t33 = turn[0] * t2;
-    const real t34 = turn[1] * delta_I[3];
-    const real t35 = t33 - t34;
-    const real t36 = G[4] * t35;
-    const real t37 = t32 + t36;
-    const real t38 = link[0] * delta_I[5];
-    const real t39 = link[1] * delta_I[4];
-    const real t40 = t38 - t39;
-    const real t41 = G[5] * t40;
-    const real t42 = t37 + t41;
-    const real t43 = g[0] - t42;
-    udot[0] = t43;
-    delta[0] = t16;
-    delta[1] = t20;
-    const real t44 = MSTMM_PI * 2.0;
-    const real t45 = 1.0 / t44;
-    const real t46 = p[0] * t45;
-    const real t47 = t43 * t46;
-    const real t48 = t25 + t47;
-    delta[2] = t48;
-    delta[3] = t30;
-    delta[4] = t35;
-    const real t49 = t40 + t43;
-    delta[5] = t49;
-    return 0;
+  real t2 = link[0] * delta_I[4] + link[1] * delta_I[5];
+  real t4 = delta_I[0] + d[0] * t2;
+  real t7 = delta_I[1] + link[2] * delta_I[5];
+  real t10 = delta_I[2] - link[2] * delta_I[4];
+  real t14 = link[0] * t7 + link[1] * t10 - d[0] * delta_I[3];
+  real t16 = turn[0] * t4 + turn[1] * t14;
+  real t20 = turn[0] * t14 - turn[1] * t4;
+  real t25 = link[0] * t10 - link[1] * t7;
+  real t30 = turn[0] * delta_I[3] + turn[1] * t2;
+  real t35 = turn[0] * t2 - turn[1] * delta_I[3];
+  real t40 = link[0] * delta_I[5] - link[1] * delta_I[4];
+  real t43 = g[0] - (G[0] * t16 + G[1] * t20 + G[2] * t25 + G[3] * t30 + G[4] * t35 + G[5] * t40);
+  udot[0] = t43;
+  delta[0] = t16;
+  delta[1] = t20;
+  delta[2] = t25 + t43 * (p[0] * (1.0 / (MSTMM_PI * 2.0)));
+  delta[3] = t30;
+  delta[4] = t35;
+  delta[5] = t40 + t43;
+  return 0;
 }
 
-static int mstmm_sweep_link_screw_rotor_recover_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_link_screw_rotor_recover(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_recover_inputs[] = {
-    {"link", 5, "", 0, 0},
-    {"turn", 2, "", 0, 0},
-    {"d", 1, "m", 0, 0},
-    {"p", 1, "", 0, 0},
-    {"G", 6, "", 0, 0},
-    {"g", 1, "", 0, 0},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_link_screw_rotor_recover_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_link_screw_rotor_recover, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1]))
 
 static const mstmm_kernel mstmm_sweep_link_screw_rotor_kernels[] = {
-    {
-        .name = "turn",
-        .function = (void (*)(void))mstmm_sweep_link_screw_rotor_turn,
-        .call = mstmm_sweep_link_screw_rotor_turn_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_link_screw_rotor_turn_inputs,
-        .outputs = mstmm_sweep_link_screw_rotor_turn_outputs,
-        .ir_hash = "a89b1a6f0729eb98a8b6b7002e09df453abaf18a1cf04a89a2f9a7e250f57eb3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_link_screw_rotor_forward,
-        .call = mstmm_sweep_link_screw_rotor_forward_call,
-        .n_inputs = 7,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_screw_rotor_forward_inputs,
-        .outputs = mstmm_sweep_link_screw_rotor_forward_outputs,
-        .ir_hash = "b8f6a79a5105db61659aa320c7b916c59b24aaf0b198a9c57a96c1f540b198ce",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_link_screw_rotor_condense,
-        .call = mstmm_sweep_link_screw_rotor_condense_call,
-        .n_inputs = 9,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_link_screw_rotor_condense_inputs,
-        .outputs = mstmm_sweep_link_screw_rotor_condense_outputs,
-        .ir_hash = "0556aa515fc938920dc7b3ed77b27b7ea7127fc7c2f5ec6c4e88e9ceeabf4b4a",
-        .n_guards = 3,
-        .guards = mstmm_sweep_link_screw_rotor_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_link_screw_rotor_recover,
-        .call = mstmm_sweep_link_screw_rotor_recover_call,
-        .n_inputs = 7,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_link_screw_rotor_recover_inputs,
-        .outputs = mstmm_sweep_link_screw_rotor_recover_outputs,
-        .ir_hash = "33fb0b1cf257e75ae812dcd64d31c25d756d7acce72211d43f0dbdac002f88ee",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"turn", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_rotor_turn), 2, 1, (const mstmm_port[]){{"link",
+    5, "", 0, 0}, {"q", 1, "", 0, 0}}, (const mstmm_port[]){{"turn", 1, "rad", 0, 0}},
+    "26c119c72ce037a1add8706885c66c32a55d090aedc167be9e8eed2a6eb4c133", 0, NULL},
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_rotor_forward), 7, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"b", 11, "", 0, 0}, {"p", 1, "", 0,
+    0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0}, {"motion_I", 9, "", 0, 0}}, (const
+    mstmm_port[]){{"d", 1, "m", 0, 0}, {"motion", 9, "", 0, 0}, {"e_B", 6, "N, N*m", 0, 0}, {"qdot",
+    1, "", 0, 0}}, "f690b02ccfb7d64783f9023167adb787d046f300547e3ac2d8f4ba8c6c7ba187", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_rotor_condense), 9, 4, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"b", 11, "",
+    0, 0}, {"p", 1, "", 0, 0}, {"S_K", 21, "", 0, 0}, {"e_K", 6, "N, N*m", 0, 0}, {"e_B", 6,
+    "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"G", 6, "", 0, 0}, {"g", 1,
+    "", 0, 0}, {"S_I", 21, "", 0, 0}, {"e_I", 6, "N, N*m", 0, 0}},
+    "f551c2d143da086a735f49102b912cdd5525e7d740213da03df19950800a767b", 3, (const mstmm_guard[]){{1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_link_screw_rotor_recover), 7, 2, (const
+    mstmm_port[]){{"link", 5, "", 0, 0}, {"turn", 2, "", 0, 0}, {"d", 1, "m", 0, 0}, {"p", 1, "", 0,
+    0}, {"G", 6, "", 0, 0}, {"g", 1, "", 0, 0}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"udot", 1, "", 0, 0}, {"delta", 6, "", 0, 0}},
+    "66e2cd68ad3be7e3a3a268b0eaa746e401f8ad6cb47d9e82d417dca699ae7eb5", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_link_screw_rotor = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "link_screw_rotor",
-    .hash = "a98aedc237505df831d405a893059fa3402edcf318cff455506924d25ce8ce4b",
+    .hash = "c568ff2daa65062699a7ae8b50d203c059fc82f753e6f8cb698d8fc9626d38eb",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,100 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_loops;
-int mstmm_sweep_loops_relative_pose(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
-    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
-    real *restrict d);
-int mstmm_sweep_loops_gap(const real *restrict R_e, const real *restrict R_C,
-    const real *restrict d, real *restrict gap);
-int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
-    const real *restrict v_B, const real *restrict w_B, real *restrict slip);
-int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
-    const real *restrict motion_B, real *restrict drift);
-int mstmm_sweep_loops_required_acceleration(const real *restrict gap, const real *restrict rate,
-    real *restrict relative);
-int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
-    real *restrict J_B);
-int mstmm_sweep_loops_known_parts(const real *restrict W, const real *restrict relative,
-    real *restrict l);
-int mstmm_sweep_loops_row_acceleration(const real *restrict J_A, const real *restrict J_B,
-    const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
-    real *restrict c);
-int mstmm_sweep_loops_apply_effort(const real *restrict J, const real *restrict tau,
-    real *restrict e);
-int mstmm_sweep_loops_pivot_inverse(const real *restrict L, const real *restrict floor_,
-    real *restrict inverse);
-int mstmm_sweep_loops_eliminate_row(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, real *restrict S, real *restrict e);
-int mstmm_sweep_loops_update_column(const real *restrict inverse, const real *restrict K,
-    const real *restrict L_p, real *restrict K_p);
-int mstmm_sweep_loops_update_known_part(const real *restrict inverse, const real *restrict l,
-    const real *restrict L_p, real *restrict l_p);
-int mstmm_sweep_loops_update_coupling(const real *restrict inverse, const real *restrict L_p,
-    const real *restrict L_q, real *restrict L_pq);
-int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
-    real *restrict x);
-int mstmm_sweep_loops_multiplier_of_motion(const real *restrict inverse, const real *restrict K,
-    const real *restrict delta, real *restrict x);
-int mstmm_sweep_loops_multiplier_of_row(const real *restrict inverse, const real *restrict L_p,
-    const real *restrict x_p, real *restrict x);
-int mstmm_sweep_loops_rotor_row_residual(const real *restrict softness, const real *restrict s,
-    const real *restrict x, real *restrict l);
-int mstmm_sweep_loops_apply_multiplier(const real *restrict K, const real *restrict x,
-    real *restrict e);
-int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
-    real *restrict gap);
-int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
-    real *restrict drift);
-int mstmm_sweep_loops_plane(const real *restrict p, const real *restrict d, real *restrict W,
-    real *restrict gap);
-int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
-    const real *restrict d, real *restrict W, real *restrict gap);
-int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
-    const real *restrict slip, real *restrict drift);
-int mstmm_sweep_loops_relative_pose_slope(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
-    const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
-    const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
-    const real *restrict d_Rc, const real *restrict d_r, real *restrict d_R_C, real *restrict d_r_A,
-    real *restrict d_d);
-int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
-    const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
-    const real *restrict d_d, const real *restrict d_v_C, const real *restrict d_w_C,
-    const real *restrict d_v_B, const real *restrict d_w_B, real *restrict d_slip);
-int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
-    const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
-    const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
-    real *restrict d_drift);
-int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
-    const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B);
-int mstmm_sweep_loops_known_parts_slope(const real *restrict W, const real *restrict relative,
-    const real *restrict d_W, const real *restrict d_relative, real *restrict d_l);
-int mstmm_sweep_loops_apply_effort_slope(const real *restrict J, const real *restrict tau,
-    const real *restrict d_J, const real *restrict d_tau, real *restrict d_e);
-int mstmm_sweep_loops_apply_multiplier_slope(const real *restrict K, const real *restrict x,
-    const real *restrict d_K, const real *restrict d_x, real *restrict d_e);
-int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
-    const real *restrict d_d, real *restrict d_W);
-int mstmm_sweep_loops_distance_drift_slope(const real *restrict d, const real *restrict slip,
-    const real *restrict d_d, const real *restrict d_slip, real *restrict d_drift);
-int mstmm_sweep_loops_plane_slope(const real *restrict p, const real *restrict d,
-    const real *restrict d_d, real *restrict d_W);
-int mstmm_sweep_loops_rolling_slope(const real *restrict p, const real *restrict R_C,
-    const real *restrict d, const real *restrict d_R_C, const real *restrict d_d,
-    real *restrict d_W);
-int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *restrict R_C,
-    const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
-    real *restrict d_drift);
-
 /* the two sides of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
  * source: Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)
@@ -115,149 +21,35 @@ int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *re
  * out r_A[3] (m) the end of B from P of A, axes of A
  * out d[3] (m) that end from the origin of C, axes of C
  */
-int mstmm_sweep_loops_relative_pose(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
-    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
-    real *restrict d)
+int mstmm_sweep_loops_relative_pose(in_t A_C, in_t x_C, in_t A_B, in_t x_B, in_t r_e, in_t Rc,
+    in_t r, out_t R_C, out_t r_A, out_t d)
 {
-    const real t0 = A_C[0] * A_B[0];
-    const real t1 = A_C[3] * A_B[3];
-    const real t2 = t0 + t1;
-    const real t3 = A_C[6] * A_B[6];
-    const real t4 = t2 + t3;
-    R_C[0] = t4;
-    const real t5 = A_C[1] * A_B[0];
-    const real t6 = A_C[4] * A_B[3];
-    const real t7 = t5 + t6;
-    const real t8 = A_C[7] * A_B[6];
-    const real t9 = t7 + t8;
-    R_C[1] = t9;
-    const real t10 = A_C[2] * A_B[0];
-    const real t11 = A_C[5] * A_B[3];
-    const real t12 = t10 + t11;
-    const real t13 = A_C[8] * A_B[6];
-    const real t14 = t12 + t13;
-    R_C[2] = t14;
-    const real t15 = A_C[0] * A_B[1];
-    const real t16 = A_C[3] * A_B[4];
-    const real t17 = t15 + t16;
-    const real t18 = A_C[6] * A_B[7];
-    const real t19 = t17 + t18;
-    R_C[3] = t19;
-    const real t20 = A_C[1] * A_B[1];
-    const real t21 = A_C[4] * A_B[4];
-    const real t22 = t20 + t21;
-    const real t23 = A_C[7] * A_B[7];
-    const real t24 = t22 + t23;
-    R_C[4] = t24;
-    const real t25 = A_C[2] * A_B[1];
-    const real t26 = A_C[5] * A_B[4];
-    const real t27 = t25 + t26;
-    const real t28 = A_C[8] * A_B[7];
-    const real t29 = t27 + t28;
-    R_C[5] = t29;
-    const real t30 = A_C[0] * A_B[2];
-    const real t31 = A_C[3] * A_B[5];
-    const real t32 = t30 + t31;
-    const real t33 = A_C[6] * A_B[8];
-    const real t34 = t32 + t33;
-    R_C[6] = t34;
-    const real t35 = A_C[1] * A_B[2];
-    const real t36 = A_C[4] * A_B[5];
-    const real t37 = t35 + t36;
-    const real t38 = A_C[7] * A_B[8];
-    const real t39 = t37 + t38;
-    R_C[7] = t39;
-    const real t40 = A_C[2] * A_B[2];
-    const real t41 = A_C[5] * A_B[5];
-    const real t42 = t40 + t41;
-    const real t43 = A_C[8] * A_B[8];
-    const real t44 = t42 + t43;
-    R_C[8] = t44;
-    const real t45 = A_B[0] * r_e[0];
-    const real t46 = A_B[1] * r_e[1];
-    const real t47 = t45 + t46;
-    const real t48 = A_B[2] * r_e[2];
-    const real t49 = t47 + t48;
-    const real t50 = t49 - x_C[0];
-    const real t51 = x_B[0] + t50;
-    const real t52 = A_C[0] * t51;
-    const real t53 = A_B[3] * r_e[0];
-    const real t54 = A_B[4] * r_e[1];
-    const real t55 = t53 + t54;
-    const real t56 = A_B[5] * r_e[2];
-    const real t57 = t55 + t56;
-    const real t58 = t57 - x_C[1];
-    const real t59 = x_B[1] + t58;
-    const real t60 = A_C[3] * t59;
-    const real t61 = t52 + t60;
-    const real t62 = A_B[6] * r_e[0];
-    const real t63 = A_B[7] * r_e[1];
-    const real t64 = t62 + t63;
-    const real t65 = A_B[8] * r_e[2];
-    const real t66 = t64 + t65;
-    const real t67 = t66 - x_C[2];
-    const real t68 = x_B[2] + t67;
-    const real t69 = A_C[6] * t68;
-    const real t70 = t61 + t69;
-    const real t71 = Rc[0] * t70;
-    const real t72 = A_C[1] * t51;
-    const real t73 = A_C[4] * t59;
-    const real t74 = t72 + t73;
-    const real t75 = A_C[7] * t68;
-    const real t76 = t74 + t75;
-    const real t77 = Rc[1] * t76;
-    const real t78 = t71 + t77;
-    const real t79 = A_C[2] * t51;
-    const real t80 = A_C[5] * t59;
-    const real t81 = t79 + t80;
-    const real t82 = A_C[8] * t68;
-    const real t83 = t81 + t82;
-    const real t84 = Rc[2] * t83;
-    const real t85 = t78 + t84;
-    const real t86 = r[0] + t85;
-    r_A[0] = t86;
-    const real t87 = Rc[3] * t70;
-    const real t88 = Rc[4] * t76;
-    const real t89 = t87 + t88;
-    const real t90 = Rc[5] * t83;
-    const real t91 = t89 + t90;
-    const real t92 = r[1] + t91;
-    r_A[1] = t92;
-    const real t93 = Rc[6] * t70;
-    const real t94 = Rc[7] * t76;
-    const real t95 = t93 + t94;
-    const real t96 = Rc[8] * t83;
-    const real t97 = t95 + t96;
-    const real t98 = r[2] + t97;
-    r_A[2] = t98;
-    d[0] = t70;
-    d[1] = t76;
-    d[2] = t83;
-    return 0;
+  R_C[0] = A_C[0] * A_B[0] + A_C[3] * A_B[3] + A_C[6] * A_B[6];
+  R_C[1] = A_C[1] * A_B[0] + A_C[4] * A_B[3] + A_C[7] * A_B[6];
+  R_C[2] = A_C[2] * A_B[0] + A_C[5] * A_B[3] + A_C[8] * A_B[6];
+  R_C[3] = A_C[0] * A_B[1] + A_C[3] * A_B[4] + A_C[6] * A_B[7];
+  R_C[4] = A_C[1] * A_B[1] + A_C[4] * A_B[4] + A_C[7] * A_B[7];
+  R_C[5] = A_C[2] * A_B[1] + A_C[5] * A_B[4] + A_C[8] * A_B[7];
+  R_C[6] = A_C[0] * A_B[2] + A_C[3] * A_B[5] + A_C[6] * A_B[8];
+  R_C[7] = A_C[1] * A_B[2] + A_C[4] * A_B[5] + A_C[7] * A_B[8];
+  R_C[8] = A_C[2] * A_B[2] + A_C[5] * A_B[5] + A_C[8] * A_B[8];
+  real t51 = x_B[0] + (A_B[0] * r_e[0] + A_B[1] * r_e[1] + A_B[2] * r_e[2] - x_C[0]);
+  real t59 = x_B[1] + (A_B[3] * r_e[0] + A_B[4] * r_e[1] + A_B[5] * r_e[2] - x_C[1]);
+  real t68 = x_B[2] + (A_B[6] * r_e[0] + A_B[7] * r_e[1] + A_B[8] * r_e[2] - x_C[2]);
+  real t70 = A_C[0] * t51 + A_C[3] * t59 + A_C[6] * t68;
+  real t76 = A_C[1] * t51 + A_C[4] * t59 + A_C[7] * t68;
+  real t83 = A_C[2] * t51 + A_C[5] * t59 + A_C[8] * t68;
+  r_A[0] = r[0] + (Rc[0] * t70 + Rc[1] * t76 + Rc[2] * t83);
+  r_A[1] = r[1] + (Rc[3] * t70 + Rc[4] * t76 + Rc[5] * t83);
+  r_A[2] = r[2] + (Rc[6] * t70 + Rc[7] * t76 + Rc[8] * t83);
+  d[0] = t70;
+  d[1] = t76;
+  d[2] = t83;
+  return 0;
 }
 
-static int mstmm_sweep_loops_relative_pose_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_relative_pose(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_loops_relative_pose_inputs[] = {
-    {"A_C", 9, "", 0, 0},
-    {"x_C", 3, "m", 0, 0},
-    {"A_B", 9, "", 0, 0},
-    {"x_B", 3, "m", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_relative_pose_outputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_A", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_relative_pose, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2]))
 
 /* position gap of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -267,90 +59,25 @@ static const mstmm_port mstmm_sweep_loops_relative_pose_outputs[] = {
  * in  d[3] (m) that end from the origin of C, axes of C
  * out gap[6] (m, rad) position gap, axes of C
  */
-int mstmm_sweep_loops_gap(const real *restrict R_e, const real *restrict R_C,
-    const real *restrict d, real *restrict gap)
+int mstmm_sweep_loops_gap(in_t R_e, in_t R_C, in_t d, out_t gap)
 {
-    gap[0] = d[0];
-    gap[1] = d[1];
-    gap[2] = d[2];
-    const real t0 = R_e[1] * R_C[2];
-    const real t1 = R_e[4] * R_C[5];
-    const real t2 = t0 + t1;
-    const real t3 = R_e[7] * R_C[8];
-    const real t4 = t2 + t3;
-    const real t5 = R_e[2] * R_C[1];
-    const real t6 = R_e[5] * R_C[4];
-    const real t7 = t5 + t6;
-    const real t8 = R_e[8] * R_C[7];
-    const real t9 = t7 + t8;
-    const real t10 = t4 - t9;
-    const real t11 = R_e[2] * R_C[2];
-    const real t12 = R_e[5] * R_C[5];
-    const real t13 = t11 + t12;
-    const real t14 = R_e[8] * R_C[8];
-    const real t15 = t13 + t14;
-    const real t16 = R_e[1] * R_C[1];
-    const real t17 = R_e[4] * R_C[4];
-    const real t18 = t16 + t17;
-    const real t19 = R_e[7] * R_C[7];
-    const real t20 = t18 + t19;
-    const real t21 = R_e[0] * R_C[0];
-    const real t22 = R_e[3] * R_C[3];
-    const real t23 = t21 + t22;
-    const real t24 = R_e[6] * R_C[6];
-    const real t25 = t23 + t24;
-    const real t26 = t25 + 1.0;
-    const real t27 = t20 + t26;
-    const real t28 = t15 + t27;
-    const real t29 = (((real)1 / (real)1000000000000) < t28 || isnan(t28)) ? t28 : ((real)1 / (real)1000000000000);
-    const real t30 = sqrt(t29);
-    const real t31 = 1.0 / t30;
-    const real t32 = t10 * t31;
-    gap[3] = t32;
-    const real t33 = R_e[2] * R_C[0];
-    const real t34 = R_e[5] * R_C[3];
-    const real t35 = t33 + t34;
-    const real t36 = R_e[8] * R_C[6];
-    const real t37 = t35 + t36;
-    const real t38 = R_e[0] * R_C[2];
-    const real t39 = R_e[3] * R_C[5];
-    const real t40 = t38 + t39;
-    const real t41 = R_e[6] * R_C[8];
-    const real t42 = t40 + t41;
-    const real t43 = t37 - t42;
-    const real t44 = t31 * t43;
-    gap[4] = t44;
-    const real t45 = R_e[0] * R_C[1];
-    const real t46 = R_e[3] * R_C[4];
-    const real t47 = t45 + t46;
-    const real t48 = R_e[6] * R_C[7];
-    const real t49 = t47 + t48;
-    const real t50 = R_e[1] * R_C[0];
-    const real t51 = R_e[4] * R_C[3];
-    const real t52 = t50 + t51;
-    const real t53 = R_e[7] * R_C[6];
-    const real t54 = t52 + t53;
-    const real t55 = t49 - t54;
-    const real t56 = t31 * t55;
-    gap[5] = t56;
-    return 0;
+  gap[0] = d[0];
+  gap[1] = d[1];
+  gap[2] = d[2];
+  real t28 = R_e[2] * R_C[2] + R_e[5] * R_C[5] + R_e[8] * R_C[8] + (R_e[1] * R_C[1] + R_e[4] *
+    R_C[4] + R_e[7] * R_C[7] + (R_e[0] * R_C[0] + R_e[3] * R_C[3] + R_e[6] * R_C[6] + 1.0));
+  real t31 = 1.0 / sqrt((((real)1 / (real)1000000000000) < t28 || isnan(t28)) ? t28 : ((real)1 /
+    (real)1000000000000));
+  gap[3] = (R_e[1] * R_C[2] + R_e[4] * R_C[5] + R_e[7] * R_C[8] - (R_e[2] * R_C[1] + R_e[5] * R_C[4]
+    + R_e[8] * R_C[7])) * t31;
+  gap[4] = t31 * (R_e[2] * R_C[0] + R_e[5] * R_C[3] + R_e[8] * R_C[6] - (R_e[0] * R_C[2] + R_e[3] *
+    R_C[5] + R_e[6] * R_C[8]));
+  gap[5] = t31 * (R_e[0] * R_C[1] + R_e[3] * R_C[4] + R_e[6] * R_C[7] - (R_e[1] * R_C[0] + R_e[4] *
+    R_C[3] + R_e[7] * R_C[6]));
+  return 0;
 }
 
-static int mstmm_sweep_loops_gap_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_gap(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_gap_inputs[] = {
-    {"R_e", 9, "", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_gap_outputs[] = {
-    {"gap", 6, "m, rad", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_gap, (in[0], in[1], in[2], out[0]))
 
 /* velocity error of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -364,98 +91,22 @@ static const mstmm_port mstmm_sweep_loops_gap_outputs[] = {
  * in  w_B[3] (rad/s) angular velocity of B, own axes
  * out slip[6] rate of d and relative angular velocity, axes of C
  */
-int mstmm_sweep_loops_slip(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
-    const real *restrict v_B, const real *restrict w_B, real *restrict slip)
+int mstmm_sweep_loops_slip(in_t R_C, in_t r_e, in_t d, in_t v_C, in_t w_C, in_t v_B, in_t w_B,
+    out_t slip)
 {
-    const real t0 = r_e[2] * w_B[1];
-    const real t1 = r_e[1] * w_B[2];
-    const real t2 = t0 - t1;
-    const real t3 = v_B[0] + t2;
-    const real t4 = R_C[0] * t3;
-    const real t5 = r_e[0] * w_B[2];
-    const real t6 = r_e[2] * w_B[0];
-    const real t7 = t5 - t6;
-    const real t8 = v_B[1] + t7;
-    const real t9 = R_C[3] * t8;
-    const real t10 = t4 + t9;
-    const real t11 = r_e[1] * w_B[0];
-    const real t12 = r_e[0] * w_B[1];
-    const real t13 = t11 - t12;
-    const real t14 = v_B[2] + t13;
-    const real t15 = R_C[6] * t14;
-    const real t16 = t10 + t15;
-    const real t17 = d[1] * w_C[2];
-    const real t18 = d[2] * w_C[1];
-    const real t19 = t17 - t18;
-    const real t20 = t19 - v_C[0];
-    const real t21 = t16 + t20;
-    slip[0] = t21;
-    const real t22 = R_C[1] * t3;
-    const real t23 = R_C[4] * t8;
-    const real t24 = t22 + t23;
-    const real t25 = R_C[7] * t14;
-    const real t26 = t24 + t25;
-    const real t27 = d[2] * w_C[0];
-    const real t28 = d[0] * w_C[2];
-    const real t29 = t27 - t28;
-    const real t30 = t29 - v_C[1];
-    const real t31 = t26 + t30;
-    slip[1] = t31;
-    const real t32 = R_C[2] * t3;
-    const real t33 = R_C[5] * t8;
-    const real t34 = t32 + t33;
-    const real t35 = R_C[8] * t14;
-    const real t36 = t34 + t35;
-    const real t37 = d[0] * w_C[1];
-    const real t38 = d[1] * w_C[0];
-    const real t39 = t37 - t38;
-    const real t40 = t39 - v_C[2];
-    const real t41 = t36 + t40;
-    slip[2] = t41;
-    const real t42 = R_C[0] * w_B[0];
-    const real t43 = R_C[3] * w_B[1];
-    const real t44 = t42 + t43;
-    const real t45 = R_C[6] * w_B[2];
-    const real t46 = t44 + t45;
-    const real t47 = t46 - w_C[0];
-    slip[3] = t47;
-    const real t48 = R_C[1] * w_B[0];
-    const real t49 = R_C[4] * w_B[1];
-    const real t50 = t48 + t49;
-    const real t51 = R_C[7] * w_B[2];
-    const real t52 = t50 + t51;
-    const real t53 = t52 - w_C[1];
-    slip[4] = t53;
-    const real t54 = R_C[2] * w_B[0];
-    const real t55 = R_C[5] * w_B[1];
-    const real t56 = t54 + t55;
-    const real t57 = R_C[8] * w_B[2];
-    const real t58 = t56 + t57;
-    const real t59 = t58 - w_C[2];
-    slip[5] = t59;
-    return 0;
+  real t3 = v_B[0] + (r_e[2] * w_B[1] - r_e[1] * w_B[2]);
+  real t8 = v_B[1] + (r_e[0] * w_B[2] - r_e[2] * w_B[0]);
+  real t14 = v_B[2] + (r_e[1] * w_B[0] - r_e[0] * w_B[1]);
+  slip[0] = R_C[0] * t3 + R_C[3] * t8 + R_C[6] * t14 + (d[1] * w_C[2] - d[2] * w_C[1] - v_C[0]);
+  slip[1] = R_C[1] * t3 + R_C[4] * t8 + R_C[7] * t14 + (d[2] * w_C[0] - d[0] * w_C[2] - v_C[1]);
+  slip[2] = R_C[2] * t3 + R_C[5] * t8 + R_C[8] * t14 + (d[0] * w_C[1] - d[1] * w_C[0] - v_C[2]);
+  slip[3] = R_C[0] * w_B[0] + R_C[3] * w_B[1] + R_C[6] * w_B[2] - w_C[0];
+  slip[4] = R_C[1] * w_B[0] + R_C[4] * w_B[1] + R_C[7] * w_B[2] - w_C[1];
+  slip[5] = R_C[2] * w_B[0] + R_C[5] * w_B[1] + R_C[8] * w_B[2] - w_C[2];
+  return 0;
 }
 
-static int mstmm_sweep_loops_slip_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_slip(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_slip_inputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"v_C", 3, "m/s", 0, 0},
-    {"w_C", 3, "rad/s", 0, 0},
-    {"v_B", 3, "m/s", 0, 0},
-    {"w_B", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_slip_outputs[] = {
-    {"slip", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_slip, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]))
 
 /* drift of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -468,181 +119,46 @@ static const mstmm_port mstmm_sweep_loops_slip_outputs[] = {
  * in  motion_B[9] bias motion of B: w, wd, rdd, own axes
  * out drift[6] rate of the velocity error in the bias motion, axes of C
  */
-int mstmm_sweep_loops_drift(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
-    const real *restrict motion_B, real *restrict drift)
+int mstmm_sweep_loops_drift(in_t R_C, in_t r_e, in_t d, in_t slip, in_t motion_C, in_t motion_B,
+    out_t drift)
 {
-    const real t0 = slip[1] * motion_C[2];
-    const real t1 = 2.0 * t0;
-    const real t2 = slip[2] * motion_C[1];
-    const real t3 = 2.0 * t2;
-    const real t4 = t1 - t3;
-    const real t5 = t4 - motion_C[6];
-    const real t6 = r_e[2] * motion_B[4];
-    const real t7 = r_e[1] * motion_B[5];
-    const real t8 = t6 - t7;
-    const real t9 = motion_B[0] * motion_B[1];
-    const real t10 = r_e[1] * t9;
-    const real t11 = motion_B[1] * motion_B[1];
-    const real t12 = motion_B[2] * motion_B[2];
-    const real t13 = t11 + t12;
-    const real t14 = r_e[0] * t13;
-    const real t15 = t10 - t14;
-    const real t16 = motion_B[0] * motion_B[2];
-    const real t17 = r_e[2] * t16;
-    const real t18 = t15 + t17;
-    const real t19 = t8 + t18;
-    const real t20 = motion_B[6] + t19;
-    const real t21 = R_C[0] * t20;
-    const real t22 = r_e[0] * motion_B[5];
-    const real t23 = r_e[2] * motion_B[3];
-    const real t24 = t22 - t23;
-    const real t25 = r_e[0] * t9;
-    const real t26 = motion_B[0] * motion_B[0];
-    const real t27 = t12 + t26;
-    const real t28 = r_e[1] * t27;
-    const real t29 = t25 - t28;
-    const real t30 = motion_B[1] * motion_B[2];
-    const real t31 = r_e[2] * t30;
-    const real t32 = t29 + t31;
-    const real t33 = t24 + t32;
-    const real t34 = motion_B[7] + t33;
-    const real t35 = R_C[3] * t34;
-    const real t36 = t21 + t35;
-    const real t37 = r_e[1] * motion_B[3];
-    const real t38 = r_e[0] * motion_B[4];
-    const real t39 = t37 - t38;
-    const real t40 = r_e[0] * t16;
-    const real t41 = r_e[1] * t30;
-    const real t42 = t40 + t41;
-    const real t43 = t11 + t26;
-    const real t44 = r_e[2] * t43;
-    const real t45 = t42 - t44;
-    const real t46 = t39 + t45;
-    const real t47 = motion_B[8] + t46;
-    const real t48 = R_C[6] * t47;
-    const real t49 = t36 + t48;
-    const real t50 = d[1] * motion_C[5];
-    const real t51 = d[2] * motion_C[4];
-    const real t52 = t50 - t51;
-    const real t53 = motion_C[1] * motion_C[1];
-    const real t54 = motion_C[2] * motion_C[2];
-    const real t55 = t53 + t54;
-    const real t56 = d[0] * t55;
-    const real t57 = motion_C[0] * motion_C[1];
-    const real t58 = d[1] * t57;
-    const real t59 = t56 - t58;
-    const real t60 = motion_C[0] * motion_C[2];
-    const real t61 = d[2] * t60;
-    const real t62 = t59 - t61;
-    const real t63 = t52 + t62;
-    const real t64 = t49 + t63;
-    const real t65 = t5 + t64;
-    drift[0] = t65;
-    const real t66 = slip[2] * motion_C[0];
-    const real t67 = 2.0 * t66;
-    const real t68 = slip[0] * motion_C[2];
-    const real t69 = 2.0 * t68;
-    const real t70 = t67 - t69;
-    const real t71 = t70 - motion_C[7];
-    const real t72 = R_C[1] * t20;
-    const real t73 = R_C[4] * t34;
-    const real t74 = t72 + t73;
-    const real t75 = R_C[7] * t47;
-    const real t76 = t74 + t75;
-    const real t77 = d[2] * motion_C[3];
-    const real t78 = d[0] * motion_C[5];
-    const real t79 = t77 - t78;
-    const real t80 = motion_C[0] * motion_C[0];
-    const real t81 = t54 + t80;
-    const real t82 = d[1] * t81;
-    const real t83 = d[0] * t57;
-    const real t84 = t82 - t83;
-    const real t85 = motion_C[1] * motion_C[2];
-    const real t86 = d[2] * t85;
-    const real t87 = t84 - t86;
-    const real t88 = t79 + t87;
-    const real t89 = t76 + t88;
-    const real t90 = t71 + t89;
-    drift[1] = t90;
-    const real t91 = slip[0] * motion_C[1];
-    const real t92 = 2.0 * t91;
-    const real t93 = slip[1] * motion_C[0];
-    const real t94 = 2.0 * t93;
-    const real t95 = t92 - t94;
-    const real t96 = t95 - motion_C[8];
-    const real t97 = R_C[2] * t20;
-    const real t98 = R_C[5] * t34;
-    const real t99 = t97 + t98;
-    const real t100 = R_C[8] * t47;
-    const real t101 = t99 + t100;
-    const real t102 = d[0] * motion_C[4];
-    const real t103 = d[1] * motion_C[3];
-    const real t104 = t102 - t103;
-    const real t105 = t53 + t80;
-    const real t106 = d[2] * t105;
-    const real t107 = d[0] * t60;
-    const real t108 = d[1] * t85;
-    const real t109 = t107 + t108;
-    const real t110 = t106 - t109;
-    const real t111 = t104 + t110;
-    const real t112 = t101 + t111;
-    const real t113 = t96 + t112;
-    drift[2] = t113;
-    const real t114 = R_C[0] * motion_B[3];
-    const real t115 = R_C[3] * motion_B[4];
-    const real t116 = t114 + t115;
-    const real t117 = R_C[6] * motion_B[5];
-    const real t118 = t116 + t117;
-    const real t119 = slip[4] * motion_C[2];
-    const real t120 = slip[5] * motion_C[1];
-    const real t121 = t119 - t120;
-    const real t122 = t121 - motion_C[3];
-    const real t123 = t118 + t122;
-    drift[3] = t123;
-    const real t124 = R_C[1] * motion_B[3];
-    const real t125 = R_C[4] * motion_B[4];
-    const real t126 = t124 + t125;
-    const real t127 = R_C[7] * motion_B[5];
-    const real t128 = t126 + t127;
-    const real t129 = slip[5] * motion_C[0];
-    const real t130 = slip[3] * motion_C[2];
-    const real t131 = t129 - t130;
-    const real t132 = t131 - motion_C[4];
-    const real t133 = t128 + t132;
-    drift[4] = t133;
-    const real t134 = R_C[2] * motion_B[3];
-    const real t135 = R_C[5] * motion_B[4];
-    const real t136 = t134 + t135;
-    const real t137 = R_C[8] * motion_B[5];
-    const real t138 = t136 + t137;
-    const real t139 = slip[3] * motion_C[1];
-    const real t140 = slip[4] * motion_C[0];
-    const real t141 = t139 - t140;
-    const real t142 = t141 - motion_C[5];
-    const real t143 = t138 + t142;
-    drift[5] = t143;
-    return 0;
+  real t9 = motion_B[0] * motion_B[1];
+  real t11 = motion_B[1] * motion_B[1];
+  real t12 = motion_B[2] * motion_B[2];
+  real t16 = motion_B[0] * motion_B[2];
+  real t20 = motion_B[6] + (r_e[2] * motion_B[4] - r_e[1] * motion_B[5] + (r_e[1] * t9 - r_e[0] *
+    (t11 + t12) + r_e[2] * t16));
+  real t26 = motion_B[0] * motion_B[0];
+  real t30 = motion_B[1] * motion_B[2];
+  real t34 = motion_B[7] + (r_e[0] * motion_B[5] - r_e[2] * motion_B[3] + (r_e[0] * t9 - r_e[1] *
+    (t12 + t26) + r_e[2] * t30));
+  real t47 = motion_B[8] + (r_e[1] * motion_B[3] - r_e[0] * motion_B[4] + (r_e[0] * t16 + r_e[1] *
+    t30 - r_e[2] * (t11 + t26)));
+  real t53 = motion_C[1] * motion_C[1];
+  real t54 = motion_C[2] * motion_C[2];
+  real t57 = motion_C[0] * motion_C[1];
+  real t60 = motion_C[0] * motion_C[2];
+  drift[0] = 2.0 * (slip[1] * motion_C[2]) - 2.0 * (slip[2] * motion_C[1]) - motion_C[6] + (R_C[0] *
+    t20 + R_C[3] * t34 + R_C[6] * t47 + (d[1] * motion_C[5] - d[2] * motion_C[4] + (d[0] * (t53 +
+    t54) - d[1] * t57 - d[2] * t60)));
+  real t80 = motion_C[0] * motion_C[0];
+  real t85 = motion_C[1] * motion_C[2];
+  drift[1] = 2.0 * (slip[2] * motion_C[0]) - 2.0 * (slip[0] * motion_C[2]) - motion_C[7] + (R_C[1] *
+    t20 + R_C[4] * t34 + R_C[7] * t47 + (d[2] * motion_C[3] - d[0] * motion_C[5] + (d[1] * (t54 +
+    t80) - d[0] * t57 - d[2] * t85)));
+  drift[2] = 2.0 * (slip[0] * motion_C[1]) - 2.0 * (slip[1] * motion_C[0]) - motion_C[8] + (R_C[2] *
+    t20 + R_C[5] * t34 + R_C[8] * t47 + (d[0] * motion_C[4] - d[1] * motion_C[3] + (d[2] * (t53 +
+    t80) - (d[0] * t60 + d[1] * t85))));
+  drift[3] = R_C[0] * motion_B[3] + R_C[3] * motion_B[4] + R_C[6] * motion_B[5] + (slip[4] *
+    motion_C[2] - slip[5] * motion_C[1] - motion_C[3]);
+  drift[4] = R_C[1] * motion_B[3] + R_C[4] * motion_B[4] + R_C[7] * motion_B[5] + (slip[5] *
+    motion_C[0] - slip[3] * motion_C[2] - motion_C[4]);
+  drift[5] = R_C[2] * motion_B[3] + R_C[5] * motion_B[4] + R_C[8] * motion_B[5] + (slip[3] *
+    motion_C[1] - slip[4] * motion_C[0] - motion_C[5]);
+  return 0;
 }
 
-static int mstmm_sweep_loops_drift_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_drift(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_drift_inputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"slip", 6, "", 0, 0},
-    {"motion_C", 9, "", 0, 0},
-    {"motion_B", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_drift_outputs[] = {
-    {"drift", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_drift, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* accelerations that remove a position gap in a step
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -651,38 +167,18 @@ static const mstmm_port mstmm_sweep_loops_drift_outputs[] = {
  * in  rate[1] (1/s^2) accelerations by changes of coordinates
  * out relative[6] motion of the end of B relative to C
  */
-int mstmm_sweep_loops_required_acceleration(const real *restrict gap, const real *restrict rate,
-    real *restrict relative)
+int mstmm_sweep_loops_required_acceleration(in_t gap, in_t rate, out_t relative)
 {
-    const real t0 = gap[0] * rate[0];
-    relative[0] = t0;
-    const real t1 = gap[1] * rate[0];
-    relative[1] = t1;
-    const real t2 = gap[2] * rate[0];
-    relative[2] = t2;
-    const real t3 = gap[3] * rate[0];
-    relative[3] = t3;
-    const real t4 = gap[4] * rate[0];
-    relative[4] = t4;
-    const real t5 = gap[5] * rate[0];
-    relative[5] = t5;
-    return 0;
+  relative[0] = gap[0] * rate[0];
+  relative[1] = gap[1] * rate[0];
+  relative[2] = gap[2] * rate[0];
+  relative[3] = gap[3] * rate[0];
+  relative[4] = gap[4] * rate[0];
+  relative[5] = gap[5] * rate[0];
+  return 0;
 }
 
-static int mstmm_sweep_loops_required_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_required_acceleration(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_required_acceleration_inputs[] = {
-    {"gap", 6, "", 0, 0},
-    {"rate", 1, "1/s^2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_required_acceleration_outputs[] = {
-    {"relative", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_required_acceleration, (in[0], in[1], out[0]))
 
 /* row of a direction of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -695,130 +191,30 @@ static const mstmm_port mstmm_sweep_loops_required_acceleration_outputs[] = {
  * out J_A[6] row by the acceleration of A, at its P
  * out J_B[6] row by the acceleration of B, at its P
  */
-int mstmm_sweep_loops_row(const real *restrict w, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
-    real *restrict J_B)
+int mstmm_sweep_loops_row(in_t w, in_t R_C, in_t r_e, in_t Rc, in_t r_A, out_t J_A, out_t J_B)
 {
-    const real t0 = w[2] * Rc[2];
-    const real t1 = w[0] * Rc[0];
-    const real t2 = w[1] * Rc[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = -t4;
-    J_A[0] = t5;
-    const real t6 = w[2] * Rc[5];
-    const real t7 = w[0] * Rc[3];
-    const real t8 = w[1] * Rc[4];
-    const real t9 = t7 + t8;
-    const real t10 = t6 + t9;
-    const real t11 = -t10;
-    J_A[1] = t11;
-    const real t12 = w[2] * Rc[8];
-    const real t13 = w[0] * Rc[6];
-    const real t14 = w[1] * Rc[7];
-    const real t15 = t13 + t14;
-    const real t16 = t12 + t15;
-    const real t17 = -t16;
-    J_A[2] = t17;
-    const real t18 = r_A[2] * t10;
-    const real t19 = r_A[1] * t16;
-    const real t20 = t18 - t19;
-    const real t21 = w[3] * Rc[0];
-    const real t22 = t20 - t21;
-    const real t23 = w[4] * Rc[1];
-    const real t24 = t22 - t23;
-    const real t25 = w[5] * Rc[2];
-    const real t26 = t24 - t25;
-    J_A[3] = t26;
-    const real t27 = r_A[0] * t16;
-    const real t28 = r_A[2] * t4;
-    const real t29 = t27 - t28;
-    const real t30 = w[3] * Rc[3];
-    const real t31 = t29 - t30;
-    const real t32 = w[4] * Rc[4];
-    const real t33 = t31 - t32;
-    const real t34 = w[5] * Rc[5];
-    const real t35 = t33 - t34;
-    J_A[4] = t35;
-    const real t36 = r_A[1] * t4;
-    const real t37 = r_A[0] * t10;
-    const real t38 = t36 - t37;
-    const real t39 = w[3] * Rc[6];
-    const real t40 = t38 - t39;
-    const real t41 = w[4] * Rc[7];
-    const real t42 = t40 - t41;
-    const real t43 = w[5] * Rc[8];
-    const real t44 = t42 - t43;
-    J_A[5] = t44;
-    const real t45 = w[2] * R_C[2];
-    const real t46 = w[0] * R_C[0];
-    const real t47 = w[1] * R_C[1];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    J_B[0] = t49;
-    const real t50 = w[2] * R_C[5];
-    const real t51 = w[0] * R_C[3];
-    const real t52 = w[1] * R_C[4];
-    const real t53 = t51 + t52;
-    const real t54 = t50 + t53;
-    J_B[1] = t54;
-    const real t55 = w[2] * R_C[8];
-    const real t56 = w[0] * R_C[6];
-    const real t57 = w[1] * R_C[7];
-    const real t58 = t56 + t57;
-    const real t59 = t55 + t58;
-    J_B[2] = t59;
-    const real t60 = w[5] * R_C[2];
-    const real t61 = w[4] * R_C[1];
-    const real t62 = w[3] * R_C[0];
-    const real t63 = r_e[1] * t59;
-    const real t64 = r_e[2] * t54;
-    const real t65 = t63 - t64;
-    const real t66 = t62 + t65;
-    const real t67 = t61 + t66;
-    const real t68 = t60 + t67;
-    J_B[3] = t68;
-    const real t69 = w[5] * R_C[5];
-    const real t70 = w[4] * R_C[4];
-    const real t71 = w[3] * R_C[3];
-    const real t72 = r_e[2] * t49;
-    const real t73 = r_e[0] * t59;
-    const real t74 = t72 - t73;
-    const real t75 = t71 + t74;
-    const real t76 = t70 + t75;
-    const real t77 = t69 + t76;
-    J_B[4] = t77;
-    const real t78 = w[5] * R_C[8];
-    const real t79 = w[4] * R_C[7];
-    const real t80 = w[3] * R_C[6];
-    const real t81 = r_e[0] * t54;
-    const real t82 = r_e[1] * t49;
-    const real t83 = t81 - t82;
-    const real t84 = t80 + t83;
-    const real t85 = t79 + t84;
-    const real t86 = t78 + t85;
-    J_B[5] = t86;
-    return 0;
+  real t4 = w[2] * Rc[2] + (w[0] * Rc[0] + w[1] * Rc[1]);
+  J_A[0] = -t4;
+  real t10 = w[2] * Rc[5] + (w[0] * Rc[3] + w[1] * Rc[4]);
+  J_A[1] = -t10;
+  real t16 = w[2] * Rc[8] + (w[0] * Rc[6] + w[1] * Rc[7]);
+  J_A[2] = -t16;
+  J_A[3] = r_A[2] * t10 - r_A[1] * t16 - w[3] * Rc[0] - w[4] * Rc[1] - w[5] * Rc[2];
+  J_A[4] = r_A[0] * t16 - r_A[2] * t4 - w[3] * Rc[3] - w[4] * Rc[4] - w[5] * Rc[5];
+  J_A[5] = r_A[1] * t4 - r_A[0] * t10 - w[3] * Rc[6] - w[4] * Rc[7] - w[5] * Rc[8];
+  real t49 = w[2] * R_C[2] + (w[0] * R_C[0] + w[1] * R_C[1]);
+  J_B[0] = t49;
+  real t54 = w[2] * R_C[5] + (w[0] * R_C[3] + w[1] * R_C[4]);
+  J_B[1] = t54;
+  real t59 = w[2] * R_C[8] + (w[0] * R_C[6] + w[1] * R_C[7]);
+  J_B[2] = t59;
+  J_B[3] = w[5] * R_C[2] + (w[4] * R_C[1] + (w[3] * R_C[0] + (r_e[1] * t59 - r_e[2] * t54)));
+  J_B[4] = w[5] * R_C[5] + (w[4] * R_C[4] + (w[3] * R_C[3] + (r_e[2] * t49 - r_e[0] * t59)));
+  J_B[5] = w[5] * R_C[8] + (w[4] * R_C[7] + (w[3] * R_C[6] + (r_e[0] * t54 - r_e[1] * t49)));
+  return 0;
 }
 
-static int mstmm_sweep_loops_row_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_row(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_loops_row_inputs[] = {
-    {"w", 6, "", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r_A", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_row_outputs[] = {
-    {"J_A", 6, "", 0, 0},
-    {"J_B", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_row, (in[0], in[1], in[2], in[3], in[4], out[0], out[1]))
 
 /* known parts of the rows of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -827,98 +223,24 @@ static const mstmm_port mstmm_sweep_loops_row_outputs[] = {
  * in  relative[6] motion of the end of B relative to C
  * out l[6] known parts of the rows
  */
-int mstmm_sweep_loops_known_parts(const real *restrict W, const real *restrict relative,
-    real *restrict l)
+int mstmm_sweep_loops_known_parts(in_t W, in_t relative, out_t l)
 {
-    const real t0 = W[0] * relative[0];
-    const real t1 = W[1] * relative[1];
-    const real t2 = t0 + t1;
-    const real t3 = W[2] * relative[2];
-    const real t4 = t2 + t3;
-    const real t5 = W[3] * relative[3];
-    const real t6 = t4 + t5;
-    const real t7 = W[4] * relative[4];
-    const real t8 = t6 + t7;
-    const real t9 = W[5] * relative[5];
-    const real t10 = t8 + t9;
-    l[0] = t10;
-    const real t11 = W[6] * relative[0];
-    const real t12 = W[7] * relative[1];
-    const real t13 = t11 + t12;
-    const real t14 = W[8] * relative[2];
-    const real t15 = t13 + t14;
-    const real t16 = W[9] * relative[3];
-    const real t17 = t15 + t16;
-    const real t18 = W[10] * relative[4];
-    const real t19 = t17 + t18;
-    const real t20 = W[11] * relative[5];
-    const real t21 = t19 + t20;
-    l[1] = t21;
-    const real t22 = W[12] * relative[0];
-    const real t23 = W[13] * relative[1];
-    const real t24 = t22 + t23;
-    const real t25 = W[14] * relative[2];
-    const real t26 = t24 + t25;
-    const real t27 = W[15] * relative[3];
-    const real t28 = t26 + t27;
-    const real t29 = W[16] * relative[4];
-    const real t30 = t28 + t29;
-    const real t31 = W[17] * relative[5];
-    const real t32 = t30 + t31;
-    l[2] = t32;
-    const real t33 = W[18] * relative[0];
-    const real t34 = W[19] * relative[1];
-    const real t35 = t33 + t34;
-    const real t36 = W[20] * relative[2];
-    const real t37 = t35 + t36;
-    const real t38 = W[21] * relative[3];
-    const real t39 = t37 + t38;
-    const real t40 = W[22] * relative[4];
-    const real t41 = t39 + t40;
-    const real t42 = W[23] * relative[5];
-    const real t43 = t41 + t42;
-    l[3] = t43;
-    const real t44 = W[24] * relative[0];
-    const real t45 = W[25] * relative[1];
-    const real t46 = t44 + t45;
-    const real t47 = W[26] * relative[2];
-    const real t48 = t46 + t47;
-    const real t49 = W[27] * relative[3];
-    const real t50 = t48 + t49;
-    const real t51 = W[28] * relative[4];
-    const real t52 = t50 + t51;
-    const real t53 = W[29] * relative[5];
-    const real t54 = t52 + t53;
-    l[4] = t54;
-    const real t55 = W[30] * relative[0];
-    const real t56 = W[31] * relative[1];
-    const real t57 = t55 + t56;
-    const real t58 = W[32] * relative[2];
-    const real t59 = t57 + t58;
-    const real t60 = W[33] * relative[3];
-    const real t61 = t59 + t60;
-    const real t62 = W[34] * relative[4];
-    const real t63 = t61 + t62;
-    const real t64 = W[35] * relative[5];
-    const real t65 = t63 + t64;
-    l[5] = t65;
-    return 0;
+  l[0] = W[0] * relative[0] + W[1] * relative[1] + W[2] * relative[2] + W[3] * relative[3] + W[4] *
+    relative[4] + W[5] * relative[5];
+  l[1] = W[6] * relative[0] + W[7] * relative[1] + W[8] * relative[2] + W[9] * relative[3] + W[10] *
+    relative[4] + W[11] * relative[5];
+  l[2] = W[12] * relative[0] + W[13] * relative[1] + W[14] * relative[2] + W[15] * relative[3] +
+    W[16] * relative[4] + W[17] * relative[5];
+  l[3] = W[18] * relative[0] + W[19] * relative[1] + W[20] * relative[2] + W[21] * relative[3] +
+    W[22] * relative[4] + W[23] * relative[5];
+  l[4] = W[24] * relative[0] + W[25] * relative[1] + W[26] * relative[2] + W[27] * relative[3] +
+    W[28] * relative[4] + W[29] * relative[5];
+  l[5] = W[30] * relative[0] + W[31] * relative[1] + W[32] * relative[2] + W[33] * relative[3] +
+    W[34] * relative[4] + W[35] * relative[5];
+  return 0;
 }
 
-static int mstmm_sweep_loops_known_parts_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_known_parts(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_known_parts_inputs[] = {
-    {"W", 36, "", 0, 0},
-    {"relative", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_known_parts_outputs[] = {
-    {"l", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_known_parts, (in[0], in[1], out[0]))
 
 /* acceleration along a direction of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -930,55 +252,17 @@ static const mstmm_port mstmm_sweep_loops_known_parts_outputs[] = {
  * in  delta_B[6] deviation of the acceleration of B
  * out c[1] acceleration along the direction
  */
-int mstmm_sweep_loops_row_acceleration(const real *restrict J_A, const real *restrict J_B,
-    const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
-    real *restrict c)
+int mstmm_sweep_loops_row_acceleration(in_t J_A, in_t J_B, in_t l, in_t delta_A, in_t delta_B,
+    out_t c)
 {
-    const real t0 = J_A[0] * delta_A[0];
-    const real t1 = J_A[1] * delta_A[1];
-    const real t2 = t0 + t1;
-    const real t3 = J_A[2] * delta_A[2];
-    const real t4 = t2 + t3;
-    const real t5 = J_A[3] * delta_A[3];
-    const real t6 = t4 + t5;
-    const real t7 = J_A[4] * delta_A[4];
-    const real t8 = t6 + t7;
-    const real t9 = J_A[5] * delta_A[5];
-    const real t10 = t8 + t9;
-    const real t11 = J_B[0] * delta_B[0];
-    const real t12 = J_B[1] * delta_B[1];
-    const real t13 = t11 + t12;
-    const real t14 = J_B[2] * delta_B[2];
-    const real t15 = t13 + t14;
-    const real t16 = J_B[3] * delta_B[3];
-    const real t17 = t15 + t16;
-    const real t18 = J_B[4] * delta_B[4];
-    const real t19 = t17 + t18;
-    const real t20 = J_B[5] * delta_B[5];
-    const real t21 = t19 + t20;
-    const real t22 = t10 + t21;
-    const real t23 = l[0] + t22;
-    c[0] = t23;
-    return 0;
+  c[0] = l[0] + (J_A[0] * delta_A[0] + J_A[1] * delta_A[1] + J_A[2] * delta_A[2] + J_A[3] *
+    delta_A[3] + J_A[4] * delta_A[4] + J_A[5] * delta_A[5] + (J_B[0] * delta_B[0] + J_B[1] *
+    delta_B[1] + J_B[2] * delta_B[2] + J_B[3] * delta_B[3] + J_B[4] * delta_B[4] + J_B[5] *
+    delta_B[5]));
+  return 0;
 }
 
-static int mstmm_sweep_loops_row_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_row_acceleration(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_row_acceleration_inputs[] = {
-    {"J_A", 6, "", 0, 0},
-    {"J_B", 6, "", 0, 0},
-    {"l", 1, "", 0, 0},
-    {"delta_A", 6, "", 0, 0},
-    {"delta_B", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_row_acceleration_outputs[] = {
-    {"c", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_row_acceleration, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* load of an effort
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -987,44 +271,18 @@ static const mstmm_port mstmm_sweep_loops_row_acceleration_outputs[] = {
  * in  tau[1] (N, N*m) effort
  * out e[6] (N, N*m) force part of f = S a + e, added to what is there
  */
-int mstmm_sweep_loops_apply_effort(const real *restrict J, const real *restrict tau,
-    real *restrict e)
+int mstmm_sweep_loops_apply_effort(in_t J, in_t tau, out_t e)
 {
-    const real t0 = J[0] * tau[0];
-    const real t1 = -t0;
-    e[0] += t1;
-    const real t2 = J[1] * tau[0];
-    const real t3 = -t2;
-    e[1] += t3;
-    const real t4 = J[2] * tau[0];
-    const real t5 = -t4;
-    e[2] += t5;
-    const real t6 = J[3] * tau[0];
-    const real t7 = -t6;
-    e[3] += t7;
-    const real t8 = J[4] * tau[0];
-    const real t9 = -t8;
-    e[4] += t9;
-    const real t10 = J[5] * tau[0];
-    const real t11 = -t10;
-    e[5] += t11;
-    return 0;
+  e[0] += -(J[0] * tau[0]);
+  e[1] += -(J[1] * tau[0]);
+  e[2] += -(J[2] * tau[0]);
+  e[3] += -(J[3] * tau[0]);
+  e[4] += -(J[4] * tau[0]);
+  e[5] += -(J[5] * tau[0]);
+  return 0;
 }
 
-static int mstmm_sweep_loops_apply_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_apply_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_apply_effort_inputs[] = {
-    {"J", 6, "", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_apply_effort_outputs[] = {
-    {"e", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_apply_effort, (in[0], in[1], out[0]))
 
 /* pivot of an eliminated row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1033,30 +291,14 @@ static const mstmm_port mstmm_sweep_loops_apply_effort_outputs[] = {
  * in  floor[1] largest pivot that is rounding
  * out inverse[1] 1 / L_rr, zero where no motion affects the row
  */
-int mstmm_sweep_loops_pivot_inverse(const real *restrict L, const real *restrict floor_,
-    real *restrict inverse)
+int mstmm_sweep_loops_pivot_inverse(in_t L, in_t floor_, out_t inverse)
 {
-    const real t0 = floor_[0] < L[0];
-    const real t1 = 1.0 / L[0];
-    const real t2 = t0 != 0 ? t1 : 0.0;
-    inverse[0] = t2;
-    return 0;
+  real t1 = 1.0 / L[0];
+  inverse[0] = (floor_[0] < L[0]) ? t1 : 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_pivot_inverse_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_pivot_inverse(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_pivot_inverse_inputs[] = {
-    {"L", 1, "", 0, 0},
-    {"floor", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_pivot_inverse_outputs[] = {
-    {"inverse", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_pivot_inverse, (in[0], in[1], out[0]))
 
 /* a row eliminated where its ends meet
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1067,88 +309,45 @@ static const mstmm_port mstmm_sweep_loops_pivot_inverse_outputs[] = {
  * out S[21] S of the body, added to what is there
  * out e[6] e of the body, added to what is there
  */
-int mstmm_sweep_loops_eliminate_row(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, real *restrict S, real *restrict e)
+int mstmm_sweep_loops_eliminate_row(in_t inverse, in_t K, in_t l, out_t S, out_t e)
 {
-    const real t0 = inverse[0] * K[0];
-    const real t1 = K[0] * t0;
-    S[0] += t1;
-    const real t2 = K[1] * t0;
-    S[1] += t2;
-    const real t3 = K[2] * t0;
-    S[2] += t3;
-    const real t4 = K[3] * t0;
-    S[3] += t4;
-    const real t5 = K[4] * t0;
-    S[4] += t5;
-    const real t6 = K[5] * t0;
-    S[5] += t6;
-    const real t7 = inverse[0] * K[1];
-    const real t8 = K[1] * t7;
-    S[6] += t8;
-    const real t9 = K[2] * t7;
-    S[7] += t9;
-    const real t10 = K[3] * t7;
-    S[8] += t10;
-    const real t11 = K[4] * t7;
-    S[9] += t11;
-    const real t12 = K[5] * t7;
-    S[10] += t12;
-    const real t13 = inverse[0] * K[2];
-    const real t14 = K[2] * t13;
-    S[11] += t14;
-    const real t15 = K[3] * t13;
-    S[12] += t15;
-    const real t16 = K[4] * t13;
-    S[13] += t16;
-    const real t17 = K[5] * t13;
-    S[14] += t17;
-    const real t18 = inverse[0] * K[3];
-    const real t19 = K[3] * t18;
-    S[15] += t19;
-    const real t20 = K[4] * t18;
-    S[16] += t20;
-    const real t21 = K[5] * t18;
-    S[17] += t21;
-    const real t22 = inverse[0] * K[4];
-    const real t23 = K[4] * t22;
-    S[18] += t23;
-    const real t24 = K[5] * t22;
-    S[19] += t24;
-    const real t25 = inverse[0] * K[5];
-    const real t26 = K[5] * t25;
-    S[20] += t26;
-    const real t27 = l[0] * t0;
-    e[0] += t27;
-    const real t28 = l[0] * t7;
-    e[1] += t28;
-    const real t29 = l[0] * t13;
-    e[2] += t29;
-    const real t30 = l[0] * t18;
-    e[3] += t30;
-    const real t31 = l[0] * t22;
-    e[4] += t31;
-    const real t32 = l[0] * t25;
-    e[5] += t32;
-    return 0;
+  real t0 = inverse[0] * K[0];
+  S[0] += K[0] * t0;
+  S[1] += K[1] * t0;
+  S[2] += K[2] * t0;
+  S[3] += K[3] * t0;
+  S[4] += K[4] * t0;
+  S[5] += K[5] * t0;
+  real t7 = inverse[0] * K[1];
+  S[6] += K[1] * t7;
+  S[7] += K[2] * t7;
+  S[8] += K[3] * t7;
+  S[9] += K[4] * t7;
+  S[10] += K[5] * t7;
+  real t13 = inverse[0] * K[2];
+  S[11] += K[2] * t13;
+  S[12] += K[3] * t13;
+  S[13] += K[4] * t13;
+  S[14] += K[5] * t13;
+  real t18 = inverse[0] * K[3];
+  S[15] += K[3] * t18;
+  S[16] += K[4] * t18;
+  S[17] += K[5] * t18;
+  real t22 = inverse[0] * K[4];
+  S[18] += K[4] * t22;
+  S[19] += K[5] * t22;
+  real t25 = inverse[0] * K[5];
+  S[20] += K[5] * t25;
+  e[0] += l[0] * t0;
+  e[1] += l[0] * t7;
+  e[2] += l[0] * t13;
+  e[3] += l[0] * t18;
+  e[4] += l[0] * t22;
+  e[5] += l[0] * t25;
+  return 0;
 }
 
-static int mstmm_sweep_loops_eliminate_row_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_eliminate_row(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_loops_eliminate_row_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
-    {"l", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_eliminate_row_outputs[] = {
-    {"S", 21, "", 1, 0},
-    {"e", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_eliminate_row, (in[0], in[1], in[2], out[0], out[1]))
 
 /* column of a remaining row while another is eliminated
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1158,51 +357,18 @@ static const mstmm_port mstmm_sweep_loops_eliminate_row_outputs[] = {
  * in  L_p[1] entry of L of the eliminated row and another
  * out K_p[6] column of row p, added to what is there
  */
-int mstmm_sweep_loops_update_column(const real *restrict inverse, const real *restrict K,
-    const real *restrict L_p, real *restrict K_p)
+int mstmm_sweep_loops_update_column(in_t inverse, in_t K, in_t L_p, out_t K_p)
 {
-    const real t0 = K[0] * L_p[0];
-    const real t1 = inverse[0] * t0;
-    const real t2 = -t1;
-    K_p[0] += t2;
-    const real t3 = K[1] * L_p[0];
-    const real t4 = inverse[0] * t3;
-    const real t5 = -t4;
-    K_p[1] += t5;
-    const real t6 = K[2] * L_p[0];
-    const real t7 = inverse[0] * t6;
-    const real t8 = -t7;
-    K_p[2] += t8;
-    const real t9 = K[3] * L_p[0];
-    const real t10 = inverse[0] * t9;
-    const real t11 = -t10;
-    K_p[3] += t11;
-    const real t12 = K[4] * L_p[0];
-    const real t13 = inverse[0] * t12;
-    const real t14 = -t13;
-    K_p[4] += t14;
-    const real t15 = K[5] * L_p[0];
-    const real t16 = inverse[0] * t15;
-    const real t17 = -t16;
-    K_p[5] += t17;
-    return 0;
+  K_p[0] += -(inverse[0] * (K[0] * L_p[0]));
+  K_p[1] += -(inverse[0] * (K[1] * L_p[0]));
+  K_p[2] += -(inverse[0] * (K[2] * L_p[0]));
+  K_p[3] += -(inverse[0] * (K[3] * L_p[0]));
+  K_p[4] += -(inverse[0] * (K[4] * L_p[0]));
+  K_p[5] += -(inverse[0] * (K[5] * L_p[0]));
+  return 0;
 }
 
-static int mstmm_sweep_loops_update_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_update_column(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_update_column_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
-    {"L_p", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_update_column_outputs[] = {
-    {"K_p", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_update_column, (in[0], in[1], in[2], out[0]))
 
 /* known part of a remaining row while another is eliminated
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1212,31 +378,13 @@ static const mstmm_port mstmm_sweep_loops_update_column_outputs[] = {
  * in  L_p[1] entry of L of the eliminated row and another
  * out l_p[1] known part of row p, added to what is there
  */
-int mstmm_sweep_loops_update_known_part(const real *restrict inverse, const real *restrict l,
-    const real *restrict L_p, real *restrict l_p)
+int mstmm_sweep_loops_update_known_part(in_t inverse, in_t l, in_t L_p, out_t l_p)
 {
-    const real t0 = inverse[0] * L_p[0];
-    const real t1 = l[0] * t0;
-    const real t2 = -t1;
-    l_p[0] += t2;
-    return 0;
+  l_p[0] += -(l[0] * (inverse[0] * L_p[0]));
+  return 0;
 }
 
-static int mstmm_sweep_loops_update_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_update_known_part(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_update_known_part_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"l", 1, "", 0, 0},
-    {"L_p", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_update_known_part_outputs[] = {
-    {"l_p", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_update_known_part, (in[0], in[1], in[2], out[0]))
 
 /* two remaining rows while another is eliminated
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1246,31 +394,13 @@ static const mstmm_port mstmm_sweep_loops_update_known_part_outputs[] = {
  * in  L_q[1] entry of L of the eliminated row and the second
  * out L_pq[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_loops_update_coupling(const real *restrict inverse, const real *restrict L_p,
-    const real *restrict L_q, real *restrict L_pq)
+int mstmm_sweep_loops_update_coupling(in_t inverse, in_t L_p, in_t L_q, out_t L_pq)
 {
-    const real t0 = L_p[0] * L_q[0];
-    const real t1 = inverse[0] * t0;
-    const real t2 = -t1;
-    L_pq[0] += t2;
-    return 0;
+  L_pq[0] += -(inverse[0] * (L_p[0] * L_q[0]));
+  return 0;
 }
 
-static int mstmm_sweep_loops_update_coupling_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_update_coupling(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_update_coupling_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"L_p", 1, "", 0, 0},
-    {"L_q", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_update_coupling_outputs[] = {
-    {"L_pq", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_update_coupling, (in[0], in[1], in[2], out[0]))
 
 /* multiplier of a row
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1279,28 +409,13 @@ static const mstmm_port mstmm_sweep_loops_update_coupling_outputs[] = {
  * in  l[1] part of the row independent of multipliers and motion
  * out x[1] (N, N*m) multiplier
  */
-int mstmm_sweep_loops_multiplier(const real *restrict inverse, const real *restrict l,
-    real *restrict x)
+int mstmm_sweep_loops_multiplier(in_t inverse, in_t l, out_t x)
 {
-    const real t0 = inverse[0] * l[0];
-    x[0] = t0;
-    return 0;
+  x[0] = inverse[0] * l[0];
+  return 0;
 }
 
-static int mstmm_sweep_loops_multiplier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_multiplier(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_multiplier_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"l", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_multiplier_outputs[] = {
-    {"x", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_multiplier, (in[0], in[1], out[0]))
 
 /* contribution of a motion to a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1310,45 +425,15 @@ static const mstmm_port mstmm_sweep_loops_multiplier_outputs[] = {
  * in  delta[6] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
-int mstmm_sweep_loops_multiplier_of_motion(const real *restrict inverse, const real *restrict K,
-    const real *restrict delta, real *restrict x)
+int mstmm_sweep_loops_multiplier_of_motion(in_t inverse, in_t K, in_t delta, out_t x)
 {
-    const real t0 = inverse[0] * K[0];
-    const real t1 = delta[0] * t0;
-    const real t2 = inverse[0] * K[1];
-    const real t3 = delta[1] * t2;
-    const real t4 = t1 + t3;
-    const real t5 = inverse[0] * K[2];
-    const real t6 = delta[2] * t5;
-    const real t7 = t4 + t6;
-    const real t8 = inverse[0] * K[3];
-    const real t9 = delta[3] * t8;
-    const real t10 = t7 + t9;
-    const real t11 = inverse[0] * K[4];
-    const real t12 = delta[4] * t11;
-    const real t13 = t10 + t12;
-    const real t14 = inverse[0] * K[5];
-    const real t15 = delta[5] * t14;
-    const real t16 = t13 + t15;
-    x[0] += t16;
-    return 0;
+  x[0] += delta[0] * (inverse[0] * K[0]) + delta[1] * (inverse[0] * K[1]) + delta[2] * (inverse[0] *
+    K[2]) + delta[3] * (inverse[0] * K[3]) + delta[4] * (inverse[0] * K[4]) + delta[5] * (inverse[0]
+    * K[5]);
+  return 0;
 }
 
-static int mstmm_sweep_loops_multiplier_of_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_multiplier_of_motion(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_multiplier_of_motion_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"K", 6, "", 0, 0},
-    {"delta", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_multiplier_of_motion_outputs[] = {
-    {"x", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_multiplier_of_motion, (in[0], in[1], in[2], out[0]))
 
 /* contribution of another row to a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1358,31 +443,13 @@ static const mstmm_port mstmm_sweep_loops_multiplier_of_motion_outputs[] = {
  * in  x_p[1] (N, N*m) multiplier of row p
  * out x[1] multiplier of row r, added to what is there
  */
-int mstmm_sweep_loops_multiplier_of_row(const real *restrict inverse, const real *restrict L_p,
-    const real *restrict x_p, real *restrict x)
+int mstmm_sweep_loops_multiplier_of_row(in_t inverse, in_t L_p, in_t x_p, out_t x)
 {
-    const real t0 = inverse[0] * L_p[0];
-    const real t1 = x_p[0] * t0;
-    const real t2 = -t1;
-    x[0] += t2;
-    return 0;
+  x[0] += -(x_p[0] * (inverse[0] * L_p[0]));
+  return 0;
 }
 
-static int mstmm_sweep_loops_multiplier_of_row_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_multiplier_of_row(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_multiplier_of_row_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"L_p", 1, "", 0, 0},
-    {"x_p", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_multiplier_of_row_outputs[] = {
-    {"x", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_multiplier_of_row, (in[0], in[1], in[2], out[0]))
 
 /* the row of a rotor with a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1392,30 +459,13 @@ static const mstmm_port mstmm_sweep_loops_multiplier_of_row_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_loops_rotor_row_residual(const real *restrict softness, const real *restrict s,
-    const real *restrict x, real *restrict l)
+int mstmm_sweep_loops_rotor_row_residual(in_t softness, in_t s, in_t x, out_t l)
 {
-    const real t0 = softness[0] * x[0];
-    const real t1 = s[0] - t0;
-    l[0] += t1;
-    return 0;
+  l[0] += s[0] - softness[0] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_loops_rotor_row_residual_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_rotor_row_residual(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_rotor_row_residual_inputs[] = {
-    {"softness", 1, "", 0, 0},
-    {"s", 1, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_rotor_row_residual_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_rotor_row_residual, (in[0], in[1], in[2], out[0]))
 
 /* load of a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1424,38 +474,18 @@ static const mstmm_port mstmm_sweep_loops_rotor_row_residual_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out e[6] e of the body, added to what is there
  */
-int mstmm_sweep_loops_apply_multiplier(const real *restrict K, const real *restrict x,
-    real *restrict e)
+int mstmm_sweep_loops_apply_multiplier(in_t K, in_t x, out_t e)
 {
-    const real t0 = K[0] * x[0];
-    e[0] += t0;
-    const real t1 = K[1] * x[0];
-    e[1] += t1;
-    const real t2 = K[2] * x[0];
-    e[2] += t2;
-    const real t3 = K[3] * x[0];
-    e[3] += t3;
-    const real t4 = K[4] * x[0];
-    e[4] += t4;
-    const real t5 = K[5] * x[0];
-    e[5] += t5;
-    return 0;
+  e[0] += K[0] * x[0];
+  e[1] += K[1] * x[0];
+  e[2] += K[2] * x[0];
+  e[3] += K[3] * x[0];
+  e[4] += K[4] * x[0];
+  e[5] += K[5] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_loops_apply_multiplier_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_apply_multiplier(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_apply_multiplier_inputs[] = {
-    {"K", 6, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_apply_multiplier_outputs[] = {
-    {"e", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_apply_multiplier, (in[0], in[1], out[0]))
 
 /* row of a distance constraint
  * in  p[1] (m) prescribed distance
@@ -1463,153 +493,62 @@ static const mstmm_port mstmm_sweep_loops_apply_multiplier_outputs[] = {
  * out W[6][6] rows: H^+, then the constrained directions
  * out gap[6] (m) position gap of the constraint, axes of C
  */
-int mstmm_sweep_loops_distance(const real *restrict p, const real *restrict d, real *restrict W,
-    real *restrict gap)
+int mstmm_sweep_loops_distance(in_t p, in_t d, out_t W, out_t gap)
 {
-    const real t0 = d[2] * d[2];
-    const real t1 = d[0] * d[0];
-    const real t2 = d[1] * d[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 1e-24 < t4;
-    const real t6 = (1e-24 < t4 || isnan(t4)) ? t4 : 1e-24;
-    const real t7 = sqrt(t6);
-    const real t8 = 1.0 / t7;
-    const real t9 = d[0] * t8;
-    const real t10 = t5 != 0 ? t9 : 1.0;
-    W[0] = t10;
-    const real t11 = d[1] * t8;
-    const real t12 = t5 != 0 ? t11 : 0.0;
-    W[1] = t12;
-    const real t13 = d[2] * t8;
-    const real t14 = t5 != 0 ? t13 : 0.0;
-    W[2] = t14;
-    W[3] = 0.0;
-    W[4] = 0.0;
-    W[5] = 0.0;
-    W[6] = 0.0;
-    W[7] = 0.0;
-    W[8] = 0.0;
-    W[9] = 0.0;
-    W[10] = 0.0;
-    W[11] = 0.0;
-    W[12] = 0.0;
-    W[13] = 0.0;
-    W[14] = 0.0;
-    W[15] = 0.0;
-    W[16] = 0.0;
-    W[17] = 0.0;
-    W[18] = 0.0;
-    W[19] = 0.0;
-    W[20] = 0.0;
-    W[21] = 0.0;
-    W[22] = 0.0;
-    W[23] = 0.0;
-    W[24] = 0.0;
-    W[25] = 0.0;
-    W[26] = 0.0;
-    W[27] = 0.0;
-    W[28] = 0.0;
-    W[29] = 0.0;
-    W[30] = 0.0;
-    W[31] = 0.0;
-    W[32] = 0.0;
-    W[33] = 0.0;
-    W[34] = 0.0;
-    W[35] = 0.0;
-    const real t15 = t7 - p[0];
-    const real t16 = t10 * t15;
-    gap[0] = t16;
-    const real t17 = t12 * t15;
-    gap[1] = t17;
-    const real t18 = t14 * t15;
-    gap[2] = t18;
-    gap[3] = 0.0;
-    gap[4] = 0.0;
-    gap[5] = 0.0;
-    return 0;
+  real t4 = d[2] * d[2] + (d[0] * d[0] + d[1] * d[1]);
+  real t5 = 1e-24 < t4;
+  real t7 = sqrt((1e-24 < t4 || isnan(t4)) ? t4 : 1e-24);
+  real t8 = 1.0 / t7;
+  real t9 = d[0] * t8;
+  real t10 = t5 != 0 ? t9 : 1.0;
+  W[0] = t10;
+  real t11 = d[1] * t8;
+  real t12 = t5 != 0 ? t11 : 0.0;
+  W[1] = t12;
+  real t13 = d[2] * t8;
+  real t14 = t5 != 0 ? t13 : 0.0;
+  W[2] = t14;
+  W[3] = W[4] = W[5] = W[6] = W[7] = W[8] = W[9] = W[10] = W[11] = W[12] = W[13] = W[14] = W[15] =
+    W[16] = W[17] = W[18] = W[19] = W[20] = W[21] = W[22] = W[23] = W[24] = W[25] = W[26] = W[27] =
+    W[28] = W[29] = W[30] = W[31] = W[32] = W[33] = W[34] = W[35] = 0.0;
+  real t15 = t7 - p[0];
+  gap[0] = t10 * t15;
+  gap[1] = t12 * t15;
+  gap[2] = t14 * t15;
+  gap[3] = gap[4] = gap[5] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_distance_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_distance(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_loops_distance_inputs[] = {
-    {"p", 1, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_distance_outputs[] = {
-    {"W", 36, "", 0, 0},
-    {"gap", 6, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_distance, (in[0], in[1], out[0], out[1]))
 
 /* rate of the row of a distance constraint
  * in  d[3] (m) that end from the origin of C, axes of C
  * in  slip[6] rate of d and relative angular velocity, axes of C
  * out drift[6] rate of the velocity error in the bias motion, axes of C, added to what is there
  */
-int mstmm_sweep_loops_distance_drift(const real *restrict d, const real *restrict slip,
-    real *restrict drift)
+int mstmm_sweep_loops_distance_drift(in_t d, in_t slip, out_t drift)
 {
-    const real t0 = d[2] * d[2];
-    const real t1 = d[0] * d[0];
-    const real t2 = d[1] * d[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = (1e-24 < t4 || isnan(t4)) ? t4 : 1e-24;
-    const real t6 = sqrt(t5);
-    const real t7 = 1.0 / t6;
-    const real t8 = 1e-24 < t4;
-    const real t9 = d[0] * t7;
-    const real t10 = t8 != 0 ? t9 : 1.0;
-    const real t11 = slip[2] * slip[2];
-    const real t12 = slip[1] * slip[1];
-    const real t13 = slip[0] * slip[0];
-    const real t14 = d[2] * t7;
-    const real t15 = t8 != 0 ? t14 : 0.0;
-    const real t16 = slip[2] * t15;
-    const real t17 = slip[0] * t10;
-    const real t18 = d[1] * t7;
-    const real t19 = t8 != 0 ? t18 : 0.0;
-    const real t20 = slip[1] * t19;
-    const real t21 = t17 + t20;
-    const real t22 = t16 + t21;
-    const real t23 = t22 * t22;
-    const real t24 = t13 - t23;
-    const real t25 = t12 + t24;
-    const real t26 = t11 + t25;
-    const real t27 = t10 * t26;
-    const real t28 = t7 * t27;
-    drift[0] += t28;
-    const real t29 = t19 * t26;
-    const real t30 = t7 * t29;
-    drift[1] += t30;
-    const real t31 = t15 * t26;
-    const real t32 = t7 * t31;
-    drift[2] += t32;
-    drift[3] += 0.0;
-    drift[4] += 0.0;
-    drift[5] += 0.0;
-    return 0;
+  real t4 = d[2] * d[2] + (d[0] * d[0] + d[1] * d[1]);
+  real t7 = 1.0 / sqrt((1e-24 < t4 || isnan(t4)) ? t4 : 1e-24);
+  real t8 = 1e-24 < t4;
+  real t9 = d[0] * t7;
+  real t10 = t8 != 0 ? t9 : 1.0;
+  real t14 = d[2] * t7;
+  real t15 = t8 != 0 ? t14 : 0.0;
+  real t18 = d[1] * t7;
+  real t19 = t8 != 0 ? t18 : 0.0;
+  real t22 = slip[2] * t15 + (slip[0] * t10 + slip[1] * t19);
+  real t26 = slip[2] * slip[2] + (slip[1] * slip[1] + (slip[0] * slip[0] - t22 * t22));
+  drift[0] += t7 * (t10 * t26);
+  drift[1] += t7 * (t19 * t26);
+  drift[2] += t7 * (t15 * t26);
+  drift[3] += 0.0;
+  drift[4] += 0.0;
+  drift[5] += 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_distance_drift_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_distance_drift(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_distance_drift_inputs[] = {
-    {"d", 3, "m", 0, 0},
-    {"slip", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_distance_drift_outputs[] = {
-    {"drift", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_distance_drift, (in[0], in[1], out[0]))
 
 /* row of a point-on-plane constraint
  * in  p[1] (m) height of the plane over C
@@ -1617,70 +556,19 @@ static const mstmm_port mstmm_sweep_loops_distance_drift_outputs[] = {
  * out W[6][6] rows: H^+, then the constrained directions
  * out gap[6] (m) position gap of the constraint, axes of C
  */
-int mstmm_sweep_loops_plane(const real *restrict p, const real *restrict d, real *restrict W,
-    real *restrict gap)
+int mstmm_sweep_loops_plane(in_t p, in_t d, out_t W, out_t gap)
 {
-    W[0] = 0.0;
-    W[1] = 0.0;
-    W[2] = 1.0;
-    W[3] = 0.0;
-    W[4] = 0.0;
-    W[5] = 0.0;
-    W[6] = 0.0;
-    W[7] = 0.0;
-    W[8] = 0.0;
-    W[9] = 0.0;
-    W[10] = 0.0;
-    W[11] = 0.0;
-    W[12] = 0.0;
-    W[13] = 0.0;
-    W[14] = 0.0;
-    W[15] = 0.0;
-    W[16] = 0.0;
-    W[17] = 0.0;
-    W[18] = 0.0;
-    W[19] = 0.0;
-    W[20] = 0.0;
-    W[21] = 0.0;
-    W[22] = 0.0;
-    W[23] = 0.0;
-    W[24] = 0.0;
-    W[25] = 0.0;
-    W[26] = 0.0;
-    W[27] = 0.0;
-    W[28] = 0.0;
-    W[29] = 0.0;
-    W[30] = 0.0;
-    W[31] = 0.0;
-    W[32] = 0.0;
-    W[33] = 0.0;
-    W[34] = 0.0;
-    W[35] = 0.0;
-    gap[0] = 0.0;
-    gap[1] = 0.0;
-    const real t0 = d[2] - p[0];
-    gap[2] = t0;
-    gap[3] = 0.0;
-    gap[4] = 0.0;
-    gap[5] = 0.0;
-    return 0;
+  W[0] = W[1] = 0.0;
+  W[2] = 1.0;
+  W[3] = W[4] = W[5] = W[6] = W[7] = W[8] = W[9] = W[10] = W[11] = W[12] = W[13] = W[14] = W[15] =
+    W[16] = W[17] = W[18] = W[19] = W[20] = W[21] = W[22] = W[23] = W[24] = W[25] = W[26] = W[27] =
+    W[28] = W[29] = W[30] = W[31] = W[32] = W[33] = W[34] = W[35] = gap[0] = gap[1] = 0.0;
+  gap[2] = d[2] - p[0];
+  gap[3] = gap[4] = gap[5] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_plane_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_plane(in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_loops_plane_inputs[] = {
-    {"p", 1, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_plane_outputs[] = {
-    {"W", 36, "", 0, 0},
-    {"gap", 6, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_plane, (in[0], in[1], out[0], out[1]))
 
 /* rows of a disc that rolls on a plane
  * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
@@ -1689,114 +577,41 @@ static const mstmm_port mstmm_sweep_loops_plane_outputs[] = {
  * out W[6][6] rows: H^+, then the constrained directions
  * out gap[6] (m) position gap of the constraint, axes of C
  */
-int mstmm_sweep_loops_rolling(const real *restrict p, const real *restrict R_C,
-    const real *restrict d, real *restrict W, real *restrict gap)
+int mstmm_sweep_loops_rolling(in_t p, in_t R_C, in_t d, out_t W, out_t gap)
 {
-    const real t0 = p[2] * R_C[2];
-    const real t1 = p[3] * R_C[5];
-    const real t2 = t0 + t1;
-    const real t3 = p[4] * R_C[8];
-    const real t4 = t2 + t3;
-    const real t5 = t4 * t4;
-    const real t6 = 1.0 - t5;
-    const real t7 = t6 * t6;
-    const real t8 = p[2] * R_C[0];
-    const real t9 = p[3] * R_C[3];
-    const real t10 = t8 + t9;
-    const real t11 = p[4] * R_C[6];
-    const real t12 = t10 + t11;
-    const real t13 = t12 * t4;
-    const real t14 = t13 * t13;
-    const real t15 = p[2] * R_C[1];
-    const real t16 = p[3] * R_C[4];
-    const real t17 = t15 + t16;
-    const real t18 = p[4] * R_C[7];
-    const real t19 = t17 + t18;
-    const real t20 = t19 * t4;
-    const real t21 = t20 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = t7 + t22;
-    const real t24 = (1e-24 < t23 || isnan(t23)) ? t23 : 1e-24;
-    const real t25 = sqrt(t24);
-    const real t26 = ((real)1 / (real)1000) < t25;
-    if (!(t26 != 0)) return 1; /* the disc lies flat on its plane */
-    W[0] = 1.0;
-    W[1] = 0.0;
-    W[2] = 0.0;
-    W[3] = 0.0;
-    const real t27 = 1.0 / t25;
-    const real t28 = p[1] * t6;
-    const real t29 = t27 * t28;
-    const real t30 = -t29;
-    W[4] = t30;
-    const real t31 = p[1] * t20;
-    const real t32 = t27 * t31;
-    const real t33 = -t32;
-    W[5] = t33;
-    W[6] = 0.0;
-    W[7] = 1.0;
-    W[8] = 0.0;
-    W[9] = t29;
-    W[10] = 0.0;
-    const real t34 = p[1] * t13;
-    const real t35 = t34 * t27;
-    W[11] = t35;
-    W[12] = 0.0;
-    W[13] = 0.0;
-    W[14] = 1.0;
-    W[15] = t32;
-    const real t36 = -t35;
-    W[16] = t36;
-    W[17] = 0.0;
-    W[18] = 0.0;
-    W[19] = 0.0;
-    W[20] = 0.0;
-    W[21] = 0.0;
-    W[22] = 0.0;
-    W[23] = 0.0;
-    W[24] = 0.0;
-    W[25] = 0.0;
-    W[26] = 0.0;
-    W[27] = 0.0;
-    W[28] = 0.0;
-    W[29] = 0.0;
-    W[30] = 0.0;
-    W[31] = 0.0;
-    W[32] = 0.0;
-    W[33] = 0.0;
-    W[34] = 0.0;
-    W[35] = 0.0;
-    gap[0] = 0.0;
-    gap[1] = 0.0;
-    const real t37 = d[2] - p[0];
-    const real t38 = t37 - t29;
-    gap[2] = t38;
-    gap[3] = 0.0;
-    gap[4] = 0.0;
-    gap[5] = 0.0;
-    return 0;
+  real t4 = p[2] * R_C[2] + p[3] * R_C[5] + p[4] * R_C[8];
+  real t6 = 1.0 - t4 * t4;
+  real t13 = (p[2] * R_C[0] + p[3] * R_C[3] + p[4] * R_C[6]) * t4;
+  real t20 = (p[2] * R_C[1] + p[3] * R_C[4] + p[4] * R_C[7]) * t4;
+  real t23 = t6 * t6 + (t13 * t13 + t20 * t20);
+  real t25 = sqrt((1e-24 < t23 || isnan(t23)) ? t23 : 1e-24);
+  if (!((((real)1 / (real)1000) < t25))) return 1; /* the disc lies flat on its plane */
+  W[0] = 1.0;
+  W[1] = W[2] = W[3] = 0.0;
+  real t27 = 1.0 / t25;
+  real t29 = t27 * (p[1] * t6);
+  W[4] = -t29;
+  real t32 = t27 * (p[1] * t20);
+  W[5] = -t32;
+  W[6] = 0.0;
+  W[7] = 1.0;
+  W[8] = 0.0;
+  W[9] = t29;
+  W[10] = 0.0;
+  real t35 = p[1] * t13 * t27;
+  W[11] = t35;
+  W[12] = W[13] = 0.0;
+  W[14] = 1.0;
+  W[15] = t32;
+  W[16] = -t35;
+  W[17] = W[18] = W[19] = W[20] = W[21] = W[22] = W[23] = W[24] = W[25] = W[26] = W[27] = W[28] =
+    W[29] = W[30] = W[31] = W[32] = W[33] = W[34] = W[35] = gap[0] = gap[1] = 0.0;
+  gap[2] = d[2] - p[0] - t29;
+  gap[3] = gap[4] = gap[5] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_rolling_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_rolling(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_loops_rolling_inputs[] = {
-    {"p", 5, "m, -", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_rolling_outputs[] = {
-    {"W", 36, "", 0, 0},
-    {"gap", 6, "m", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_loops_rolling_guards[] = {
-    {1, "the disc lies flat on its plane"},
-};
+MSTMM_CALL(mstmm_sweep_loops_rolling, (in[0], in[1], in[2], out[0], out[1]))
 
 /* rate of the rows of a disc that rolls on a plane
  * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
@@ -1804,108 +619,34 @@ static const mstmm_guard mstmm_sweep_loops_rolling_guards[] = {
  * in  slip[6] rate of d and relative angular velocity, axes of C
  * out drift[6] rate of the velocity error in the bias motion, axes of C, added to what is there
  */
-int mstmm_sweep_loops_rolling_drift(const real *restrict p, const real *restrict R_C,
-    const real *restrict slip, real *restrict drift)
+int mstmm_sweep_loops_rolling_drift(in_t p, in_t R_C, in_t slip, out_t drift)
 {
-    const real t0 = p[2] * R_C[2];
-    const real t1 = p[3] * R_C[5];
-    const real t2 = t0 + t1;
-    const real t3 = p[4] * R_C[8];
-    const real t4 = t2 + t3;
-    const real t5 = t4 * t4;
-    const real t6 = 1.0 - t5;
-    const real t7 = t6 * t6;
-    const real t8 = p[2] * R_C[0];
-    const real t9 = p[3] * R_C[3];
-    const real t10 = t8 + t9;
-    const real t11 = p[4] * R_C[6];
-    const real t12 = t10 + t11;
-    const real t13 = t12 * t4;
-    const real t14 = t13 * t13;
-    const real t15 = p[2] * R_C[1];
-    const real t16 = p[3] * R_C[4];
-    const real t17 = t15 + t16;
-    const real t18 = p[4] * R_C[7];
-    const real t19 = t17 + t18;
-    const real t20 = t19 * t4;
-    const real t21 = t20 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = t7 + t22;
-    const real t24 = (1e-24 < t23 || isnan(t23)) ? t23 : 1e-24;
-    const real t25 = sqrt(t24);
-    const real t26 = 1.0 / t25;
-    const real t27 = slip[3] * t19;
-    const real t28 = slip[4] * t12;
-    const real t29 = t27 - t28;
-    const real t30 = t12 * t29;
-    const real t31 = slip[4] * t4;
-    const real t32 = slip[5] * t19;
-    const real t33 = t31 - t32;
-    const real t34 = t4 * t33;
-    const real t35 = t30 + t34;
-    const real t36 = t13 * t35;
-    const real t37 = t19 * t29;
-    const real t38 = slip[5] * t12;
-    const real t39 = slip[3] * t4;
-    const real t40 = t38 - t39;
-    const real t41 = t4 * t40;
-    const real t42 = t37 + t41;
-    const real t43 = t20 * t42;
-    const real t44 = t36 + t43;
-    const real t45 = t4 * t29;
-    const real t46 = 2.0 * t45;
-    const real t47 = t6 * t46;
-    const real t48 = t44 - t47;
-    const real t49 = t48 * t26;
-    const real t50 = t20 * t49;
-    const real t51 = t26 * t50;
-    const real t52 = t51 - t42;
-    const real t53 = p[1] * t52;
-    const real t54 = t26 * t53;
-    const real t55 = slip[5] * t54;
-    const real t56 = t6 * t49;
-    const real t57 = t26 * t56;
-    const real t58 = t46 + t57;
-    const real t59 = p[1] * t58;
-    const real t60 = t26 * t59;
-    const real t61 = slip[4] * t60;
-    const real t62 = t55 + t61;
-    drift[0] += t62;
-    const real t63 = t13 * t49;
-    const real t64 = t26 * t63;
-    const real t65 = t64 - t35;
-    const real t66 = p[1] * t65;
-    const real t67 = t26 * t66;
-    const real t68 = slip[5] * t67;
-    const real t69 = slip[3] * t60;
-    const real t70 = t68 + t69;
-    const real t71 = -t70;
-    drift[1] += t71;
-    const real t72 = slip[4] * t67;
-    const real t73 = slip[3] * t54;
-    const real t74 = t72 - t73;
-    drift[2] += t74;
-    drift[3] += 0.0;
-    drift[4] += 0.0;
-    drift[5] += 0.0;
-    return 0;
+  real t4 = p[2] * R_C[2] + p[3] * R_C[5] + p[4] * R_C[8];
+  real t6 = 1.0 - t4 * t4;
+  real t12 = p[2] * R_C[0] + p[3] * R_C[3] + p[4] * R_C[6];
+  real t13 = t12 * t4;
+  real t19 = p[2] * R_C[1] + p[3] * R_C[4] + p[4] * R_C[7];
+  real t20 = t19 * t4;
+  real t23 = t6 * t6 + (t13 * t13 + t20 * t20);
+  real t26 = 1.0 / sqrt((1e-24 < t23 || isnan(t23)) ? t23 : 1e-24);
+  real t29 = slip[3] * t19 - slip[4] * t12;
+  real t35 = t12 * t29 + t4 * (slip[4] * t4 - slip[5] * t19);
+  real t42 = t19 * t29 + t4 * (slip[5] * t12 - slip[3] * t4);
+  real t46 = 2.0 * (t4 * t29);
+  real t49 = (t13 * t35 + t20 * t42 - t6 * t46) * t26;
+  real t54 = t26 * (p[1] * (t26 * (t20 * t49) - t42));
+  real t60 = t26 * (p[1] * (t46 + t26 * (t6 * t49)));
+  drift[0] += slip[5] * t54 + slip[4] * t60;
+  real t67 = t26 * (p[1] * (t26 * (t13 * t49) - t35));
+  drift[1] += -(slip[5] * t67 + slip[3] * t60);
+  drift[2] += slip[4] * t67 - slip[3] * t54;
+  drift[3] += 0.0;
+  drift[4] += 0.0;
+  drift[5] += 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_rolling_drift_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_rolling_drift(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_rolling_drift_inputs[] = {
-    {"p", 5, "m, -", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"slip", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
-    {"drift", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_rolling_drift, (in[0], in[1], in[2], out[0]))
 
 /* relative_pose and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1927,284 +668,58 @@ static const mstmm_port mstmm_sweep_loops_rolling_drift_outputs[] = {
  * out d_r_A[3] (m) derivative of r_A
  * out d_d[3] (m) derivative of d
  */
-int mstmm_sweep_loops_relative_pose_slope(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
-    const real *restrict Rc, const real *restrict r, const real *restrict d_A_C,
-    const real *restrict d_x_C, const real *restrict d_A_B, const real *restrict d_x_B,
-    const real *restrict d_Rc, const real *restrict d_r, real *restrict d_R_C, real *restrict d_r_A,
-    real *restrict d_d)
+int mstmm_sweep_loops_relative_pose_slope(in_t A_C, in_t x_C, in_t A_B, in_t x_B, in_t r_e, in_t Rc,
+    in_t r, in_t d_A_C, in_t d_x_C, in_t d_A_B, in_t d_x_B, in_t d_Rc, in_t d_r, out_t d_R_C,
+    out_t d_r_A, out_t d_d)
 {
-    (void)r;
-    const real t0 = A_B[6] * d_A_C[6];
-    const real t1 = A_C[6] * d_A_B[6];
-    const real t2 = t0 + t1;
-    const real t3 = A_B[3] * d_A_C[3];
-    const real t4 = A_C[3] * d_A_B[3];
-    const real t5 = t3 + t4;
-    const real t6 = A_B[0] * d_A_C[0];
-    const real t7 = A_C[0] * d_A_B[0];
-    const real t8 = t6 + t7;
-    const real t9 = t5 + t8;
-    const real t10 = t2 + t9;
-    d_R_C[0] = t10;
-    const real t11 = A_C[7] * d_A_B[6];
-    const real t12 = A_B[6] * d_A_C[7];
-    const real t13 = t11 + t12;
-    const real t14 = A_C[4] * d_A_B[3];
-    const real t15 = A_B[3] * d_A_C[4];
-    const real t16 = t14 + t15;
-    const real t17 = A_C[1] * d_A_B[0];
-    const real t18 = A_B[0] * d_A_C[1];
-    const real t19 = t17 + t18;
-    const real t20 = t16 + t19;
-    const real t21 = t13 + t20;
-    d_R_C[1] = t21;
-    const real t22 = A_C[8] * d_A_B[6];
-    const real t23 = A_B[6] * d_A_C[8];
-    const real t24 = t22 + t23;
-    const real t25 = A_C[5] * d_A_B[3];
-    const real t26 = A_B[3] * d_A_C[5];
-    const real t27 = t25 + t26;
-    const real t28 = A_C[2] * d_A_B[0];
-    const real t29 = A_B[0] * d_A_C[2];
-    const real t30 = t28 + t29;
-    const real t31 = t27 + t30;
-    const real t32 = t24 + t31;
-    d_R_C[2] = t32;
-    const real t33 = A_B[7] * d_A_C[6];
-    const real t34 = A_C[6] * d_A_B[7];
-    const real t35 = t33 + t34;
-    const real t36 = A_B[4] * d_A_C[3];
-    const real t37 = A_C[3] * d_A_B[4];
-    const real t38 = t36 + t37;
-    const real t39 = A_B[1] * d_A_C[0];
-    const real t40 = A_C[0] * d_A_B[1];
-    const real t41 = t39 + t40;
-    const real t42 = t38 + t41;
-    const real t43 = t35 + t42;
-    d_R_C[3] = t43;
-    const real t44 = A_B[7] * d_A_C[7];
-    const real t45 = A_C[7] * d_A_B[7];
-    const real t46 = t44 + t45;
-    const real t47 = A_B[4] * d_A_C[4];
-    const real t48 = A_C[4] * d_A_B[4];
-    const real t49 = t47 + t48;
-    const real t50 = A_B[1] * d_A_C[1];
-    const real t51 = A_C[1] * d_A_B[1];
-    const real t52 = t50 + t51;
-    const real t53 = t49 + t52;
-    const real t54 = t46 + t53;
-    d_R_C[4] = t54;
-    const real t55 = A_B[7] * d_A_C[8];
-    const real t56 = A_C[8] * d_A_B[7];
-    const real t57 = t55 + t56;
-    const real t58 = A_B[4] * d_A_C[5];
-    const real t59 = A_C[5] * d_A_B[4];
-    const real t60 = t58 + t59;
-    const real t61 = A_B[1] * d_A_C[2];
-    const real t62 = A_C[2] * d_A_B[1];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    d_R_C[5] = t65;
-    const real t66 = A_B[8] * d_A_C[6];
-    const real t67 = A_C[6] * d_A_B[8];
-    const real t68 = t66 + t67;
-    const real t69 = A_B[5] * d_A_C[3];
-    const real t70 = A_C[3] * d_A_B[5];
-    const real t71 = t69 + t70;
-    const real t72 = A_B[2] * d_A_C[0];
-    const real t73 = A_C[0] * d_A_B[2];
-    const real t74 = t72 + t73;
-    const real t75 = t71 + t74;
-    const real t76 = t68 + t75;
-    d_R_C[6] = t76;
-    const real t77 = A_B[8] * d_A_C[7];
-    const real t78 = A_C[7] * d_A_B[8];
-    const real t79 = t77 + t78;
-    const real t80 = A_B[5] * d_A_C[4];
-    const real t81 = A_C[4] * d_A_B[5];
-    const real t82 = t80 + t81;
-    const real t83 = A_B[2] * d_A_C[1];
-    const real t84 = A_C[1] * d_A_B[2];
-    const real t85 = t83 + t84;
-    const real t86 = t82 + t85;
-    const real t87 = t79 + t86;
-    d_R_C[7] = t87;
-    const real t88 = A_B[8] * d_A_C[8];
-    const real t89 = A_C[8] * d_A_B[8];
-    const real t90 = t88 + t89;
-    const real t91 = A_B[5] * d_A_C[5];
-    const real t92 = A_C[5] * d_A_B[5];
-    const real t93 = t91 + t92;
-    const real t94 = A_B[2] * d_A_C[2];
-    const real t95 = A_C[2] * d_A_B[2];
-    const real t96 = t94 + t95;
-    const real t97 = t93 + t96;
-    const real t98 = t90 + t97;
-    d_R_C[8] = t98;
-    const real t99 = A_B[6] * r_e[0];
-    const real t100 = A_B[7] * r_e[1];
-    const real t101 = t99 + t100;
-    const real t102 = A_B[8] * r_e[2];
-    const real t103 = t101 + t102;
-    const real t104 = t103 - x_C[2];
-    const real t105 = t104 + x_B[2];
-    const real t106 = t105 * d_A_C[8];
-    const real t107 = r_e[2] * d_A_B[8];
-    const real t108 = r_e[1] * d_A_B[7];
-    const real t109 = r_e[0] * d_A_B[6];
-    const real t110 = t108 + t109;
-    const real t111 = t107 + t110;
-    const real t112 = t111 - d_x_C[2];
-    const real t113 = d_x_B[2] + t112;
-    const real t114 = A_C[8] * t113;
-    const real t115 = t106 + t114;
-    const real t116 = A_B[3] * r_e[0];
-    const real t117 = A_B[4] * r_e[1];
-    const real t118 = t116 + t117;
-    const real t119 = A_B[5] * r_e[2];
-    const real t120 = t118 + t119;
-    const real t121 = t120 - x_C[1];
-    const real t122 = t121 + x_B[1];
-    const real t123 = t122 * d_A_C[5];
-    const real t124 = r_e[2] * d_A_B[5];
-    const real t125 = r_e[1] * d_A_B[4];
-    const real t126 = r_e[0] * d_A_B[3];
-    const real t127 = t125 + t126;
-    const real t128 = t124 + t127;
-    const real t129 = t128 - d_x_C[1];
-    const real t130 = d_x_B[1] + t129;
-    const real t131 = A_C[5] * t130;
-    const real t132 = t123 + t131;
-    const real t133 = A_B[0] * r_e[0];
-    const real t134 = A_B[1] * r_e[1];
-    const real t135 = t133 + t134;
-    const real t136 = A_B[2] * r_e[2];
-    const real t137 = t135 + t136;
-    const real t138 = t137 - x_C[0];
-    const real t139 = t138 + x_B[0];
-    const real t140 = t139 * d_A_C[2];
-    const real t141 = r_e[2] * d_A_B[2];
-    const real t142 = r_e[1] * d_A_B[1];
-    const real t143 = r_e[0] * d_A_B[0];
-    const real t144 = t142 + t143;
-    const real t145 = t141 + t144;
-    const real t146 = t145 - d_x_C[0];
-    const real t147 = d_x_B[0] + t146;
-    const real t148 = A_C[2] * t147;
-    const real t149 = t140 + t148;
-    const real t150 = t132 + t149;
-    const real t151 = t115 + t150;
-    const real t152 = Rc[2] * t151;
-    const real t153 = A_C[2] * t139;
-    const real t154 = A_C[5] * t122;
-    const real t155 = t153 + t154;
-    const real t156 = A_C[8] * t105;
-    const real t157 = t155 + t156;
-    const real t158 = t157 * d_Rc[2];
-    const real t159 = t152 + t158;
-    const real t160 = t105 * d_A_C[7];
-    const real t161 = A_C[7] * t113;
-    const real t162 = t160 + t161;
-    const real t163 = t122 * d_A_C[4];
-    const real t164 = A_C[4] * t130;
-    const real t165 = t163 + t164;
-    const real t166 = t139 * d_A_C[1];
-    const real t167 = A_C[1] * t147;
-    const real t168 = t166 + t167;
-    const real t169 = t165 + t168;
-    const real t170 = t162 + t169;
-    const real t171 = Rc[1] * t170;
-    const real t172 = A_C[1] * t139;
-    const real t173 = A_C[4] * t122;
-    const real t174 = t172 + t173;
-    const real t175 = A_C[7] * t105;
-    const real t176 = t174 + t175;
-    const real t177 = t176 * d_Rc[1];
-    const real t178 = t171 + t177;
-    const real t179 = t105 * d_A_C[6];
-    const real t180 = A_C[6] * t113;
-    const real t181 = t179 + t180;
-    const real t182 = t122 * d_A_C[3];
-    const real t183 = A_C[3] * t130;
-    const real t184 = t182 + t183;
-    const real t185 = t139 * d_A_C[0];
-    const real t186 = A_C[0] * t147;
-    const real t187 = t185 + t186;
-    const real t188 = t184 + t187;
-    const real t189 = t181 + t188;
-    const real t190 = Rc[0] * t189;
-    const real t191 = A_C[0] * t139;
-    const real t192 = A_C[3] * t122;
-    const real t193 = t191 + t192;
-    const real t194 = A_C[6] * t105;
-    const real t195 = t193 + t194;
-    const real t196 = t195 * d_Rc[0];
-    const real t197 = t190 + t196;
-    const real t198 = t178 + t197;
-    const real t199 = t159 + t198;
-    const real t200 = d_r[0] + t199;
-    d_r_A[0] = t200;
-    const real t201 = Rc[5] * t151;
-    const real t202 = t157 * d_Rc[5];
-    const real t203 = t201 + t202;
-    const real t204 = Rc[4] * t170;
-    const real t205 = t176 * d_Rc[4];
-    const real t206 = t204 + t205;
-    const real t207 = Rc[3] * t189;
-    const real t208 = t195 * d_Rc[3];
-    const real t209 = t207 + t208;
-    const real t210 = t206 + t209;
-    const real t211 = t203 + t210;
-    const real t212 = d_r[1] + t211;
-    d_r_A[1] = t212;
-    const real t213 = Rc[8] * t151;
-    const real t214 = t157 * d_Rc[8];
-    const real t215 = t213 + t214;
-    const real t216 = Rc[7] * t170;
-    const real t217 = t176 * d_Rc[7];
-    const real t218 = t216 + t217;
-    const real t219 = Rc[6] * t189;
-    const real t220 = t195 * d_Rc[6];
-    const real t221 = t219 + t220;
-    const real t222 = t218 + t221;
-    const real t223 = t215 + t222;
-    const real t224 = d_r[2] + t223;
-    d_r_A[2] = t224;
-    d_d[0] = t189;
-    d_d[1] = t170;
-    d_d[2] = t151;
-    return 0;
+  (void)r;
+  d_R_C[0] = A_B[6] * d_A_C[6] + A_C[6] * d_A_B[6] + (A_B[3] * d_A_C[3] + A_C[3] * d_A_B[3] +
+    (A_B[0] * d_A_C[0] + A_C[0] * d_A_B[0]));
+  d_R_C[1] = A_C[7] * d_A_B[6] + A_B[6] * d_A_C[7] + (A_C[4] * d_A_B[3] + A_B[3] * d_A_C[4] +
+    (A_C[1] * d_A_B[0] + A_B[0] * d_A_C[1]));
+  d_R_C[2] = A_C[8] * d_A_B[6] + A_B[6] * d_A_C[8] + (A_C[5] * d_A_B[3] + A_B[3] * d_A_C[5] +
+    (A_C[2] * d_A_B[0] + A_B[0] * d_A_C[2]));
+  d_R_C[3] = A_B[7] * d_A_C[6] + A_C[6] * d_A_B[7] + (A_B[4] * d_A_C[3] + A_C[3] * d_A_B[4] +
+    (A_B[1] * d_A_C[0] + A_C[0] * d_A_B[1]));
+  d_R_C[4] = A_B[7] * d_A_C[7] + A_C[7] * d_A_B[7] + (A_B[4] * d_A_C[4] + A_C[4] * d_A_B[4] +
+    (A_B[1] * d_A_C[1] + A_C[1] * d_A_B[1]));
+  d_R_C[5] = A_B[7] * d_A_C[8] + A_C[8] * d_A_B[7] + (A_B[4] * d_A_C[5] + A_C[5] * d_A_B[4] +
+    (A_B[1] * d_A_C[2] + A_C[2] * d_A_B[1]));
+  d_R_C[6] = A_B[8] * d_A_C[6] + A_C[6] * d_A_B[8] + (A_B[5] * d_A_C[3] + A_C[3] * d_A_B[5] +
+    (A_B[2] * d_A_C[0] + A_C[0] * d_A_B[2]));
+  d_R_C[7] = A_B[8] * d_A_C[7] + A_C[7] * d_A_B[8] + (A_B[5] * d_A_C[4] + A_C[4] * d_A_B[5] +
+    (A_B[2] * d_A_C[1] + A_C[1] * d_A_B[2]));
+  d_R_C[8] = A_B[8] * d_A_C[8] + A_C[8] * d_A_B[8] + (A_B[5] * d_A_C[5] + A_C[5] * d_A_B[5] +
+    (A_B[2] * d_A_C[2] + A_C[2] * d_A_B[2]));
+  real t105 = A_B[6] * r_e[0] + A_B[7] * r_e[1] + A_B[8] * r_e[2] - x_C[2] + x_B[2];
+  real t113 = d_x_B[2] + (r_e[2] * d_A_B[8] + (r_e[1] * d_A_B[7] + r_e[0] * d_A_B[6]) - d_x_C[2]);
+  real t122 = A_B[3] * r_e[0] + A_B[4] * r_e[1] + A_B[5] * r_e[2] - x_C[1] + x_B[1];
+  real t130 = d_x_B[1] + (r_e[2] * d_A_B[5] + (r_e[1] * d_A_B[4] + r_e[0] * d_A_B[3]) - d_x_C[1]);
+  real t139 = A_B[0] * r_e[0] + A_B[1] * r_e[1] + A_B[2] * r_e[2] - x_C[0] + x_B[0];
+  real t147 = d_x_B[0] + (r_e[2] * d_A_B[2] + (r_e[1] * d_A_B[1] + r_e[0] * d_A_B[0]) - d_x_C[0]);
+  real t151 = t105 * d_A_C[8] + A_C[8] * t113 + (t122 * d_A_C[5] + A_C[5] * t130 + (t139 * d_A_C[2]
+    + A_C[2] * t147));
+  real t157 = A_C[2] * t139 + A_C[5] * t122 + A_C[8] * t105;
+  real t170 = t105 * d_A_C[7] + A_C[7] * t113 + (t122 * d_A_C[4] + A_C[4] * t130 + (t139 * d_A_C[1]
+    + A_C[1] * t147));
+  real t176 = A_C[1] * t139 + A_C[4] * t122 + A_C[7] * t105;
+  real t189 = t105 * d_A_C[6] + A_C[6] * t113 + (t122 * d_A_C[3] + A_C[3] * t130 + (t139 * d_A_C[0]
+    + A_C[0] * t147));
+  real t195 = A_C[0] * t139 + A_C[3] * t122 + A_C[6] * t105;
+  d_r_A[0] = d_r[0] + (Rc[2] * t151 + t157 * d_Rc[2] + (Rc[1] * t170 + t176 * d_Rc[1] + (Rc[0] *
+    t189 + t195 * d_Rc[0])));
+  d_r_A[1] = d_r[1] + (Rc[5] * t151 + t157 * d_Rc[5] + (Rc[4] * t170 + t176 * d_Rc[4] + (Rc[3] *
+    t189 + t195 * d_Rc[3])));
+  d_r_A[2] = d_r[2] + (Rc[8] * t151 + t157 * d_Rc[8] + (Rc[7] * t170 + t176 * d_Rc[7] + (Rc[6] *
+    t189 + t195 * d_Rc[6])));
+  d_d[0] = t189;
+  d_d[1] = t170;
+  d_d[2] = t151;
+  return 0;
 }
 
-static int mstmm_sweep_loops_relative_pose_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_relative_pose_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_loops_relative_pose_slope_inputs[] = {
-    {"A_C", 9, "", 0, 0},
-    {"x_C", 3, "m", 0, 0},
-    {"A_B", 9, "", 0, 0},
-    {"x_B", 3, "m", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"d_A_C", 9, "", 0, 0},
-    {"d_x_C", 3, "m", 0, 0},
-    {"d_A_B", 9, "", 0, 0},
-    {"d_x_B", 3, "m", 0, 0},
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_relative_pose_slope_outputs[] = {
-    {"d_R_C", 9, "", 0, 0},
-    {"d_r_A", 3, "m", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_relative_pose_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2]))
 
 /* slip and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -2224,167 +739,36 @@ static const mstmm_port mstmm_sweep_loops_relative_pose_slope_outputs[] = {
  * in  d_w_B[3] (rad/s) derivative of w_B
  * out d_slip[6] derivative of slip
  */
-int mstmm_sweep_loops_slip_slope(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
-    const real *restrict v_B, const real *restrict w_B, const real *restrict d_R_C,
-    const real *restrict d_d, const real *restrict d_v_C, const real *restrict d_w_C,
-    const real *restrict d_v_B, const real *restrict d_w_B, real *restrict d_slip)
+int mstmm_sweep_loops_slip_slope(in_t R_C, in_t r_e, in_t d, in_t v_C, in_t w_C, in_t v_B, in_t w_B,
+    in_t d_R_C, in_t d_d, in_t d_v_C, in_t d_w_C, in_t d_v_B, in_t d_w_B, out_t d_slip)
 {
-    (void)v_C;
-    const real t0 = w_C[2] * d_d[1];
-    const real t1 = d[1] * d_w_C[2];
-    const real t2 = t0 + t1;
-    const real t3 = w_C[1] * d_d[2];
-    const real t4 = d[2] * d_w_C[1];
-    const real t5 = t3 + t4;
-    const real t6 = t2 - t5;
-    const real t7 = t6 - d_v_C[0];
-    const real t8 = r_e[1] * d_w_B[0];
-    const real t9 = r_e[0] * d_w_B[1];
-    const real t10 = t8 - t9;
-    const real t11 = d_v_B[2] + t10;
-    const real t12 = R_C[6] * t11;
-    const real t13 = r_e[1] * w_B[0];
-    const real t14 = w_B[1] * r_e[0];
-    const real t15 = t13 - t14;
-    const real t16 = t15 + v_B[2];
-    const real t17 = t16 * d_R_C[6];
-    const real t18 = t12 + t17;
-    const real t19 = r_e[0] * d_w_B[2];
-    const real t20 = r_e[2] * d_w_B[0];
-    const real t21 = t19 - t20;
-    const real t22 = d_v_B[1] + t21;
-    const real t23 = R_C[3] * t22;
-    const real t24 = w_B[2] * r_e[0];
-    const real t25 = r_e[2] * w_B[0];
-    const real t26 = t24 - t25;
-    const real t27 = t26 + v_B[1];
-    const real t28 = t27 * d_R_C[3];
-    const real t29 = t23 + t28;
-    const real t30 = r_e[2] * d_w_B[1];
-    const real t31 = r_e[1] * d_w_B[2];
-    const real t32 = t30 - t31;
-    const real t33 = d_v_B[0] + t32;
-    const real t34 = R_C[0] * t33;
-    const real t35 = r_e[2] * w_B[1];
-    const real t36 = r_e[1] * w_B[2];
-    const real t37 = t35 - t36;
-    const real t38 = t37 + v_B[0];
-    const real t39 = t38 * d_R_C[0];
-    const real t40 = t34 + t39;
-    const real t41 = t29 + t40;
-    const real t42 = t18 + t41;
-    const real t43 = t7 + t42;
-    d_slip[0] = t43;
-    const real t44 = w_C[0] * d_d[2];
-    const real t45 = d[2] * d_w_C[0];
-    const real t46 = t44 + t45;
-    const real t47 = d[0] * d_w_C[2];
-    const real t48 = w_C[2] * d_d[0];
-    const real t49 = t47 + t48;
-    const real t50 = t46 - t49;
-    const real t51 = t50 - d_v_C[1];
-    const real t52 = R_C[7] * t11;
-    const real t53 = t16 * d_R_C[7];
-    const real t54 = t52 + t53;
-    const real t55 = R_C[4] * t22;
-    const real t56 = t27 * d_R_C[4];
-    const real t57 = t55 + t56;
-    const real t58 = R_C[1] * t33;
-    const real t59 = t38 * d_R_C[1];
-    const real t60 = t58 + t59;
-    const real t61 = t57 + t60;
-    const real t62 = t54 + t61;
-    const real t63 = t51 + t62;
-    d_slip[1] = t63;
-    const real t64 = d[0] * d_w_C[1];
-    const real t65 = w_C[1] * d_d[0];
-    const real t66 = t64 + t65;
-    const real t67 = w_C[0] * d_d[1];
-    const real t68 = d[1] * d_w_C[0];
-    const real t69 = t67 + t68;
-    const real t70 = t66 - t69;
-    const real t71 = t70 - d_v_C[2];
-    const real t72 = R_C[8] * t11;
-    const real t73 = t16 * d_R_C[8];
-    const real t74 = t72 + t73;
-    const real t75 = R_C[5] * t22;
-    const real t76 = t27 * d_R_C[5];
-    const real t77 = t75 + t76;
-    const real t78 = R_C[2] * t33;
-    const real t79 = t38 * d_R_C[2];
-    const real t80 = t78 + t79;
-    const real t81 = t77 + t80;
-    const real t82 = t74 + t81;
-    const real t83 = t71 + t82;
-    d_slip[2] = t83;
-    const real t84 = R_C[6] * d_w_B[2];
-    const real t85 = w_B[2] * d_R_C[6];
-    const real t86 = t84 + t85;
-    const real t87 = R_C[3] * d_w_B[1];
-    const real t88 = w_B[1] * d_R_C[3];
-    const real t89 = t87 + t88;
-    const real t90 = w_B[0] * d_R_C[0];
-    const real t91 = R_C[0] * d_w_B[0];
-    const real t92 = t90 + t91;
-    const real t93 = t89 + t92;
-    const real t94 = t86 + t93;
-    const real t95 = t94 - d_w_C[0];
-    d_slip[3] = t95;
-    const real t96 = R_C[7] * d_w_B[2];
-    const real t97 = w_B[2] * d_R_C[7];
-    const real t98 = t96 + t97;
-    const real t99 = R_C[4] * d_w_B[1];
-    const real t100 = w_B[1] * d_R_C[4];
-    const real t101 = t99 + t100;
-    const real t102 = R_C[1] * d_w_B[0];
-    const real t103 = w_B[0] * d_R_C[1];
-    const real t104 = t102 + t103;
-    const real t105 = t101 + t104;
-    const real t106 = t98 + t105;
-    const real t107 = t106 - d_w_C[1];
-    d_slip[4] = t107;
-    const real t108 = R_C[8] * d_w_B[2];
-    const real t109 = w_B[2] * d_R_C[8];
-    const real t110 = t108 + t109;
-    const real t111 = R_C[5] * d_w_B[1];
-    const real t112 = w_B[1] * d_R_C[5];
-    const real t113 = t111 + t112;
-    const real t114 = R_C[2] * d_w_B[0];
-    const real t115 = w_B[0] * d_R_C[2];
-    const real t116 = t114 + t115;
-    const real t117 = t113 + t116;
-    const real t118 = t110 + t117;
-    const real t119 = t118 - d_w_C[2];
-    d_slip[5] = t119;
-    return 0;
+  (void)v_C;
+  real t11 = d_v_B[2] + (r_e[1] * d_w_B[0] - r_e[0] * d_w_B[1]);
+  real t16 = r_e[1] * w_B[0] - w_B[1] * r_e[0] + v_B[2];
+  real t22 = d_v_B[1] + (r_e[0] * d_w_B[2] - r_e[2] * d_w_B[0]);
+  real t27 = w_B[2] * r_e[0] - r_e[2] * w_B[0] + v_B[1];
+  real t33 = d_v_B[0] + (r_e[2] * d_w_B[1] - r_e[1] * d_w_B[2]);
+  real t38 = r_e[2] * w_B[1] - r_e[1] * w_B[2] + v_B[0];
+  d_slip[0] = w_C[2] * d_d[1] + d[1] * d_w_C[2] - (w_C[1] * d_d[2] + d[2] * d_w_C[1]) - d_v_C[0] +
+    (R_C[6] * t11 + t16 * d_R_C[6] + (R_C[3] * t22 + t27 * d_R_C[3] + (R_C[0] * t33 + t38 *
+    d_R_C[0])));
+  d_slip[1] = w_C[0] * d_d[2] + d[2] * d_w_C[0] - (d[0] * d_w_C[2] + w_C[2] * d_d[0]) - d_v_C[1] +
+    (R_C[7] * t11 + t16 * d_R_C[7] + (R_C[4] * t22 + t27 * d_R_C[4] + (R_C[1] * t33 + t38 *
+    d_R_C[1])));
+  d_slip[2] = d[0] * d_w_C[1] + w_C[1] * d_d[0] - (w_C[0] * d_d[1] + d[1] * d_w_C[0]) - d_v_C[2] +
+    (R_C[8] * t11 + t16 * d_R_C[8] + (R_C[5] * t22 + t27 * d_R_C[5] + (R_C[2] * t33 + t38 *
+    d_R_C[2])));
+  d_slip[3] = R_C[6] * d_w_B[2] + w_B[2] * d_R_C[6] + (R_C[3] * d_w_B[1] + w_B[1] * d_R_C[3] +
+    (w_B[0] * d_R_C[0] + R_C[0] * d_w_B[0])) - d_w_C[0];
+  d_slip[4] = R_C[7] * d_w_B[2] + w_B[2] * d_R_C[7] + (R_C[4] * d_w_B[1] + w_B[1] * d_R_C[4] +
+    (R_C[1] * d_w_B[0] + w_B[0] * d_R_C[1])) - d_w_C[1];
+  d_slip[5] = R_C[8] * d_w_B[2] + w_B[2] * d_R_C[8] + (R_C[5] * d_w_B[1] + w_B[1] * d_R_C[5] +
+    (R_C[2] * d_w_B[0] + w_B[0] * d_R_C[2])) - d_w_C[2];
+  return 0;
 }
 
-static int mstmm_sweep_loops_slip_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_slip_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_slip_slope_inputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"v_C", 3, "m/s", 0, 0},
-    {"w_C", 3, "rad/s", 0, 0},
-    {"v_B", 3, "m/s", 0, 0},
-    {"w_B", 3, "rad/s", 0, 0},
-    {"d_R_C", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_v_C", 3, "m/s", 0, 0},
-    {"d_w_C", 3, "rad/s", 0, 0},
-    {"d_v_B", 3, "m/s", 0, 0},
-    {"d_w_B", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_slip_slope_outputs[] = {
-    {"d_slip", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_slip_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], in[12], out[0]))
 
 /* drift and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -2402,344 +786,84 @@ static const mstmm_port mstmm_sweep_loops_slip_slope_outputs[] = {
  * in  d_motion_B[9] derivative of motion_B
  * out d_drift[6] derivative of drift
  */
-int mstmm_sweep_loops_drift_slope(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
-    const real *restrict motion_B, const real *restrict d_R_C, const real *restrict d_d,
-    const real *restrict d_slip, const real *restrict d_motion_C, const real *restrict d_motion_B,
-    real *restrict d_drift)
+int mstmm_sweep_loops_drift_slope(in_t R_C, in_t r_e, in_t d, in_t slip, in_t motion_C,
+    in_t motion_B, in_t d_R_C, in_t d_d, in_t d_slip, in_t d_motion_C, in_t d_motion_B,
+    out_t d_drift)
 {
-    const real t0 = motion_C[2] * d_motion_C[2];
-    const real t1 = t0 + t0;
-    const real t2 = motion_C[1] * d_motion_C[1];
-    const real t3 = t2 + t2;
-    const real t4 = t1 + t3;
-    const real t5 = d[0] * t4;
-    const real t6 = motion_C[1] * motion_C[1];
-    const real t7 = motion_C[2] * motion_C[2];
-    const real t8 = t6 + t7;
-    const real t9 = t8 * d_d[0];
-    const real t10 = t5 + t9;
-    const real t11 = motion_C[1] * motion_C[0];
-    const real t12 = t11 * d_d[1];
-    const real t13 = motion_C[0] * d_motion_C[1];
-    const real t14 = motion_C[1] * d_motion_C[0];
-    const real t15 = t13 + t14;
-    const real t16 = d[1] * t15;
-    const real t17 = t12 + t16;
-    const real t18 = t10 - t17;
-    const real t19 = motion_C[2] * motion_C[0];
-    const real t20 = t19 * d_d[2];
-    const real t21 = motion_C[0] * d_motion_C[2];
-    const real t22 = motion_C[2] * d_motion_C[0];
-    const real t23 = t21 + t22;
-    const real t24 = d[2] * t23;
-    const real t25 = t20 + t24;
-    const real t26 = t18 - t25;
-    const real t27 = motion_C[5] * d_d[1];
-    const real t28 = d[1] * d_motion_C[5];
-    const real t29 = t27 + t28;
-    const real t30 = motion_C[4] * d_d[2];
-    const real t31 = d[2] * d_motion_C[4];
-    const real t32 = t30 + t31;
-    const real t33 = t29 - t32;
-    const real t34 = t26 + t33;
-    const real t35 = motion_B[2] * d_motion_B[1];
-    const real t36 = motion_B[1] * d_motion_B[2];
-    const real t37 = t35 + t36;
-    const real t38 = r_e[1] * t37;
-    const real t39 = motion_B[2] * d_motion_B[0];
-    const real t40 = motion_B[0] * d_motion_B[2];
-    const real t41 = t39 + t40;
-    const real t42 = r_e[0] * t41;
-    const real t43 = t38 + t42;
-    const real t44 = motion_B[0] * d_motion_B[0];
-    const real t45 = t44 + t44;
-    const real t46 = motion_B[1] * d_motion_B[1];
-    const real t47 = t46 + t46;
-    const real t48 = t45 + t47;
-    const real t49 = r_e[2] * t48;
-    const real t50 = t43 - t49;
-    const real t51 = r_e[1] * d_motion_B[3];
-    const real t52 = r_e[0] * d_motion_B[4];
-    const real t53 = t51 - t52;
-    const real t54 = t50 + t53;
-    const real t55 = d_motion_B[8] + t54;
-    const real t56 = R_C[6] * t55;
-    const real t57 = r_e[1] * motion_B[3];
-    const real t58 = motion_B[4] * r_e[0];
-    const real t59 = t57 - t58;
-    const real t60 = motion_B[0] * motion_B[2];
-    const real t61 = r_e[0] * t60;
-    const real t62 = motion_B[1] * motion_B[2];
-    const real t63 = r_e[1] * t62;
-    const real t64 = t61 + t63;
-    const real t65 = motion_B[1] * motion_B[1];
-    const real t66 = motion_B[0] * motion_B[0];
-    const real t67 = t65 + t66;
-    const real t68 = r_e[2] * t67;
-    const real t69 = t64 - t68;
-    const real t70 = t59 + t69;
-    const real t71 = t70 + motion_B[8];
-    const real t72 = t71 * d_R_C[6];
-    const real t73 = t56 + t72;
-    const real t74 = r_e[2] * t37;
-    const real t75 = motion_B[1] * d_motion_B[0];
-    const real t76 = motion_B[0] * d_motion_B[1];
-    const real t77 = t75 + t76;
-    const real t78 = r_e[0] * t77;
-    const real t79 = motion_B[2] * d_motion_B[2];
-    const real t80 = t79 + t79;
-    const real t81 = t45 + t80;
-    const real t82 = r_e[1] * t81;
-    const real t83 = t78 - t82;
-    const real t84 = t74 + t83;
-    const real t85 = r_e[0] * d_motion_B[5];
-    const real t86 = r_e[2] * d_motion_B[3];
-    const real t87 = t85 - t86;
-    const real t88 = t84 + t87;
-    const real t89 = d_motion_B[7] + t88;
-    const real t90 = R_C[3] * t89;
-    const real t91 = motion_B[5] * r_e[0];
-    const real t92 = r_e[2] * motion_B[3];
-    const real t93 = t91 - t92;
-    const real t94 = motion_B[0] * motion_B[1];
-    const real t95 = t94 * r_e[0];
-    const real t96 = motion_B[2] * motion_B[2];
-    const real t97 = t96 + t66;
-    const real t98 = r_e[1] * t97;
-    const real t99 = t95 - t98;
-    const real t100 = r_e[2] * t62;
-    const real t101 = t99 + t100;
-    const real t102 = t93 + t101;
-    const real t103 = t102 + motion_B[7];
-    const real t104 = t103 * d_R_C[3];
-    const real t105 = t90 + t104;
-    const real t106 = r_e[2] * t41;
-    const real t107 = r_e[1] * t77;
-    const real t108 = t47 + t80;
-    const real t109 = r_e[0] * t108;
-    const real t110 = t107 - t109;
-    const real t111 = t106 + t110;
-    const real t112 = r_e[2] * d_motion_B[4];
-    const real t113 = r_e[1] * d_motion_B[5];
-    const real t114 = t112 - t113;
-    const real t115 = t111 + t114;
-    const real t116 = d_motion_B[6] + t115;
-    const real t117 = R_C[0] * t116;
-    const real t118 = r_e[2] * motion_B[4];
-    const real t119 = r_e[1] * motion_B[5];
-    const real t120 = t118 - t119;
-    const real t121 = r_e[1] * t94;
-    const real t122 = t65 + t96;
-    const real t123 = t122 * r_e[0];
-    const real t124 = t121 - t123;
-    const real t125 = r_e[2] * t60;
-    const real t126 = t124 + t125;
-    const real t127 = t120 + t126;
-    const real t128 = t127 + motion_B[6];
-    const real t129 = t128 * d_R_C[0];
-    const real t130 = t117 + t129;
-    const real t131 = t105 + t130;
-    const real t132 = t73 + t131;
-    const real t133 = t34 + t132;
-    const real t134 = motion_C[2] * d_slip[1];
-    const real t135 = slip[1] * d_motion_C[2];
-    const real t136 = t134 + t135;
-    const real t137 = 2.0 * t136;
-    const real t138 = motion_C[1] * d_slip[2];
-    const real t139 = slip[2] * d_motion_C[1];
-    const real t140 = t138 + t139;
-    const real t141 = 2.0 * t140;
-    const real t142 = t137 - t141;
-    const real t143 = t142 - d_motion_C[6];
-    const real t144 = t133 + t143;
-    d_drift[0] = t144;
-    const real t145 = motion_C[0] * motion_C[0];
-    const real t146 = t7 + t145;
-    const real t147 = t146 * d_d[1];
-    const real t148 = motion_C[0] * d_motion_C[0];
-    const real t149 = t148 + t148;
-    const real t150 = t1 + t149;
-    const real t151 = d[1] * t150;
-    const real t152 = t147 + t151;
-    const real t153 = t11 * d_d[0];
-    const real t154 = d[0] * t15;
-    const real t155 = t153 + t154;
-    const real t156 = t152 - t155;
-    const real t157 = motion_C[2] * motion_C[1];
-    const real t158 = t157 * d_d[2];
-    const real t159 = motion_C[1] * d_motion_C[2];
-    const real t160 = motion_C[2] * d_motion_C[1];
-    const real t161 = t159 + t160;
-    const real t162 = d[2] * t161;
-    const real t163 = t158 + t162;
-    const real t164 = t156 - t163;
-    const real t165 = motion_C[3] * d_d[2];
-    const real t166 = d[2] * d_motion_C[3];
-    const real t167 = t165 + t166;
-    const real t168 = d[0] * d_motion_C[5];
-    const real t169 = motion_C[5] * d_d[0];
-    const real t170 = t168 + t169;
-    const real t171 = t167 - t170;
-    const real t172 = t164 + t171;
-    const real t173 = R_C[7] * t55;
-    const real t174 = t71 * d_R_C[7];
-    const real t175 = t173 + t174;
-    const real t176 = R_C[4] * t89;
-    const real t177 = t103 * d_R_C[4];
-    const real t178 = t176 + t177;
-    const real t179 = R_C[1] * t116;
-    const real t180 = t128 * d_R_C[1];
-    const real t181 = t179 + t180;
-    const real t182 = t178 + t181;
-    const real t183 = t175 + t182;
-    const real t184 = t172 + t183;
-    const real t185 = motion_C[0] * d_slip[2];
-    const real t186 = slip[2] * d_motion_C[0];
-    const real t187 = t185 + t186;
-    const real t188 = 2.0 * t187;
-    const real t189 = slip[0] * d_motion_C[2];
-    const real t190 = motion_C[2] * d_slip[0];
-    const real t191 = t189 + t190;
-    const real t192 = 2.0 * t191;
-    const real t193 = t188 - t192;
-    const real t194 = t193 - d_motion_C[7];
-    const real t195 = t184 + t194;
-    d_drift[1] = t195;
-    const real t196 = t6 + t145;
-    const real t197 = t196 * d_d[2];
-    const real t198 = t3 + t149;
-    const real t199 = d[2] * t198;
-    const real t200 = t197 + t199;
-    const real t201 = t157 * d_d[1];
-    const real t202 = d[1] * t161;
-    const real t203 = t201 + t202;
-    const real t204 = t19 * d_d[0];
-    const real t205 = d[0] * t23;
-    const real t206 = t204 + t205;
-    const real t207 = t203 + t206;
-    const real t208 = t200 - t207;
-    const real t209 = d[0] * d_motion_C[4];
-    const real t210 = motion_C[4] * d_d[0];
-    const real t211 = t209 + t210;
-    const real t212 = motion_C[3] * d_d[1];
-    const real t213 = d[1] * d_motion_C[3];
-    const real t214 = t212 + t213;
-    const real t215 = t211 - t214;
-    const real t216 = t208 + t215;
-    const real t217 = R_C[8] * t55;
-    const real t218 = t71 * d_R_C[8];
-    const real t219 = t217 + t218;
-    const real t220 = R_C[5] * t89;
-    const real t221 = t103 * d_R_C[5];
-    const real t222 = t220 + t221;
-    const real t223 = R_C[2] * t116;
-    const real t224 = t128 * d_R_C[2];
-    const real t225 = t223 + t224;
-    const real t226 = t222 + t225;
-    const real t227 = t219 + t226;
-    const real t228 = t216 + t227;
-    const real t229 = slip[0] * d_motion_C[1];
-    const real t230 = motion_C[1] * d_slip[0];
-    const real t231 = t229 + t230;
-    const real t232 = 2.0 * t231;
-    const real t233 = motion_C[0] * d_slip[1];
-    const real t234 = slip[1] * d_motion_C[0];
-    const real t235 = t233 + t234;
-    const real t236 = 2.0 * t235;
-    const real t237 = t232 - t236;
-    const real t238 = t237 - d_motion_C[8];
-    const real t239 = t228 + t238;
-    d_drift[2] = t239;
-    const real t240 = slip[4] * d_motion_C[2];
-    const real t241 = motion_C[2] * d_slip[4];
-    const real t242 = t240 + t241;
-    const real t243 = slip[5] * d_motion_C[1];
-    const real t244 = motion_C[1] * d_slip[5];
-    const real t245 = t243 + t244;
-    const real t246 = t242 - t245;
-    const real t247 = t246 - d_motion_C[3];
-    const real t248 = R_C[6] * d_motion_B[5];
-    const real t249 = motion_B[5] * d_R_C[6];
-    const real t250 = t248 + t249;
-    const real t251 = R_C[3] * d_motion_B[4];
-    const real t252 = motion_B[4] * d_R_C[3];
-    const real t253 = t251 + t252;
-    const real t254 = motion_B[3] * d_R_C[0];
-    const real t255 = R_C[0] * d_motion_B[3];
-    const real t256 = t254 + t255;
-    const real t257 = t253 + t256;
-    const real t258 = t250 + t257;
-    const real t259 = t247 + t258;
-    d_drift[3] = t259;
-    const real t260 = slip[5] * d_motion_C[0];
-    const real t261 = motion_C[0] * d_slip[5];
-    const real t262 = t260 + t261;
-    const real t263 = slip[3] * d_motion_C[2];
-    const real t264 = motion_C[2] * d_slip[3];
-    const real t265 = t263 + t264;
-    const real t266 = t262 - t265;
-    const real t267 = t266 - d_motion_C[4];
-    const real t268 = R_C[7] * d_motion_B[5];
-    const real t269 = motion_B[5] * d_R_C[7];
-    const real t270 = t268 + t269;
-    const real t271 = R_C[4] * d_motion_B[4];
-    const real t272 = motion_B[4] * d_R_C[4];
-    const real t273 = t271 + t272;
-    const real t274 = R_C[1] * d_motion_B[3];
-    const real t275 = motion_B[3] * d_R_C[1];
-    const real t276 = t274 + t275;
-    const real t277 = t273 + t276;
-    const real t278 = t270 + t277;
-    const real t279 = t267 + t278;
-    d_drift[4] = t279;
-    const real t280 = slip[3] * d_motion_C[1];
-    const real t281 = motion_C[1] * d_slip[3];
-    const real t282 = t280 + t281;
-    const real t283 = slip[4] * d_motion_C[0];
-    const real t284 = motion_C[0] * d_slip[4];
-    const real t285 = t283 + t284;
-    const real t286 = t282 - t285;
-    const real t287 = t286 - d_motion_C[5];
-    const real t288 = R_C[8] * d_motion_B[5];
-    const real t289 = motion_B[5] * d_R_C[8];
-    const real t290 = t288 + t289;
-    const real t291 = R_C[5] * d_motion_B[4];
-    const real t292 = motion_B[4] * d_R_C[5];
-    const real t293 = t291 + t292;
-    const real t294 = R_C[2] * d_motion_B[3];
-    const real t295 = motion_B[3] * d_R_C[2];
-    const real t296 = t294 + t295;
-    const real t297 = t293 + t296;
-    const real t298 = t290 + t297;
-    const real t299 = t287 + t298;
-    d_drift[5] = t299;
-    return 0;
+  real t0 = motion_C[2] * d_motion_C[2];
+  real t1 = t0 + t0;
+  real t2 = motion_C[1] * d_motion_C[1];
+  real t3 = t2 + t2;
+  real t6 = motion_C[1] * motion_C[1];
+  real t7 = motion_C[2] * motion_C[2];
+  real t11 = motion_C[1] * motion_C[0];
+  real t15 = motion_C[0] * d_motion_C[1] + motion_C[1] * d_motion_C[0];
+  real t19 = motion_C[2] * motion_C[0];
+  real t23 = motion_C[0] * d_motion_C[2] + motion_C[2] * d_motion_C[0];
+  real t37 = motion_B[2] * d_motion_B[1] + motion_B[1] * d_motion_B[2];
+  real t41 = motion_B[2] * d_motion_B[0] + motion_B[0] * d_motion_B[2];
+  real t44 = motion_B[0] * d_motion_B[0];
+  real t45 = t44 + t44;
+  real t46 = motion_B[1] * d_motion_B[1];
+  real t47 = t46 + t46;
+  real t55 = d_motion_B[8] + (r_e[1] * t37 + r_e[0] * t41 - r_e[2] * (t45 + t47) + (r_e[1] *
+    d_motion_B[3] - r_e[0] * d_motion_B[4]));
+  real t60 = motion_B[0] * motion_B[2];
+  real t62 = motion_B[1] * motion_B[2];
+  real t65 = motion_B[1] * motion_B[1];
+  real t66 = motion_B[0] * motion_B[0];
+  real t71 = r_e[1] * motion_B[3] - motion_B[4] * r_e[0] + (r_e[0] * t60 + r_e[1] * t62 - r_e[2] *
+    (t65 + t66)) + motion_B[8];
+  real t77 = motion_B[1] * d_motion_B[0] + motion_B[0] * d_motion_B[1];
+  real t79 = motion_B[2] * d_motion_B[2];
+  real t80 = t79 + t79;
+  real t89 = d_motion_B[7] + (r_e[2] * t37 + (r_e[0] * t77 - r_e[1] * (t45 + t80)) + (r_e[0] *
+    d_motion_B[5] - r_e[2] * d_motion_B[3]));
+  real t94 = motion_B[0] * motion_B[1];
+  real t96 = motion_B[2] * motion_B[2];
+  real t103 = motion_B[5] * r_e[0] - r_e[2] * motion_B[3] + (t94 * r_e[0] - r_e[1] * (t96 + t66) +
+    r_e[2] * t62) + motion_B[7];
+  real t116 = d_motion_B[6] + (r_e[2] * t41 + (r_e[1] * t77 - r_e[0] * (t47 + t80)) + (r_e[2] *
+    d_motion_B[4] - r_e[1] * d_motion_B[5]));
+  real t128 = r_e[2] * motion_B[4] - r_e[1] * motion_B[5] + (r_e[1] * t94 - (t65 + t96) * r_e[0] +
+    r_e[2] * t60) + motion_B[6];
+  d_drift[0] = d[0] * (t1 + t3) + (t6 + t7) * d_d[0] - (t11 * d_d[1] + d[1] * t15) - (t19 * d_d[2] +
+    d[2] * t23) + (motion_C[5] * d_d[1] + d[1] * d_motion_C[5] - (motion_C[4] * d_d[2] + d[2] *
+    d_motion_C[4])) + (R_C[6] * t55 + t71 * d_R_C[6] + (R_C[3] * t89 + t103 * d_R_C[3] + (R_C[0] *
+    t116 + t128 * d_R_C[0]))) + (2.0 * (motion_C[2] * d_slip[1] + slip[1] * d_motion_C[2]) - 2.0 *
+    (motion_C[1] * d_slip[2] + slip[2] * d_motion_C[1]) - d_motion_C[6]);
+  real t145 = motion_C[0] * motion_C[0];
+  real t148 = motion_C[0] * d_motion_C[0];
+  real t149 = t148 + t148;
+  real t157 = motion_C[2] * motion_C[1];
+  real t161 = motion_C[1] * d_motion_C[2] + motion_C[2] * d_motion_C[1];
+  d_drift[1] = (t7 + t145) * d_d[1] + d[1] * (t1 + t149) - (t11 * d_d[0] + d[0] * t15) - (t157 *
+    d_d[2] + d[2] * t161) + (motion_C[3] * d_d[2] + d[2] * d_motion_C[3] - (d[0] * d_motion_C[5] +
+    motion_C[5] * d_d[0])) + (R_C[7] * t55 + t71 * d_R_C[7] + (R_C[4] * t89 + t103 * d_R_C[4] +
+    (R_C[1] * t116 + t128 * d_R_C[1]))) + (2.0 * (motion_C[0] * d_slip[2] + slip[2] * d_motion_C[0])
+    - 2.0 * (slip[0] * d_motion_C[2] + motion_C[2] * d_slip[0]) - d_motion_C[7]);
+  d_drift[2] = (t6 + t145) * d_d[2] + d[2] * (t3 + t149) - (t157 * d_d[1] + d[1] * t161 + (t19 *
+    d_d[0] + d[0] * t23)) + (d[0] * d_motion_C[4] + motion_C[4] * d_d[0] - (motion_C[3] * d_d[1] +
+    d[1] * d_motion_C[3])) + (R_C[8] * t55 + t71 * d_R_C[8] + (R_C[5] * t89 + t103 * d_R_C[5] +
+    (R_C[2] * t116 + t128 * d_R_C[2]))) + (2.0 * (slip[0] * d_motion_C[1] + motion_C[1] * d_slip[0])
+    - 2.0 * (motion_C[0] * d_slip[1] + slip[1] * d_motion_C[0]) - d_motion_C[8]);
+  d_drift[3] = slip[4] * d_motion_C[2] + motion_C[2] * d_slip[4] - (slip[5] * d_motion_C[1] +
+    motion_C[1] * d_slip[5]) - d_motion_C[3] + (R_C[6] * d_motion_B[5] + motion_B[5] * d_R_C[6] +
+    (R_C[3] * d_motion_B[4] + motion_B[4] * d_R_C[3] + (motion_B[3] * d_R_C[0] + R_C[0] *
+    d_motion_B[3])));
+  d_drift[4] = slip[5] * d_motion_C[0] + motion_C[0] * d_slip[5] - (slip[3] * d_motion_C[2] +
+    motion_C[2] * d_slip[3]) - d_motion_C[4] + (R_C[7] * d_motion_B[5] + motion_B[5] * d_R_C[7] +
+    (R_C[4] * d_motion_B[4] + motion_B[4] * d_R_C[4] + (R_C[1] * d_motion_B[3] + motion_B[3] *
+    d_R_C[1])));
+  d_drift[5] = slip[3] * d_motion_C[1] + motion_C[1] * d_slip[3] - (slip[4] * d_motion_C[0] +
+    motion_C[0] * d_slip[4]) - d_motion_C[5] + (R_C[8] * d_motion_B[5] + motion_B[5] * d_R_C[8] +
+    (R_C[5] * d_motion_B[4] + motion_B[4] * d_R_C[5] + (R_C[2] * d_motion_B[3] + motion_B[3] *
+    d_R_C[2])));
+  return 0;
 }
 
-static int mstmm_sweep_loops_drift_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_drift_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_drift_slope_inputs[] = {
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"slip", 6, "", 0, 0},
-    {"motion_C", 9, "", 0, 0},
-    {"motion_B", 9, "", 0, 0},
-    {"d_R_C", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_slip", 6, "", 0, 0},
-    {"d_motion_C", 9, "", 0, 0},
-    {"d_motion_B", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_drift_slope_outputs[] = {
-    {"d_drift", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_drift_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], out[0]))
 
 /* row and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -2756,234 +880,47 @@ static const mstmm_port mstmm_sweep_loops_drift_slope_outputs[] = {
  * out d_J_A[6] derivative of J_A
  * out d_J_B[6] derivative of J_B
  */
-int mstmm_sweep_loops_row_slope(const real *restrict w, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A,
-    const real *restrict d_w, const real *restrict d_R_C, const real *restrict d_Rc,
-    const real *restrict d_r_A, real *restrict d_J_A, real *restrict d_J_B)
+int mstmm_sweep_loops_row_slope(in_t w, in_t R_C, in_t r_e, in_t Rc, in_t r_A, in_t d_w, in_t d_R_C,
+    in_t d_Rc, in_t d_r_A, out_t d_J_A, out_t d_J_B)
 {
-    const real t0 = Rc[1] * d_w[1];
-    const real t1 = w[1] * d_Rc[1];
-    const real t2 = t0 + t1;
-    const real t3 = Rc[0] * d_w[0];
-    const real t4 = w[0] * d_Rc[0];
-    const real t5 = t3 + t4;
-    const real t6 = t2 + t5;
-    const real t7 = Rc[2] * d_w[2];
-    const real t8 = w[2] * d_Rc[2];
-    const real t9 = t7 + t8;
-    const real t10 = t6 + t9;
-    const real t11 = -t10;
-    d_J_A[0] = t11;
-    const real t12 = Rc[4] * d_w[1];
-    const real t13 = w[1] * d_Rc[4];
-    const real t14 = t12 + t13;
-    const real t15 = Rc[3] * d_w[0];
-    const real t16 = w[0] * d_Rc[3];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = Rc[5] * d_w[2];
-    const real t20 = w[2] * d_Rc[5];
-    const real t21 = t19 + t20;
-    const real t22 = t18 + t21;
-    const real t23 = -t22;
-    d_J_A[1] = t23;
-    const real t24 = Rc[7] * d_w[1];
-    const real t25 = w[1] * d_Rc[7];
-    const real t26 = t24 + t25;
-    const real t27 = Rc[6] * d_w[0];
-    const real t28 = w[0] * d_Rc[6];
-    const real t29 = t27 + t28;
-    const real t30 = t26 + t29;
-    const real t31 = Rc[8] * d_w[2];
-    const real t32 = w[2] * d_Rc[8];
-    const real t33 = t31 + t32;
-    const real t34 = t30 + t33;
-    const real t35 = -t34;
-    d_J_A[2] = t35;
-    const real t36 = r_A[2] * t22;
-    const real t37 = w[2] * Rc[5];
-    const real t38 = w[0] * Rc[3];
-    const real t39 = w[1] * Rc[4];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t41 * d_r_A[2];
-    const real t43 = t36 + t42;
-    const real t44 = r_A[1] * t34;
-    const real t45 = w[2] * Rc[8];
-    const real t46 = w[0] * Rc[6];
-    const real t47 = w[1] * Rc[7];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    const real t50 = t49 * d_r_A[1];
-    const real t51 = t44 + t50;
-    const real t52 = t43 - t51;
-    const real t53 = w[3] * d_Rc[0];
-    const real t54 = Rc[0] * d_w[3];
-    const real t55 = t53 + t54;
-    const real t56 = t52 - t55;
-    const real t57 = w[4] * d_Rc[1];
-    const real t58 = Rc[1] * d_w[4];
-    const real t59 = t57 + t58;
-    const real t60 = t56 - t59;
-    const real t61 = w[5] * d_Rc[2];
-    const real t62 = Rc[2] * d_w[5];
-    const real t63 = t61 + t62;
-    const real t64 = t60 - t63;
-    d_J_A[3] = t64;
-    const real t65 = r_A[0] * t34;
-    const real t66 = t49 * d_r_A[0];
-    const real t67 = t65 + t66;
-    const real t68 = r_A[2] * t10;
-    const real t69 = w[2] * Rc[2];
-    const real t70 = w[0] * Rc[0];
-    const real t71 = w[1] * Rc[1];
-    const real t72 = t70 + t71;
-    const real t73 = t69 + t72;
-    const real t74 = t73 * d_r_A[2];
-    const real t75 = t68 + t74;
-    const real t76 = t67 - t75;
-    const real t77 = w[3] * d_Rc[3];
-    const real t78 = Rc[3] * d_w[3];
-    const real t79 = t77 + t78;
-    const real t80 = t76 - t79;
-    const real t81 = w[4] * d_Rc[4];
-    const real t82 = Rc[4] * d_w[4];
-    const real t83 = t81 + t82;
-    const real t84 = t80 - t83;
-    const real t85 = w[5] * d_Rc[5];
-    const real t86 = Rc[5] * d_w[5];
-    const real t87 = t85 + t86;
-    const real t88 = t84 - t87;
-    d_J_A[4] = t88;
-    const real t89 = r_A[1] * t10;
-    const real t90 = t73 * d_r_A[1];
-    const real t91 = t89 + t90;
-    const real t92 = r_A[0] * t22;
-    const real t93 = t41 * d_r_A[0];
-    const real t94 = t92 + t93;
-    const real t95 = t91 - t94;
-    const real t96 = w[3] * d_Rc[6];
-    const real t97 = Rc[6] * d_w[3];
-    const real t98 = t96 + t97;
-    const real t99 = t95 - t98;
-    const real t100 = w[4] * d_Rc[7];
-    const real t101 = Rc[7] * d_w[4];
-    const real t102 = t100 + t101;
-    const real t103 = t99 - t102;
-    const real t104 = w[5] * d_Rc[8];
-    const real t105 = Rc[8] * d_w[5];
-    const real t106 = t104 + t105;
-    const real t107 = t103 - t106;
-    d_J_A[5] = t107;
-    const real t108 = R_C[1] * d_w[1];
-    const real t109 = w[1] * d_R_C[1];
-    const real t110 = t108 + t109;
-    const real t111 = R_C[0] * d_w[0];
-    const real t112 = w[0] * d_R_C[0];
-    const real t113 = t111 + t112;
-    const real t114 = t110 + t113;
-    const real t115 = R_C[2] * d_w[2];
-    const real t116 = w[2] * d_R_C[2];
-    const real t117 = t115 + t116;
-    const real t118 = t114 + t117;
-    d_J_B[0] = t118;
-    const real t119 = R_C[4] * d_w[1];
-    const real t120 = w[1] * d_R_C[4];
-    const real t121 = t119 + t120;
-    const real t122 = R_C[3] * d_w[0];
-    const real t123 = w[0] * d_R_C[3];
-    const real t124 = t122 + t123;
-    const real t125 = t121 + t124;
-    const real t126 = R_C[5] * d_w[2];
-    const real t127 = w[2] * d_R_C[5];
-    const real t128 = t126 + t127;
-    const real t129 = t125 + t128;
-    d_J_B[1] = t129;
-    const real t130 = R_C[7] * d_w[1];
-    const real t131 = w[1] * d_R_C[7];
-    const real t132 = t130 + t131;
-    const real t133 = R_C[6] * d_w[0];
-    const real t134 = w[0] * d_R_C[6];
-    const real t135 = t133 + t134;
-    const real t136 = t132 + t135;
-    const real t137 = R_C[8] * d_w[2];
-    const real t138 = w[2] * d_R_C[8];
-    const real t139 = t137 + t138;
-    const real t140 = t136 + t139;
-    d_J_B[2] = t140;
-    const real t141 = r_e[1] * t140;
-    const real t142 = r_e[2] * t129;
-    const real t143 = t141 - t142;
-    const real t144 = R_C[0] * d_w[3];
-    const real t145 = w[3] * d_R_C[0];
-    const real t146 = t144 + t145;
-    const real t147 = t143 + t146;
-    const real t148 = R_C[1] * d_w[4];
-    const real t149 = w[4] * d_R_C[1];
-    const real t150 = t148 + t149;
-    const real t151 = t147 + t150;
-    const real t152 = R_C[2] * d_w[5];
-    const real t153 = w[5] * d_R_C[2];
-    const real t154 = t152 + t153;
-    const real t155 = t151 + t154;
-    d_J_B[3] = t155;
-    const real t156 = r_e[2] * t118;
-    const real t157 = r_e[0] * t140;
-    const real t158 = t156 - t157;
-    const real t159 = R_C[3] * d_w[3];
-    const real t160 = w[3] * d_R_C[3];
-    const real t161 = t159 + t160;
-    const real t162 = t158 + t161;
-    const real t163 = R_C[4] * d_w[4];
-    const real t164 = w[4] * d_R_C[4];
-    const real t165 = t163 + t164;
-    const real t166 = t162 + t165;
-    const real t167 = R_C[5] * d_w[5];
-    const real t168 = w[5] * d_R_C[5];
-    const real t169 = t167 + t168;
-    const real t170 = t166 + t169;
-    d_J_B[4] = t170;
-    const real t171 = r_e[0] * t129;
-    const real t172 = r_e[1] * t118;
-    const real t173 = t171 - t172;
-    const real t174 = R_C[6] * d_w[3];
-    const real t175 = w[3] * d_R_C[6];
-    const real t176 = t174 + t175;
-    const real t177 = t173 + t176;
-    const real t178 = R_C[7] * d_w[4];
-    const real t179 = w[4] * d_R_C[7];
-    const real t180 = t178 + t179;
-    const real t181 = t177 + t180;
-    const real t182 = R_C[8] * d_w[5];
-    const real t183 = w[5] * d_R_C[8];
-    const real t184 = t182 + t183;
-    const real t185 = t181 + t184;
-    d_J_B[5] = t185;
-    return 0;
+  real t10 = Rc[1] * d_w[1] + w[1] * d_Rc[1] + (Rc[0] * d_w[0] + w[0] * d_Rc[0]) + (Rc[2] * d_w[2] +
+    w[2] * d_Rc[2]);
+  d_J_A[0] = -t10;
+  real t22 = Rc[4] * d_w[1] + w[1] * d_Rc[4] + (Rc[3] * d_w[0] + w[0] * d_Rc[3]) + (Rc[5] * d_w[2] +
+    w[2] * d_Rc[5]);
+  d_J_A[1] = -t22;
+  real t34 = Rc[7] * d_w[1] + w[1] * d_Rc[7] + (Rc[6] * d_w[0] + w[0] * d_Rc[6]) + (Rc[8] * d_w[2] +
+    w[2] * d_Rc[8]);
+  d_J_A[2] = -t34;
+  real t41 = w[2] * Rc[5] + (w[0] * Rc[3] + w[1] * Rc[4]);
+  real t49 = w[2] * Rc[8] + (w[0] * Rc[6] + w[1] * Rc[7]);
+  d_J_A[3] = r_A[2] * t22 + t41 * d_r_A[2] - (r_A[1] * t34 + t49 * d_r_A[1]) - (w[3] * d_Rc[0] +
+    Rc[0] * d_w[3]) - (w[4] * d_Rc[1] + Rc[1] * d_w[4]) - (w[5] * d_Rc[2] + Rc[2] * d_w[5]);
+  real t73 = w[2] * Rc[2] + (w[0] * Rc[0] + w[1] * Rc[1]);
+  d_J_A[4] = r_A[0] * t34 + t49 * d_r_A[0] - (r_A[2] * t10 + t73 * d_r_A[2]) - (w[3] * d_Rc[3] +
+    Rc[3] * d_w[3]) - (w[4] * d_Rc[4] + Rc[4] * d_w[4]) - (w[5] * d_Rc[5] + Rc[5] * d_w[5]);
+  d_J_A[5] = r_A[1] * t10 + t73 * d_r_A[1] - (r_A[0] * t22 + t41 * d_r_A[0]) - (w[3] * d_Rc[6] +
+    Rc[6] * d_w[3]) - (w[4] * d_Rc[7] + Rc[7] * d_w[4]) - (w[5] * d_Rc[8] + Rc[8] * d_w[5]);
+  real t118 = R_C[1] * d_w[1] + w[1] * d_R_C[1] + (R_C[0] * d_w[0] + w[0] * d_R_C[0]) + (R_C[2] *
+    d_w[2] + w[2] * d_R_C[2]);
+  d_J_B[0] = t118;
+  real t129 = R_C[4] * d_w[1] + w[1] * d_R_C[4] + (R_C[3] * d_w[0] + w[0] * d_R_C[3]) + (R_C[5] *
+    d_w[2] + w[2] * d_R_C[5]);
+  d_J_B[1] = t129;
+  real t140 = R_C[7] * d_w[1] + w[1] * d_R_C[7] + (R_C[6] * d_w[0] + w[0] * d_R_C[6]) + (R_C[8] *
+    d_w[2] + w[2] * d_R_C[8]);
+  d_J_B[2] = t140;
+  d_J_B[3] = r_e[1] * t140 - r_e[2] * t129 + (R_C[0] * d_w[3] + w[3] * d_R_C[0]) + (R_C[1] * d_w[4]
+    + w[4] * d_R_C[1]) + (R_C[2] * d_w[5] + w[5] * d_R_C[2]);
+  d_J_B[4] = r_e[2] * t118 - r_e[0] * t140 + (R_C[3] * d_w[3] + w[3] * d_R_C[3]) + (R_C[4] * d_w[4]
+    + w[4] * d_R_C[4]) + (R_C[5] * d_w[5] + w[5] * d_R_C[5]);
+  d_J_B[5] = r_e[0] * t129 - r_e[1] * t118 + (R_C[6] * d_w[3] + w[3] * d_R_C[6]) + (R_C[7] * d_w[4]
+    + w[4] * d_R_C[7]) + (R_C[8] * d_w[5] + w[5] * d_R_C[8]);
+  return 0;
 }
 
-static int mstmm_sweep_loops_row_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_row_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_loops_row_slope_inputs[] = {
-    {"w", 6, "", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"r_e", 3, "m", 0, 0},
-    {"Rc", 9, "", 0, 0},
-    {"r_A", 3, "m", 0, 0},
-    {"d_w", 6, "", 0, 0},
-    {"d_R_C", 9, "", 0, 0},
-    {"d_Rc", 9, "", 0, 0},
-    {"d_r_A", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_row_slope_outputs[] = {
-    {"d_J_A", 6, "", 0, 0},
-    {"d_J_B", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_row_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], out[0], out[1]))
 
 /* known_parts and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -2994,172 +931,36 @@ static const mstmm_port mstmm_sweep_loops_row_slope_outputs[] = {
  * in  d_relative[6] derivative of relative
  * out d_l[6] derivative of l
  */
-int mstmm_sweep_loops_known_parts_slope(const real *restrict W, const real *restrict relative,
-    const real *restrict d_W, const real *restrict d_relative, real *restrict d_l)
+int mstmm_sweep_loops_known_parts_slope(in_t W, in_t relative, in_t d_W, in_t d_relative, out_t d_l)
 {
-    const real t0 = relative[5] * d_W[5];
-    const real t1 = W[5] * d_relative[5];
-    const real t2 = t0 + t1;
-    const real t3 = relative[4] * d_W[4];
-    const real t4 = W[4] * d_relative[4];
-    const real t5 = t3 + t4;
-    const real t6 = relative[3] * d_W[3];
-    const real t7 = W[3] * d_relative[3];
-    const real t8 = t6 + t7;
-    const real t9 = relative[2] * d_W[2];
-    const real t10 = W[2] * d_relative[2];
-    const real t11 = t9 + t10;
-    const real t12 = relative[1] * d_W[1];
-    const real t13 = W[1] * d_relative[1];
-    const real t14 = t12 + t13;
-    const real t15 = relative[0] * d_W[0];
-    const real t16 = W[0] * d_relative[0];
-    const real t17 = t15 + t16;
-    const real t18 = t14 + t17;
-    const real t19 = t11 + t18;
-    const real t20 = t8 + t19;
-    const real t21 = t5 + t20;
-    const real t22 = t2 + t21;
-    d_l[0] = t22;
-    const real t23 = W[11] * d_relative[5];
-    const real t24 = relative[5] * d_W[11];
-    const real t25 = t23 + t24;
-    const real t26 = W[10] * d_relative[4];
-    const real t27 = relative[4] * d_W[10];
-    const real t28 = t26 + t27;
-    const real t29 = W[9] * d_relative[3];
-    const real t30 = relative[3] * d_W[9];
-    const real t31 = t29 + t30;
-    const real t32 = W[8] * d_relative[2];
-    const real t33 = relative[2] * d_W[8];
-    const real t34 = t32 + t33;
-    const real t35 = W[7] * d_relative[1];
-    const real t36 = relative[1] * d_W[7];
-    const real t37 = t35 + t36;
-    const real t38 = W[6] * d_relative[0];
-    const real t39 = relative[0] * d_W[6];
-    const real t40 = t38 + t39;
-    const real t41 = t37 + t40;
-    const real t42 = t34 + t41;
-    const real t43 = t31 + t42;
-    const real t44 = t28 + t43;
-    const real t45 = t25 + t44;
-    d_l[1] = t45;
-    const real t46 = W[17] * d_relative[5];
-    const real t47 = relative[5] * d_W[17];
-    const real t48 = t46 + t47;
-    const real t49 = W[16] * d_relative[4];
-    const real t50 = relative[4] * d_W[16];
-    const real t51 = t49 + t50;
-    const real t52 = W[15] * d_relative[3];
-    const real t53 = relative[3] * d_W[15];
-    const real t54 = t52 + t53;
-    const real t55 = W[14] * d_relative[2];
-    const real t56 = relative[2] * d_W[14];
-    const real t57 = t55 + t56;
-    const real t58 = W[13] * d_relative[1];
-    const real t59 = relative[1] * d_W[13];
-    const real t60 = t58 + t59;
-    const real t61 = W[12] * d_relative[0];
-    const real t62 = relative[0] * d_W[12];
-    const real t63 = t61 + t62;
-    const real t64 = t60 + t63;
-    const real t65 = t57 + t64;
-    const real t66 = t54 + t65;
-    const real t67 = t51 + t66;
-    const real t68 = t48 + t67;
-    d_l[2] = t68;
-    const real t69 = W[23] * d_relative[5];
-    const real t70 = relative[5] * d_W[23];
-    const real t71 = t69 + t70;
-    const real t72 = W[22] * d_relative[4];
-    const real t73 = relative[4] * d_W[22];
-    const real t74 = t72 + t73;
-    const real t75 = W[21] * d_relative[3];
-    const real t76 = relative[3] * d_W[21];
-    const real t77 = t75 + t76;
-    const real t78 = W[20] * d_relative[2];
-    const real t79 = relative[2] * d_W[20];
-    const real t80 = t78 + t79;
-    const real t81 = W[19] * d_relative[1];
-    const real t82 = relative[1] * d_W[19];
-    const real t83 = t81 + t82;
-    const real t84 = W[18] * d_relative[0];
-    const real t85 = relative[0] * d_W[18];
-    const real t86 = t84 + t85;
-    const real t87 = t83 + t86;
-    const real t88 = t80 + t87;
-    const real t89 = t77 + t88;
-    const real t90 = t74 + t89;
-    const real t91 = t71 + t90;
-    d_l[3] = t91;
-    const real t92 = W[29] * d_relative[5];
-    const real t93 = relative[5] * d_W[29];
-    const real t94 = t92 + t93;
-    const real t95 = W[28] * d_relative[4];
-    const real t96 = relative[4] * d_W[28];
-    const real t97 = t95 + t96;
-    const real t98 = W[27] * d_relative[3];
-    const real t99 = relative[3] * d_W[27];
-    const real t100 = t98 + t99;
-    const real t101 = W[26] * d_relative[2];
-    const real t102 = relative[2] * d_W[26];
-    const real t103 = t101 + t102;
-    const real t104 = W[25] * d_relative[1];
-    const real t105 = relative[1] * d_W[25];
-    const real t106 = t104 + t105;
-    const real t107 = W[24] * d_relative[0];
-    const real t108 = relative[0] * d_W[24];
-    const real t109 = t107 + t108;
-    const real t110 = t106 + t109;
-    const real t111 = t103 + t110;
-    const real t112 = t100 + t111;
-    const real t113 = t97 + t112;
-    const real t114 = t94 + t113;
-    d_l[4] = t114;
-    const real t115 = W[35] * d_relative[5];
-    const real t116 = relative[5] * d_W[35];
-    const real t117 = t115 + t116;
-    const real t118 = W[34] * d_relative[4];
-    const real t119 = relative[4] * d_W[34];
-    const real t120 = t118 + t119;
-    const real t121 = W[33] * d_relative[3];
-    const real t122 = relative[3] * d_W[33];
-    const real t123 = t121 + t122;
-    const real t124 = W[32] * d_relative[2];
-    const real t125 = relative[2] * d_W[32];
-    const real t126 = t124 + t125;
-    const real t127 = W[31] * d_relative[1];
-    const real t128 = relative[1] * d_W[31];
-    const real t129 = t127 + t128;
-    const real t130 = W[30] * d_relative[0];
-    const real t131 = relative[0] * d_W[30];
-    const real t132 = t130 + t131;
-    const real t133 = t129 + t132;
-    const real t134 = t126 + t133;
-    const real t135 = t123 + t134;
-    const real t136 = t120 + t135;
-    const real t137 = t117 + t136;
-    d_l[5] = t137;
-    return 0;
+  d_l[0] = relative[5] * d_W[5] + W[5] * d_relative[5] + (relative[4] * d_W[4] + W[4] *
+    d_relative[4] + (relative[3] * d_W[3] + W[3] * d_relative[3] + (relative[2] * d_W[2] + W[2] *
+    d_relative[2] + (relative[1] * d_W[1] + W[1] * d_relative[1] + (relative[0] * d_W[0] + W[0] *
+    d_relative[0])))));
+  d_l[1] = W[11] * d_relative[5] + relative[5] * d_W[11] + (W[10] * d_relative[4] + relative[4] *
+    d_W[10] + (W[9] * d_relative[3] + relative[3] * d_W[9] + (W[8] * d_relative[2] + relative[2] *
+    d_W[8] + (W[7] * d_relative[1] + relative[1] * d_W[7] + (W[6] * d_relative[0] + relative[0] *
+    d_W[6])))));
+  d_l[2] = W[17] * d_relative[5] + relative[5] * d_W[17] + (W[16] * d_relative[4] + relative[4] *
+    d_W[16] + (W[15] * d_relative[3] + relative[3] * d_W[15] + (W[14] * d_relative[2] + relative[2]
+    * d_W[14] + (W[13] * d_relative[1] + relative[1] * d_W[13] + (W[12] * d_relative[0] +
+    relative[0] * d_W[12])))));
+  d_l[3] = W[23] * d_relative[5] + relative[5] * d_W[23] + (W[22] * d_relative[4] + relative[4] *
+    d_W[22] + (W[21] * d_relative[3] + relative[3] * d_W[21] + (W[20] * d_relative[2] + relative[2]
+    * d_W[20] + (W[19] * d_relative[1] + relative[1] * d_W[19] + (W[18] * d_relative[0] +
+    relative[0] * d_W[18])))));
+  d_l[4] = W[29] * d_relative[5] + relative[5] * d_W[29] + (W[28] * d_relative[4] + relative[4] *
+    d_W[28] + (W[27] * d_relative[3] + relative[3] * d_W[27] + (W[26] * d_relative[2] + relative[2]
+    * d_W[26] + (W[25] * d_relative[1] + relative[1] * d_W[25] + (W[24] * d_relative[0] +
+    relative[0] * d_W[24])))));
+  d_l[5] = W[35] * d_relative[5] + relative[5] * d_W[35] + (W[34] * d_relative[4] + relative[4] *
+    d_W[34] + (W[33] * d_relative[3] + relative[3] * d_W[33] + (W[32] * d_relative[2] + relative[2]
+    * d_W[32] + (W[31] * d_relative[1] + relative[1] * d_W[31] + (W[30] * d_relative[0] +
+    relative[0] * d_W[30])))));
+  return 0;
 }
 
-static int mstmm_sweep_loops_known_parts_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_known_parts_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_known_parts_slope_inputs[] = {
-    {"W", 36, "", 0, 0},
-    {"relative", 6, "", 0, 0},
-    {"d_W", 36, "", 0, 0},
-    {"d_relative", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_known_parts_slope_outputs[] = {
-    {"d_l", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_known_parts_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* apply_effort and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -3170,58 +971,18 @@ static const mstmm_port mstmm_sweep_loops_known_parts_slope_outputs[] = {
  * in  d_tau[1] (N, N*m) derivative of tau
  * out d_e[6] (N, N*m) derivative of e, added to what is there
  */
-int mstmm_sweep_loops_apply_effort_slope(const real *restrict J, const real *restrict tau,
-    const real *restrict d_J, const real *restrict d_tau, real *restrict d_e)
+int mstmm_sweep_loops_apply_effort_slope(in_t J, in_t tau, in_t d_J, in_t d_tau, out_t d_e)
 {
-    const real t0 = tau[0] * d_J[0];
-    const real t1 = J[0] * d_tau[0];
-    const real t2 = t0 + t1;
-    const real t3 = -t2;
-    d_e[0] += t3;
-    const real t4 = J[1] * d_tau[0];
-    const real t5 = tau[0] * d_J[1];
-    const real t6 = t4 + t5;
-    const real t7 = -t6;
-    d_e[1] += t7;
-    const real t8 = J[2] * d_tau[0];
-    const real t9 = tau[0] * d_J[2];
-    const real t10 = t8 + t9;
-    const real t11 = -t10;
-    d_e[2] += t11;
-    const real t12 = J[3] * d_tau[0];
-    const real t13 = tau[0] * d_J[3];
-    const real t14 = t12 + t13;
-    const real t15 = -t14;
-    d_e[3] += t15;
-    const real t16 = J[4] * d_tau[0];
-    const real t17 = tau[0] * d_J[4];
-    const real t18 = t16 + t17;
-    const real t19 = -t18;
-    d_e[4] += t19;
-    const real t20 = J[5] * d_tau[0];
-    const real t21 = tau[0] * d_J[5];
-    const real t22 = t20 + t21;
-    const real t23 = -t22;
-    d_e[5] += t23;
-    return 0;
+  d_e[0] += -(tau[0] * d_J[0] + J[0] * d_tau[0]);
+  d_e[1] += -(J[1] * d_tau[0] + tau[0] * d_J[1]);
+  d_e[2] += -(J[2] * d_tau[0] + tau[0] * d_J[2]);
+  d_e[3] += -(J[3] * d_tau[0] + tau[0] * d_J[3]);
+  d_e[4] += -(J[4] * d_tau[0] + tau[0] * d_J[4]);
+  d_e[5] += -(J[5] * d_tau[0] + tau[0] * d_J[5]);
+  return 0;
 }
 
-static int mstmm_sweep_loops_apply_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_apply_effort_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_apply_effort_slope_inputs[] = {
-    {"J", 6, "", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-    {"d_J", 6, "", 0, 0},
-    {"d_tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_apply_effort_slope_outputs[] = {
-    {"d_e", 6, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_apply_effort_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* apply_multiplier and its derivative along a direction
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -3232,52 +993,18 @@ static const mstmm_port mstmm_sweep_loops_apply_effort_slope_outputs[] = {
  * in  d_x[1] (N, N*m) derivative of x
  * out d_e[6] derivative of e, added to what is there
  */
-int mstmm_sweep_loops_apply_multiplier_slope(const real *restrict K, const real *restrict x,
-    const real *restrict d_K, const real *restrict d_x, real *restrict d_e)
+int mstmm_sweep_loops_apply_multiplier_slope(in_t K, in_t x, in_t d_K, in_t d_x, out_t d_e)
 {
-    const real t0 = x[0] * d_K[0];
-    const real t1 = K[0] * d_x[0];
-    const real t2 = t0 + t1;
-    d_e[0] += t2;
-    const real t3 = K[1] * d_x[0];
-    const real t4 = x[0] * d_K[1];
-    const real t5 = t3 + t4;
-    d_e[1] += t5;
-    const real t6 = K[2] * d_x[0];
-    const real t7 = x[0] * d_K[2];
-    const real t8 = t6 + t7;
-    d_e[2] += t8;
-    const real t9 = K[3] * d_x[0];
-    const real t10 = x[0] * d_K[3];
-    const real t11 = t9 + t10;
-    d_e[3] += t11;
-    const real t12 = K[4] * d_x[0];
-    const real t13 = x[0] * d_K[4];
-    const real t14 = t12 + t13;
-    d_e[4] += t14;
-    const real t15 = K[5] * d_x[0];
-    const real t16 = x[0] * d_K[5];
-    const real t17 = t15 + t16;
-    d_e[5] += t17;
-    return 0;
+  d_e[0] += x[0] * d_K[0] + K[0] * d_x[0];
+  d_e[1] += K[1] * d_x[0] + x[0] * d_K[1];
+  d_e[2] += K[2] * d_x[0] + x[0] * d_K[2];
+  d_e[3] += K[3] * d_x[0] + x[0] * d_K[3];
+  d_e[4] += K[4] * d_x[0] + x[0] * d_K[4];
+  d_e[5] += K[5] * d_x[0] + x[0] * d_K[5];
+  return 0;
 }
 
-static int mstmm_sweep_loops_apply_multiplier_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_apply_multiplier_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_apply_multiplier_slope_inputs[] = {
-    {"K", 6, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-    {"d_K", 6, "", 0, 0},
-    {"d_x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_apply_multiplier_slope_outputs[] = {
-    {"d_e", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_apply_multiplier_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* distance and its derivative along a direction
  * in  p[1] (m) prescribed distance
@@ -3285,99 +1012,32 @@ static const mstmm_port mstmm_sweep_loops_apply_multiplier_slope_outputs[] = {
  * in  d_d[3] (m) derivative of d
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_loops_distance_slope(const real *restrict p, const real *restrict d,
-    const real *restrict d_d, real *restrict d_W)
+int mstmm_sweep_loops_distance_slope(in_t p, in_t d, in_t d_d, out_t d_W)
 {
-    (void)p;
-    const real t0 = d[2] * d[2];
-    const real t1 = d[0] * d[0];
-    const real t2 = d[1] * d[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = 1e-24 < t4;
-    const real t6 = (t4 < 1e-24 || isnan(1e-24)) ? 1e-24 : t4;
-    const real t7 = sqrt(t6);
-    const real t8 = 1.0 / t7;
-    const real t9 = t8 * d_d[0];
-    const real t10 = t4 < 1e-24;
-    const real t11 = d[1] * d_d[1];
-    const real t12 = t11 + t11;
-    const real t13 = d[0] * d_d[0];
-    const real t14 = t13 + t13;
-    const real t15 = t12 + t14;
-    const real t16 = d[2] * d_d[2];
-    const real t17 = t16 + t16;
-    const real t18 = t15 + t17;
-    const real t19 = t10 != 0 ? 0.0 : t18;
-    const real t20 = t7 * 2.0;
-    const real t21 = t19 / t20;
-    const real t22 = t8 * t21;
-    const real t23 = t22 / t7;
-    const real t24 = d[0] * t23;
-    const real t25 = t9 - t24;
-    const real t26 = t5 != 0 ? t25 : 0.0;
-    d_W[0] = t26;
-    const real t27 = t8 * d_d[1];
-    const real t28 = d[1] * t23;
-    const real t29 = t27 - t28;
-    const real t30 = t5 != 0 ? t29 : 0.0;
-    d_W[1] = t30;
-    const real t31 = t8 * d_d[2];
-    const real t32 = d[2] * t23;
-    const real t33 = t31 - t32;
-    const real t34 = t5 != 0 ? t33 : 0.0;
-    d_W[2] = t34;
-    d_W[3] = 0.0;
-    d_W[4] = 0.0;
-    d_W[5] = 0.0;
-    d_W[6] = 0.0;
-    d_W[7] = 0.0;
-    d_W[8] = 0.0;
-    d_W[9] = 0.0;
-    d_W[10] = 0.0;
-    d_W[11] = 0.0;
-    d_W[12] = 0.0;
-    d_W[13] = 0.0;
-    d_W[14] = 0.0;
-    d_W[15] = 0.0;
-    d_W[16] = 0.0;
-    d_W[17] = 0.0;
-    d_W[18] = 0.0;
-    d_W[19] = 0.0;
-    d_W[20] = 0.0;
-    d_W[21] = 0.0;
-    d_W[22] = 0.0;
-    d_W[23] = 0.0;
-    d_W[24] = 0.0;
-    d_W[25] = 0.0;
-    d_W[26] = 0.0;
-    d_W[27] = 0.0;
-    d_W[28] = 0.0;
-    d_W[29] = 0.0;
-    d_W[30] = 0.0;
-    d_W[31] = 0.0;
-    d_W[32] = 0.0;
-    d_W[33] = 0.0;
-    d_W[34] = 0.0;
-    d_W[35] = 0.0;
-    return 0;
+  (void)p;
+  real t4 = d[2] * d[2] + (d[0] * d[0] + d[1] * d[1]);
+  real t5 = 1e-24 < t4;
+  real t7 = sqrt((t4 < 1e-24 || isnan(1e-24)) ? 1e-24 : t4);
+  real t8 = 1.0 / t7;
+  real t11 = d[1] * d_d[1];
+  real t13 = d[0] * d_d[0];
+  real t16 = d[2] * d_d[2];
+  real t18 = t11 + t11 + (t13 + t13) + (t16 + t16);
+  real t23 = t8 * (((t4 < 1e-24) ? 0.0 : t18) / (t7 * 2.0)) / t7;
+  real t25 = t8 * d_d[0] - d[0] * t23;
+  d_W[0] = t5 != 0 ? t25 : 0.0;
+  real t29 = t8 * d_d[1] - d[1] * t23;
+  d_W[1] = t5 != 0 ? t29 : 0.0;
+  real t33 = t8 * d_d[2] - d[2] * t23;
+  d_W[2] = t5 != 0 ? t33 : 0.0;
+  d_W[3] = d_W[4] = d_W[5] = d_W[6] = d_W[7] = d_W[8] = d_W[9] = d_W[10] = d_W[11] = d_W[12] =
+    d_W[13] = d_W[14] = d_W[15] = d_W[16] = d_W[17] = d_W[18] = d_W[19] = d_W[20] = d_W[21] =
+    d_W[22] = d_W[23] = d_W[24] = d_W[25] = d_W[26] = d_W[27] = d_W[28] = d_W[29] = d_W[30] =
+    d_W[31] = d_W[32] = d_W[33] = d_W[34] = d_W[35] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_distance_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_distance_slope(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_distance_slope_inputs[] = {
-    {"p", 1, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_distance_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_distance_slope, (in[0], in[1], in[2], out[0]))
 
 /* distance_drift and its derivative along a direction
  * in  d[3] (m) that end from the origin of C, axes of C
@@ -3386,130 +1046,47 @@ static const mstmm_port mstmm_sweep_loops_distance_slope_outputs[] = {
  * in  d_slip[6] derivative of slip
  * out d_drift[6] derivative of drift, added to what is there
  */
-int mstmm_sweep_loops_distance_drift_slope(const real *restrict d, const real *restrict slip,
-    const real *restrict d_d, const real *restrict d_slip, real *restrict d_drift)
+int mstmm_sweep_loops_distance_drift_slope(in_t d, in_t slip, in_t d_d, in_t d_slip, out_t d_drift)
 {
-    const real t0 = d[2] * d[2];
-    const real t1 = d[0] * d[0];
-    const real t2 = d[1] * d[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = (t4 < 1e-24 || isnan(1e-24)) ? 1e-24 : t4;
-    const real t6 = sqrt(t5);
-    const real t7 = 1.0 / t6;
-    const real t8 = slip[2] * slip[2];
-    const real t9 = slip[1] * slip[1];
-    const real t10 = slip[0] * slip[0];
-    const real t11 = 1e-24 < t4;
-    const real t12 = d[2] * t7;
-    const real t13 = t11 != 0 ? t12 : 0.0;
-    const real t14 = slip[2] * t13;
-    const real t15 = d[0] * t7;
-    const real t16 = t11 != 0 ? t15 : 1.0;
-    const real t17 = t16 * slip[0];
-    const real t18 = d[1] * t7;
-    const real t19 = t11 != 0 ? t18 : 0.0;
-    const real t20 = slip[1] * t19;
-    const real t21 = t17 + t20;
-    const real t22 = t14 + t21;
-    const real t23 = t22 * t22;
-    const real t24 = t10 - t23;
-    const real t25 = t9 + t24;
-    const real t26 = t8 + t25;
-    const real t27 = t7 * d_d[0];
-    const real t28 = t4 < 1e-24;
-    const real t29 = d[1] * d_d[1];
-    const real t30 = t29 + t29;
-    const real t31 = d[0] * d_d[0];
-    const real t32 = t31 + t31;
-    const real t33 = t30 + t32;
-    const real t34 = d[2] * d_d[2];
-    const real t35 = t34 + t34;
-    const real t36 = t33 + t35;
-    const real t37 = t28 != 0 ? 0.0 : t36;
-    const real t38 = t6 * 2.0;
-    const real t39 = t37 / t38;
-    const real t40 = t7 * t39;
-    const real t41 = t40 / t6;
-    const real t42 = d[0] * t41;
-    const real t43 = t27 - t42;
-    const real t44 = t11 != 0 ? t43 : 0.0;
-    const real t45 = t26 * t44;
-    const real t46 = slip[0] * d_slip[0];
-    const real t47 = t46 + t46;
-    const real t48 = t19 * d_slip[1];
-    const real t49 = t7 * d_d[1];
-    const real t50 = d[1] * t41;
-    const real t51 = t49 - t50;
-    const real t52 = t11 != 0 ? t51 : 0.0;
-    const real t53 = slip[1] * t52;
-    const real t54 = t48 + t53;
-    const real t55 = slip[0] * t44;
-    const real t56 = t16 * d_slip[0];
-    const real t57 = t55 + t56;
-    const real t58 = t54 + t57;
-    const real t59 = t13 * d_slip[2];
-    const real t60 = t7 * d_d[2];
-    const real t61 = d[2] * t41;
-    const real t62 = t60 - t61;
-    const real t63 = t11 != 0 ? t62 : 0.0;
-    const real t64 = slip[2] * t63;
-    const real t65 = t59 + t64;
-    const real t66 = t58 + t65;
-    const real t67 = t22 * t66;
-    const real t68 = t67 + t67;
-    const real t69 = t47 - t68;
-    const real t70 = slip[1] * d_slip[1];
-    const real t71 = t70 + t70;
-    const real t72 = t69 + t71;
-    const real t73 = slip[2] * d_slip[2];
-    const real t74 = t73 + t73;
-    const real t75 = t72 + t74;
-    const real t76 = t16 * t75;
-    const real t77 = t45 + t76;
-    const real t78 = t7 * t77;
-    const real t79 = t16 * t26;
-    const real t80 = t79 * t41;
-    const real t81 = t78 - t80;
-    d_drift[0] += t81;
-    const real t82 = t26 * t52;
-    const real t83 = t19 * t75;
-    const real t84 = t82 + t83;
-    const real t85 = t7 * t84;
-    const real t86 = t19 * t26;
-    const real t87 = t86 * t41;
-    const real t88 = t85 - t87;
-    d_drift[1] += t88;
-    const real t89 = t26 * t63;
-    const real t90 = t13 * t75;
-    const real t91 = t89 + t90;
-    const real t92 = t7 * t91;
-    const real t93 = t13 * t26;
-    const real t94 = t93 * t41;
-    const real t95 = t92 - t94;
-    d_drift[2] += t95;
-    d_drift[3] += 0.0;
-    d_drift[4] += 0.0;
-    d_drift[5] += 0.0;
-    return 0;
+  real t4 = d[2] * d[2] + (d[0] * d[0] + d[1] * d[1]);
+  real t6 = sqrt((t4 < 1e-24 || isnan(1e-24)) ? 1e-24 : t4);
+  real t7 = 1.0 / t6;
+  real t11 = 1e-24 < t4;
+  real t12 = d[2] * t7;
+  real t13 = t11 != 0 ? t12 : 0.0;
+  real t15 = d[0] * t7;
+  real t16 = t11 != 0 ? t15 : 1.0;
+  real t18 = d[1] * t7;
+  real t19 = t11 != 0 ? t18 : 0.0;
+  real t22 = slip[2] * t13 + (t16 * slip[0] + slip[1] * t19);
+  real t26 = slip[2] * slip[2] + (slip[1] * slip[1] + (slip[0] * slip[0] - t22 * t22));
+  real t29 = d[1] * d_d[1];
+  real t31 = d[0] * d_d[0];
+  real t34 = d[2] * d_d[2];
+  real t36 = t29 + t29 + (t31 + t31) + (t34 + t34);
+  real t41 = t7 * (((t4 < 1e-24) ? 0.0 : t36) / (t6 * 2.0)) / t6;
+  real t43 = t7 * d_d[0] - d[0] * t41;
+  real t44 = t11 != 0 ? t43 : 0.0;
+  real t46 = slip[0] * d_slip[0];
+  real t51 = t7 * d_d[1] - d[1] * t41;
+  real t52 = t11 != 0 ? t51 : 0.0;
+  real t62 = t7 * d_d[2] - d[2] * t41;
+  real t63 = t11 != 0 ? t62 : 0.0;
+  real t67 = t22 * (t19 * d_slip[1] + slip[1] * t52 + (slip[0] * t44 + t16 * d_slip[0]) + (t13 *
+    d_slip[2] + slip[2] * t63));
+  real t70 = slip[1] * d_slip[1];
+  real t73 = slip[2] * d_slip[2];
+  real t75 = t46 + t46 - (t67 + t67) + (t70 + t70) + (t73 + t73);
+  d_drift[0] += t7 * (t26 * t44 + t16 * t75) - t16 * t26 * t41;
+  d_drift[1] += t7 * (t26 * t52 + t19 * t75) - t19 * t26 * t41;
+  d_drift[2] += t7 * (t26 * t63 + t13 * t75) - t13 * t26 * t41;
+  d_drift[3] += 0.0;
+  d_drift[4] += 0.0;
+  d_drift[5] += 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_distance_drift_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_distance_drift_slope(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_distance_drift_slope_inputs[] = {
-    {"d", 3, "m", 0, 0},
-    {"slip", 6, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_slip", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_distance_drift_slope_outputs[] = {
-    {"d_drift", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_distance_drift_slope, (in[0], in[1], in[2], in[3], out[0]))
 
 /* plane and its derivative along a direction
  * in  p[1] (m) height of the plane over C
@@ -3517,66 +1094,19 @@ static const mstmm_port mstmm_sweep_loops_distance_drift_slope_outputs[] = {
  * in  d_d[3] (m) derivative of d
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_loops_plane_slope(const real *restrict p, const real *restrict d,
-    const real *restrict d_d, real *restrict d_W)
+int mstmm_sweep_loops_plane_slope(in_t p, in_t d, in_t d_d, out_t d_W)
 {
-    (void)p;
-    (void)d;
-    (void)d_d;
-    d_W[0] = 0.0;
-    d_W[1] = 0.0;
-    d_W[2] = 0.0;
-    d_W[3] = 0.0;
-    d_W[4] = 0.0;
-    d_W[5] = 0.0;
-    d_W[6] = 0.0;
-    d_W[7] = 0.0;
-    d_W[8] = 0.0;
-    d_W[9] = 0.0;
-    d_W[10] = 0.0;
-    d_W[11] = 0.0;
-    d_W[12] = 0.0;
-    d_W[13] = 0.0;
-    d_W[14] = 0.0;
-    d_W[15] = 0.0;
-    d_W[16] = 0.0;
-    d_W[17] = 0.0;
-    d_W[18] = 0.0;
-    d_W[19] = 0.0;
-    d_W[20] = 0.0;
-    d_W[21] = 0.0;
-    d_W[22] = 0.0;
-    d_W[23] = 0.0;
-    d_W[24] = 0.0;
-    d_W[25] = 0.0;
-    d_W[26] = 0.0;
-    d_W[27] = 0.0;
-    d_W[28] = 0.0;
-    d_W[29] = 0.0;
-    d_W[30] = 0.0;
-    d_W[31] = 0.0;
-    d_W[32] = 0.0;
-    d_W[33] = 0.0;
-    d_W[34] = 0.0;
-    d_W[35] = 0.0;
-    return 0;
+  (void)p;
+  (void)d;
+  (void)d_d;
+  d_W[0] = d_W[1] = d_W[2] = d_W[3] = d_W[4] = d_W[5] = d_W[6] = d_W[7] = d_W[8] = d_W[9] = d_W[10]
+    = d_W[11] = d_W[12] = d_W[13] = d_W[14] = d_W[15] = d_W[16] = d_W[17] = d_W[18] = d_W[19] =
+    d_W[20] = d_W[21] = d_W[22] = d_W[23] = d_W[24] = d_W[25] = d_W[26] = d_W[27] = d_W[28] =
+    d_W[29] = d_W[30] = d_W[31] = d_W[32] = d_W[33] = d_W[34] = d_W[35] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_plane_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_plane_slope(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_plane_slope_inputs[] = {
-    {"p", 1, "m", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_plane_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_plane_slope, (in[0], in[1], in[2], out[0]))
 
 /* rolling and its derivative along a direction
  * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
@@ -3586,150 +1116,50 @@ static const mstmm_port mstmm_sweep_loops_plane_slope_outputs[] = {
  * in  d_d[3] (m) derivative of d
  * out d_W[6][6] derivative of W
  */
-int mstmm_sweep_loops_rolling_slope(const real *restrict p, const real *restrict R_C,
-    const real *restrict d, const real *restrict d_R_C, const real *restrict d_d,
-    real *restrict d_W)
+int mstmm_sweep_loops_rolling_slope(in_t p, in_t R_C, in_t d, in_t d_R_C, in_t d_d, out_t d_W)
 {
-    (void)d;
-    (void)d_d;
-    d_W[0] = 0.0;
-    d_W[1] = 0.0;
-    d_W[2] = 0.0;
-    d_W[3] = 0.0;
-    const real t0 = p[2] * R_C[2];
-    const real t1 = p[3] * R_C[5];
-    const real t2 = t0 + t1;
-    const real t3 = p[4] * R_C[8];
-    const real t4 = t2 + t3;
-    const real t5 = t4 * t4;
-    const real t6 = 1.0 - t5;
-    const real t7 = t6 * p[1];
-    const real t8 = t6 * t6;
-    const real t9 = p[2] * R_C[0];
-    const real t10 = p[3] * R_C[3];
-    const real t11 = t9 + t10;
-    const real t12 = p[4] * R_C[6];
-    const real t13 = t11 + t12;
-    const real t14 = t4 * t13;
-    const real t15 = t14 * t14;
-    const real t16 = p[2] * R_C[1];
-    const real t17 = p[3] * R_C[4];
-    const real t18 = t16 + t17;
-    const real t19 = p[4] * R_C[7];
-    const real t20 = t18 + t19;
-    const real t21 = t4 * t20;
-    const real t22 = t21 * t21;
-    const real t23 = t15 + t22;
-    const real t24 = t8 + t23;
-    const real t25 = (t24 < 1e-24 || isnan(1e-24)) ? 1e-24 : t24;
-    const real t26 = sqrt(t25);
-    const real t27 = 1.0 / t26;
-    const real t28 = t24 < 1e-24;
-    const real t29 = p[4] * d_R_C[8];
-    const real t30 = p[3] * d_R_C[5];
-    const real t31 = p[2] * d_R_C[2];
-    const real t32 = t30 + t31;
-    const real t33 = t29 + t32;
-    const real t34 = t20 * t33;
-    const real t35 = p[4] * d_R_C[7];
-    const real t36 = p[3] * d_R_C[4];
-    const real t37 = p[2] * d_R_C[1];
-    const real t38 = t36 + t37;
-    const real t39 = t35 + t38;
-    const real t40 = t4 * t39;
-    const real t41 = t34 + t40;
-    const real t42 = t21 * t41;
-    const real t43 = t42 + t42;
-    const real t44 = t13 * t33;
-    const real t45 = p[4] * d_R_C[6];
-    const real t46 = p[3] * d_R_C[3];
-    const real t47 = p[2] * d_R_C[0];
-    const real t48 = t46 + t47;
-    const real t49 = t45 + t48;
-    const real t50 = t4 * t49;
-    const real t51 = t44 + t50;
-    const real t52 = t14 * t51;
-    const real t53 = t52 + t52;
-    const real t54 = t43 + t53;
-    const real t55 = t4 * t33;
-    const real t56 = t55 + t55;
-    const real t57 = t6 * t56;
-    const real t58 = t57 + t57;
-    const real t59 = t54 - t58;
-    const real t60 = t28 != 0 ? 0.0 : t59;
-    const real t61 = t26 * 2.0;
-    const real t62 = t60 / t61;
-    const real t63 = t27 * t62;
-    const real t64 = t63 / t26;
-    const real t65 = t7 * t64;
-    const real t66 = p[1] * t56;
-    const real t67 = t27 * t66;
-    const real t68 = t65 + t67;
-    d_W[4] = t68;
-    const real t69 = t21 * p[1];
-    const real t70 = t69 * t64;
-    const real t71 = p[1] * t41;
-    const real t72 = t27 * t71;
-    const real t73 = t70 - t72;
-    d_W[5] = t73;
-    d_W[6] = 0.0;
-    d_W[7] = 0.0;
-    d_W[8] = 0.0;
-    const real t74 = -t68;
-    d_W[9] = t74;
-    d_W[10] = 0.0;
-    const real t75 = p[1] * t51;
-    const real t76 = t27 * t75;
-    const real t77 = t14 * p[1];
-    const real t78 = t77 * t64;
-    const real t79 = t76 - t78;
-    d_W[11] = t79;
-    d_W[12] = 0.0;
-    d_W[13] = 0.0;
-    d_W[14] = 0.0;
-    const real t80 = t72 - t70;
-    d_W[15] = t80;
-    const real t81 = t78 - t76;
-    d_W[16] = t81;
-    d_W[17] = 0.0;
-    d_W[18] = 0.0;
-    d_W[19] = 0.0;
-    d_W[20] = 0.0;
-    d_W[21] = 0.0;
-    d_W[22] = 0.0;
-    d_W[23] = 0.0;
-    d_W[24] = 0.0;
-    d_W[25] = 0.0;
-    d_W[26] = 0.0;
-    d_W[27] = 0.0;
-    d_W[28] = 0.0;
-    d_W[29] = 0.0;
-    d_W[30] = 0.0;
-    d_W[31] = 0.0;
-    d_W[32] = 0.0;
-    d_W[33] = 0.0;
-    d_W[34] = 0.0;
-    d_W[35] = 0.0;
-    return 0;
+  (void)d;
+  (void)d_d;
+  d_W[0] = d_W[1] = d_W[2] = d_W[3] = 0.0;
+  real t4 = p[2] * R_C[2] + p[3] * R_C[5] + p[4] * R_C[8];
+  real t6 = 1.0 - t4 * t4;
+  real t13 = p[2] * R_C[0] + p[3] * R_C[3] + p[4] * R_C[6];
+  real t14 = t4 * t13;
+  real t20 = p[2] * R_C[1] + p[3] * R_C[4] + p[4] * R_C[7];
+  real t21 = t4 * t20;
+  real t24 = t6 * t6 + (t14 * t14 + t21 * t21);
+  real t26 = sqrt((t24 < 1e-24 || isnan(1e-24)) ? 1e-24 : t24);
+  real t27 = 1.0 / t26;
+  real t33 = p[4] * d_R_C[8] + (p[3] * d_R_C[5] + p[2] * d_R_C[2]);
+  real t41 = t20 * t33 + t4 * (p[4] * d_R_C[7] + (p[3] * d_R_C[4] + p[2] * d_R_C[1]));
+  real t42 = t21 * t41;
+  real t51 = t13 * t33 + t4 * (p[4] * d_R_C[6] + (p[3] * d_R_C[3] + p[2] * d_R_C[0]));
+  real t52 = t14 * t51;
+  real t55 = t4 * t33;
+  real t56 = t55 + t55;
+  real t57 = t6 * t56;
+  real t59 = t42 + t42 + (t52 + t52) - (t57 + t57);
+  real t64 = t27 * (((t24 < 1e-24) ? 0.0 : t59) / (t26 * 2.0)) / t26;
+  real t68 = t6 * p[1] * t64 + t27 * (p[1] * t56);
+  d_W[4] = t68;
+  real t70 = t21 * p[1] * t64;
+  real t72 = t27 * (p[1] * t41);
+  d_W[5] = t70 - t72;
+  d_W[6] = d_W[7] = d_W[8] = 0.0;
+  d_W[9] = -t68;
+  d_W[10] = 0.0;
+  real t76 = t27 * (p[1] * t51);
+  real t78 = t14 * p[1] * t64;
+  d_W[11] = t76 - t78;
+  d_W[12] = d_W[13] = d_W[14] = 0.0;
+  d_W[15] = t72 - t70;
+  d_W[16] = t78 - t76;
+  d_W[17] = d_W[18] = d_W[19] = d_W[20] = d_W[21] = d_W[22] = d_W[23] = d_W[24] = d_W[25] = d_W[26]
+    = d_W[27] = d_W[28] = d_W[29] = d_W[30] = d_W[31] = d_W[32] = d_W[33] = d_W[34] = d_W[35] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_rolling_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_rolling_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_rolling_slope_inputs[] = {
-    {"p", 5, "m, -", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"d_R_C", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_rolling_slope_outputs[] = {
-    {"d_W", 36, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_rolling_slope, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* rolling_drift and its derivative along a direction
  * in  p[5] (m, -) height of the plane over C, radius of the disc, its axis in axes of B (a ball: 0)
@@ -3739,687 +1169,220 @@ static const mstmm_port mstmm_sweep_loops_rolling_slope_outputs[] = {
  * in  d_slip[6] derivative of slip
  * out d_drift[6] derivative of drift, added to what is there
  */
-int mstmm_sweep_loops_rolling_drift_slope(const real *restrict p, const real *restrict R_C,
-    const real *restrict slip, const real *restrict d_R_C, const real *restrict d_slip,
-    real *restrict d_drift)
+int mstmm_sweep_loops_rolling_drift_slope(in_t p, in_t R_C, in_t slip, in_t d_R_C, in_t d_slip,
+    out_t d_drift)
 {
-    const real t0 = p[2] * R_C[2];
-    const real t1 = p[3] * R_C[5];
-    const real t2 = t0 + t1;
-    const real t3 = p[4] * R_C[8];
-    const real t4 = t2 + t3;
-    const real t5 = t4 * t4;
-    const real t6 = 1.0 - t5;
-    const real t7 = t6 * t6;
-    const real t8 = p[2] * R_C[0];
-    const real t9 = p[3] * R_C[3];
-    const real t10 = t8 + t9;
-    const real t11 = p[4] * R_C[6];
-    const real t12 = t10 + t11;
-    const real t13 = t4 * t12;
-    const real t14 = t13 * t13;
-    const real t15 = p[2] * R_C[1];
-    const real t16 = p[3] * R_C[4];
-    const real t17 = t15 + t16;
-    const real t18 = p[4] * R_C[7];
-    const real t19 = t17 + t18;
-    const real t20 = t4 * t19;
-    const real t21 = t20 * t20;
-    const real t22 = t14 + t21;
-    const real t23 = t7 + t22;
-    const real t24 = (t23 < 1e-24 || isnan(1e-24)) ? 1e-24 : t23;
-    const real t25 = sqrt(t24);
-    const real t26 = 1.0 / t25;
-    const real t27 = t19 * slip[3];
-    const real t28 = t12 * slip[4];
-    const real t29 = t27 - t28;
-    const real t30 = t4 * t29;
-    const real t31 = t30 * 2.0;
-    const real t32 = t12 * t29;
-    const real t33 = t4 * slip[4];
-    const real t34 = t19 * slip[5];
-    const real t35 = t33 - t34;
-    const real t36 = t4 * t35;
-    const real t37 = t32 + t36;
-    const real t38 = t13 * t37;
-    const real t39 = t19 * t29;
-    const real t40 = t12 * slip[5];
-    const real t41 = t4 * slip[3];
-    const real t42 = t40 - t41;
-    const real t43 = t4 * t42;
-    const real t44 = t39 + t43;
-    const real t45 = t20 * t44;
-    const real t46 = t38 + t45;
-    const real t47 = t6 * t31;
-    const real t48 = t46 - t47;
-    const real t49 = t26 * t48;
-    const real t50 = t6 * t49;
-    const real t51 = t26 * t50;
-    const real t52 = t31 + t51;
-    const real t53 = p[1] * t52;
-    const real t54 = t26 * t53;
-    const real t55 = t54 * d_slip[4];
-    const real t56 = p[4] * d_R_C[8];
-    const real t57 = p[3] * d_R_C[5];
-    const real t58 = p[2] * d_R_C[2];
-    const real t59 = t57 + t58;
-    const real t60 = t56 + t59;
-    const real t61 = t29 * t60;
-    const real t62 = p[4] * d_R_C[7];
-    const real t63 = p[3] * d_R_C[4];
-    const real t64 = p[2] * d_R_C[1];
-    const real t65 = t63 + t64;
-    const real t66 = t62 + t65;
-    const real t67 = slip[3] * t66;
-    const real t68 = t19 * d_slip[3];
-    const real t69 = t67 + t68;
-    const real t70 = p[4] * d_R_C[6];
-    const real t71 = p[3] * d_R_C[3];
-    const real t72 = p[2] * d_R_C[0];
-    const real t73 = t71 + t72;
-    const real t74 = t70 + t73;
-    const real t75 = slip[4] * t74;
-    const real t76 = t12 * d_slip[4];
-    const real t77 = t75 + t76;
-    const real t78 = t69 - t77;
-    const real t79 = t4 * t78;
-    const real t80 = t61 + t79;
-    const real t81 = 2.0 * t80;
-    const real t82 = t19 * t60;
-    const real t83 = t4 * t66;
-    const real t84 = t82 + t83;
-    const real t85 = t44 * t84;
-    const real t86 = t42 * t60;
-    const real t87 = slip[5] * t74;
-    const real t88 = t12 * d_slip[5];
-    const real t89 = t87 + t88;
-    const real t90 = slip[3] * t60;
-    const real t91 = t4 * d_slip[3];
-    const real t92 = t90 + t91;
-    const real t93 = t89 - t92;
-    const real t94 = t4 * t93;
-    const real t95 = t86 + t94;
-    const real t96 = t29 * t66;
-    const real t97 = t19 * t78;
-    const real t98 = t96 + t97;
-    const real t99 = t95 + t98;
-    const real t100 = t20 * t99;
-    const real t101 = t85 + t100;
-    const real t102 = t12 * t60;
-    const real t103 = t4 * t74;
-    const real t104 = t102 + t103;
-    const real t105 = t37 * t104;
-    const real t106 = t35 * t60;
-    const real t107 = slip[4] * t60;
-    const real t108 = t4 * d_slip[4];
-    const real t109 = t107 + t108;
-    const real t110 = slip[5] * t66;
-    const real t111 = t19 * d_slip[5];
-    const real t112 = t110 + t111;
-    const real t113 = t109 - t112;
-    const real t114 = t4 * t113;
-    const real t115 = t106 + t114;
-    const real t116 = t29 * t74;
-    const real t117 = t12 * t78;
-    const real t118 = t116 + t117;
-    const real t119 = t115 + t118;
-    const real t120 = t13 * t119;
-    const real t121 = t105 + t120;
-    const real t122 = t101 + t121;
-    const real t123 = t6 * t81;
-    const real t124 = t4 * t60;
-    const real t125 = t124 + t124;
-    const real t126 = t31 * t125;
-    const real t127 = t123 - t126;
-    const real t128 = t122 - t127;
-    const real t129 = t26 * t128;
-    const real t130 = t23 < 1e-24;
-    const real t131 = t20 * t84;
-    const real t132 = t131 + t131;
-    const real t133 = t13 * t104;
-    const real t134 = t133 + t133;
-    const real t135 = t132 + t134;
-    const real t136 = t6 * t125;
-    const real t137 = t136 + t136;
-    const real t138 = t135 - t137;
-    const real t139 = t130 != 0 ? 0.0 : t138;
-    const real t140 = t25 * 2.0;
-    const real t141 = t139 / t140;
-    const real t142 = t26 * t141;
-    const real t143 = t142 / t25;
-    const real t144 = t48 * t143;
-    const real t145 = t129 - t144;
-    const real t146 = t6 * t145;
-    const real t147 = t49 * t125;
-    const real t148 = t146 - t147;
-    const real t149 = t26 * t148;
-    const real t150 = t50 * t143;
-    const real t151 = t149 - t150;
-    const real t152 = t81 + t151;
-    const real t153 = p[1] * t152;
-    const real t154 = t26 * t153;
-    const real t155 = t53 * t143;
-    const real t156 = t154 - t155;
-    const real t157 = slip[4] * t156;
-    const real t158 = t55 + t157;
-    const real t159 = t20 * t49;
-    const real t160 = t26 * t159;
-    const real t161 = t160 - t44;
-    const real t162 = t161 * p[1];
-    const real t163 = t26 * t162;
-    const real t164 = t163 * d_slip[5];
-    const real t165 = t49 * t84;
-    const real t166 = t20 * t145;
-    const real t167 = t165 + t166;
-    const real t168 = t26 * t167;
-    const real t169 = t159 * t143;
-    const real t170 = t168 - t169;
-    const real t171 = t170 - t99;
-    const real t172 = p[1] * t171;
-    const real t173 = t26 * t172;
-    const real t174 = t162 * t143;
-    const real t175 = t173 - t174;
-    const real t176 = slip[5] * t175;
-    const real t177 = t164 + t176;
-    const real t178 = t158 + t177;
-    d_drift[0] += t178;
-    const real t179 = t54 * d_slip[3];
-    const real t180 = slip[3] * t156;
-    const real t181 = t179 + t180;
-    const real t182 = t13 * t49;
-    const real t183 = t26 * t182;
-    const real t184 = t183 - t37;
-    const real t185 = p[1] * t184;
-    const real t186 = t26 * t185;
-    const real t187 = t186 * d_slip[5];
-    const real t188 = t49 * t104;
-    const real t189 = t13 * t145;
-    const real t190 = t188 + t189;
-    const real t191 = t26 * t190;
-    const real t192 = t182 * t143;
-    const real t193 = t191 - t192;
-    const real t194 = t193 - t119;
-    const real t195 = p[1] * t194;
-    const real t196 = t26 * t195;
-    const real t197 = t185 * t143;
-    const real t198 = t196 - t197;
-    const real t199 = slip[5] * t198;
-    const real t200 = t187 + t199;
-    const real t201 = t181 + t200;
-    const real t202 = -t201;
-    d_drift[1] += t202;
-    const real t203 = t186 * d_slip[4];
-    const real t204 = slip[4] * t198;
-    const real t205 = t203 + t204;
-    const real t206 = t163 * d_slip[3];
-    const real t207 = slip[3] * t175;
-    const real t208 = t206 + t207;
-    const real t209 = t205 - t208;
-    d_drift[2] += t209;
-    d_drift[3] += 0.0;
-    d_drift[4] += 0.0;
-    d_drift[5] += 0.0;
-    return 0;
+  real t4 = p[2] * R_C[2] + p[3] * R_C[5] + p[4] * R_C[8];
+  real t6 = 1.0 - t4 * t4;
+  real t12 = p[2] * R_C[0] + p[3] * R_C[3] + p[4] * R_C[6];
+  real t13 = t4 * t12;
+  real t19 = p[2] * R_C[1] + p[3] * R_C[4] + p[4] * R_C[7];
+  real t20 = t4 * t19;
+  real t23 = t6 * t6 + (t13 * t13 + t20 * t20);
+  real t25 = sqrt((t23 < 1e-24 || isnan(1e-24)) ? 1e-24 : t23);
+  real t26 = 1.0 / t25;
+  real t29 = t19 * slip[3] - t12 * slip[4];
+  real t31 = t4 * t29 * 2.0;
+  real t35 = t4 * slip[4] - t19 * slip[5];
+  real t37 = t12 * t29 + t4 * t35;
+  real t42 = t12 * slip[5] - t4 * slip[3];
+  real t44 = t19 * t29 + t4 * t42;
+  real t48 = t13 * t37 + t20 * t44 - t6 * t31;
+  real t49 = t26 * t48;
+  real t50 = t6 * t49;
+  real t53 = p[1] * (t31 + t26 * t50);
+  real t54 = t26 * t53;
+  real t60 = p[4] * d_R_C[8] + (p[3] * d_R_C[5] + p[2] * d_R_C[2]);
+  real t66 = p[4] * d_R_C[7] + (p[3] * d_R_C[4] + p[2] * d_R_C[1]);
+  real t74 = p[4] * d_R_C[6] + (p[3] * d_R_C[3] + p[2] * d_R_C[0]);
+  real t78 = slip[3] * t66 + t19 * d_slip[3] - (slip[4] * t74 + t12 * d_slip[4]);
+  real t81 = 2.0 * (t29 * t60 + t4 * t78);
+  real t84 = t19 * t60 + t4 * t66;
+  real t99 = t42 * t60 + t4 * (slip[5] * t74 + t12 * d_slip[5] - (slip[3] * t60 + t4 * d_slip[3])) +
+    (t29 * t66 + t19 * t78);
+  real t104 = t12 * t60 + t4 * t74;
+  real t119 = t35 * t60 + t4 * (slip[4] * t60 + t4 * d_slip[4] - (slip[5] * t66 + t19 * d_slip[5]))
+    + (t29 * t74 + t12 * t78);
+  real t124 = t4 * t60;
+  real t125 = t124 + t124;
+  real t131 = t20 * t84;
+  real t133 = t13 * t104;
+  real t136 = t6 * t125;
+  real t138 = t131 + t131 + (t133 + t133) - (t136 + t136);
+  real t143 = t26 * (((t23 < 1e-24) ? 0.0 : t138) / (t25 * 2.0)) / t25;
+  real t145 = t26 * (t44 * t84 + t20 * t99 + (t37 * t104 + t13 * t119) - (t6 * t81 - t31 * t125)) -
+    t48 * t143;
+  real t156 = t26 * (p[1] * (t81 + (t26 * (t6 * t145 - t49 * t125) - t50 * t143))) - t53 * t143;
+  real t159 = t20 * t49;
+  real t162 = (t26 * t159 - t44) * p[1];
+  real t163 = t26 * t162;
+  real t175 = t26 * (p[1] * (t26 * (t49 * t84 + t20 * t145) - t159 * t143 - t99)) - t162 * t143;
+  d_drift[0] += t54 * d_slip[4] + slip[4] * t156 + (t163 * d_slip[5] + slip[5] * t175);
+  real t182 = t13 * t49;
+  real t185 = p[1] * (t26 * t182 - t37);
+  real t186 = t26 * t185;
+  real t198 = t26 * (p[1] * (t26 * (t49 * t104 + t13 * t145) - t182 * t143 - t119)) - t185 * t143;
+  d_drift[1] += -(t54 * d_slip[3] + slip[3] * t156 + (t186 * d_slip[5] + slip[5] * t198));
+  d_drift[2] += t186 * d_slip[4] + slip[4] * t198 - (t163 * d_slip[3] + slip[3] * t175);
+  d_drift[3] += 0.0;
+  d_drift[4] += 0.0;
+  d_drift[5] += 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_loops_rolling_drift_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_loops_rolling_drift_slope(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_loops_rolling_drift_slope_inputs[] = {
-    {"p", 5, "m, -", 0, 0},
-    {"R_C", 9, "", 0, 0},
-    {"slip", 6, "", 0, 0},
-    {"d_R_C", 9, "", 0, 0},
-    {"d_slip", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_loops_rolling_drift_slope_outputs[] = {
-    {"d_drift", 6, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_loops_rolling_drift_slope, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 static const mstmm_kernel mstmm_sweep_loops_kernels[] = {
-    {
-        .name = "relative_pose",
-        .function = (void (*)(void))mstmm_sweep_loops_relative_pose,
-        .call = mstmm_sweep_loops_relative_pose_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_relative_pose_inputs,
-        .outputs = mstmm_sweep_loops_relative_pose_outputs,
-        .ir_hash = "1e5a2740c1b35eb8cae5372ba5f438f1b6121fddc62bdaffe4d876d774fe1578",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "gap",
-        .function = (void (*)(void))mstmm_sweep_loops_gap,
-        .call = mstmm_sweep_loops_gap_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_gap_inputs,
-        .outputs = mstmm_sweep_loops_gap_outputs,
-        .ir_hash = "cdee38f683d70199722dedd18865db81c6e533c9860bdac2042354848d0e5c83",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "slip",
-        .function = (void (*)(void))mstmm_sweep_loops_slip,
-        .call = mstmm_sweep_loops_slip_call,
-        .n_inputs = 7,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_slip_inputs,
-        .outputs = mstmm_sweep_loops_slip_outputs,
-        .ir_hash = "22be95c4ad5d355f9a2968fd90cce3df95eba317e1f686628e6909afa71c44b1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "drift",
-        .function = (void (*)(void))mstmm_sweep_loops_drift,
-        .call = mstmm_sweep_loops_drift_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_drift_inputs,
-        .outputs = mstmm_sweep_loops_drift_outputs,
-        .ir_hash = "8a297ba9c1afed50e2340c4079b0b003abce0412a8503f9cc3a2d5d34661529d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "required_acceleration",
-        .function = (void (*)(void))mstmm_sweep_loops_required_acceleration,
-        .call = mstmm_sweep_loops_required_acceleration_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_required_acceleration_inputs,
-        .outputs = mstmm_sweep_loops_required_acceleration_outputs,
-        .ir_hash = "c921834c099ebc988eb3047f1f9acea4f64e1647943e137ac2a6a2b2af6e10c4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "row",
-        .function = (void (*)(void))mstmm_sweep_loops_row,
-        .call = mstmm_sweep_loops_row_call,
-        .n_inputs = 5,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_row_inputs,
-        .outputs = mstmm_sweep_loops_row_outputs,
-        .ir_hash = "c7845036a8c0fadb0fde7c8bd8ca1208f0eb065c3d66800b9b6dc8bcec7e6335",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "known_parts",
-        .function = (void (*)(void))mstmm_sweep_loops_known_parts,
-        .call = mstmm_sweep_loops_known_parts_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_known_parts_inputs,
-        .outputs = mstmm_sweep_loops_known_parts_outputs,
-        .ir_hash = "3d1f0350c6aaa9ba0332fddbc6ac98220c1df53947a724f41819692371885f9c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "row_acceleration",
-        .function = (void (*)(void))mstmm_sweep_loops_row_acceleration,
-        .call = mstmm_sweep_loops_row_acceleration_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_row_acceleration_inputs,
-        .outputs = mstmm_sweep_loops_row_acceleration_outputs,
-        .ir_hash = "44376ecadc4e52049941e6d04d67dfed0cf5f33763342a684642348feaa1941a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "apply_effort",
-        .function = (void (*)(void))mstmm_sweep_loops_apply_effort,
-        .call = mstmm_sweep_loops_apply_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_apply_effort_inputs,
-        .outputs = mstmm_sweep_loops_apply_effort_outputs,
-        .ir_hash = "4f08ea93df91fd1dbc29675b0205aa587d0fb3590e58d1f6abf81a0fb52feecd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "pivot_inverse",
-        .function = (void (*)(void))mstmm_sweep_loops_pivot_inverse,
-        .call = mstmm_sweep_loops_pivot_inverse_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_pivot_inverse_inputs,
-        .outputs = mstmm_sweep_loops_pivot_inverse_outputs,
-        .ir_hash = "717594a4e2e66ee200cb5d12841fa3ee802b17fa8836d0959fe92f1ff867b51d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "eliminate_row",
-        .function = (void (*)(void))mstmm_sweep_loops_eliminate_row,
-        .call = mstmm_sweep_loops_eliminate_row_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_eliminate_row_inputs,
-        .outputs = mstmm_sweep_loops_eliminate_row_outputs,
-        .ir_hash = "713fbf6e5c610f41335662ebf87c519f69c0bb72906967619b25f8b43e329d40",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "update_column",
-        .function = (void (*)(void))mstmm_sweep_loops_update_column,
-        .call = mstmm_sweep_loops_update_column_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_update_column_inputs,
-        .outputs = mstmm_sweep_loops_update_column_outputs,
-        .ir_hash = "7c3d3cf4927fa1fc9d3368f5fee36c375b2d025476a08b41d0b4eaac62f91f8f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "update_known_part",
-        .function = (void (*)(void))mstmm_sweep_loops_update_known_part,
-        .call = mstmm_sweep_loops_update_known_part_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_update_known_part_inputs,
-        .outputs = mstmm_sweep_loops_update_known_part_outputs,
-        .ir_hash = "010209841523b2a9a2d7b3b2a6d2637bfacf3c0212ee9c2e27ef5cdf64c5c91c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "update_coupling",
-        .function = (void (*)(void))mstmm_sweep_loops_update_coupling,
-        .call = mstmm_sweep_loops_update_coupling_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_update_coupling_inputs,
-        .outputs = mstmm_sweep_loops_update_coupling_outputs,
-        .ir_hash = "516245a0d0d47aec76b806ec972ceb7c0be968e00ae4599e88a0d5a9f5837e17",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "multiplier",
-        .function = (void (*)(void))mstmm_sweep_loops_multiplier,
-        .call = mstmm_sweep_loops_multiplier_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_multiplier_inputs,
-        .outputs = mstmm_sweep_loops_multiplier_outputs,
-        .ir_hash = "6bb5d332dd94bed08c70dd06e1dae93b73e9b544fe123549cbadb0a7f391ac9f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "multiplier_of_motion",
-        .function = (void (*)(void))mstmm_sweep_loops_multiplier_of_motion,
-        .call = mstmm_sweep_loops_multiplier_of_motion_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_multiplier_of_motion_inputs,
-        .outputs = mstmm_sweep_loops_multiplier_of_motion_outputs,
-        .ir_hash = "726dcbc31e9c42b4e558fbfc18b4374e77aceab83307f9a74a36a2f0c9ce68de",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "multiplier_of_row",
-        .function = (void (*)(void))mstmm_sweep_loops_multiplier_of_row,
-        .call = mstmm_sweep_loops_multiplier_of_row_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_multiplier_of_row_inputs,
-        .outputs = mstmm_sweep_loops_multiplier_of_row_outputs,
-        .ir_hash = "b721ae78ac5b22a4076fb2ce50db05b316231ee89870e6010bf73940511a2171",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rotor_row_residual",
-        .function = (void (*)(void))mstmm_sweep_loops_rotor_row_residual,
-        .call = mstmm_sweep_loops_rotor_row_residual_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_rotor_row_residual_inputs,
-        .outputs = mstmm_sweep_loops_rotor_row_residual_outputs,
-        .ir_hash = "5f3846ce586bc4430169db14015103f5bada445a59e63e72124dbff90305abb7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "apply_multiplier",
-        .function = (void (*)(void))mstmm_sweep_loops_apply_multiplier,
-        .call = mstmm_sweep_loops_apply_multiplier_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_apply_multiplier_inputs,
-        .outputs = mstmm_sweep_loops_apply_multiplier_outputs,
-        .ir_hash = "251bf35f1a6786f4721b52c6df98b7cefb9b6b55591e1ab514327a16dddc4e91",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "distance",
-        .function = (void (*)(void))mstmm_sweep_loops_distance,
-        .call = mstmm_sweep_loops_distance_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_distance_inputs,
-        .outputs = mstmm_sweep_loops_distance_outputs,
-        .ir_hash = "950b07b76c54ef3665f4f5506096956b86c680152d2447d37b368a5b6cfa8cde",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "distance_drift",
-        .function = (void (*)(void))mstmm_sweep_loops_distance_drift,
-        .call = mstmm_sweep_loops_distance_drift_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_distance_drift_inputs,
-        .outputs = mstmm_sweep_loops_distance_drift_outputs,
-        .ir_hash = "27b2cec6d9070677d4c987f804ec0b17f0f556a5ffb1d212695e5510cfab85b5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "plane",
-        .function = (void (*)(void))mstmm_sweep_loops_plane,
-        .call = mstmm_sweep_loops_plane_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_plane_inputs,
-        .outputs = mstmm_sweep_loops_plane_outputs,
-        .ir_hash = "98c5db8c311b5a7a0aa9ab0fb7acd09c6ec7cc4fd012c767c5748b0d9c38f31c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rolling",
-        .function = (void (*)(void))mstmm_sweep_loops_rolling,
-        .call = mstmm_sweep_loops_rolling_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_rolling_inputs,
-        .outputs = mstmm_sweep_loops_rolling_outputs,
-        .ir_hash = "a048176a199f70e1df67b6e135ab0cdabb98e45909b9c07a3c75e5058385c958",
-        .n_guards = 1,
-        .guards = mstmm_sweep_loops_rolling_guards,
-    },
-    {
-        .name = "rolling_drift",
-        .function = (void (*)(void))mstmm_sweep_loops_rolling_drift,
-        .call = mstmm_sweep_loops_rolling_drift_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_rolling_drift_inputs,
-        .outputs = mstmm_sweep_loops_rolling_drift_outputs,
-        .ir_hash = "552892fb912d9e893e8a26d0d72c3330c686a333db5f16211777d191b5e0c71f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "relative_pose_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_relative_pose_slope,
-        .call = mstmm_sweep_loops_relative_pose_slope_call,
-        .n_inputs = 13,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_loops_relative_pose_slope_inputs,
-        .outputs = mstmm_sweep_loops_relative_pose_slope_outputs,
-        .ir_hash = "e89830935f6cc37c19c05a3493419af980742994731b41a4c696317e6c10c01d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "slip_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_slip_slope,
-        .call = mstmm_sweep_loops_slip_slope_call,
-        .n_inputs = 13,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_slip_slope_inputs,
-        .outputs = mstmm_sweep_loops_slip_slope_outputs,
-        .ir_hash = "d686e96ee2635ea323c75c47f8325af060d0c89be3b50a01246dc55a2ef88cae",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "drift_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_drift_slope,
-        .call = mstmm_sweep_loops_drift_slope_call,
-        .n_inputs = 11,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_drift_slope_inputs,
-        .outputs = mstmm_sweep_loops_drift_slope_outputs,
-        .ir_hash = "c2111149101325f7da85dfd14e83e6e86d61f98ab0c54425d671dc1bf4ca9ab1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "row_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_row_slope,
-        .call = mstmm_sweep_loops_row_slope_call,
-        .n_inputs = 9,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_loops_row_slope_inputs,
-        .outputs = mstmm_sweep_loops_row_slope_outputs,
-        .ir_hash = "c114f9e110af27bcb4c461d8f561fb8fc6354b0a53b155549146873e07674ccf",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "known_parts_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_known_parts_slope,
-        .call = mstmm_sweep_loops_known_parts_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_known_parts_slope_inputs,
-        .outputs = mstmm_sweep_loops_known_parts_slope_outputs,
-        .ir_hash = "b3896c12504629f639061ba8ac4ae728d23db2e9454b79cbc9e7d46a50206db7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "apply_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_apply_effort_slope,
-        .call = mstmm_sweep_loops_apply_effort_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_apply_effort_slope_inputs,
-        .outputs = mstmm_sweep_loops_apply_effort_slope_outputs,
-        .ir_hash = "7a19c61f2efc0ff45fadd5c3d17887dd04430822661dfa7d717a927bafc1e161",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "apply_multiplier_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_apply_multiplier_slope,
-        .call = mstmm_sweep_loops_apply_multiplier_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_apply_multiplier_slope_inputs,
-        .outputs = mstmm_sweep_loops_apply_multiplier_slope_outputs,
-        .ir_hash = "8fc50cecf64101eeca3e17a0aa888a216043cabffd38620b7390e4956d313f2c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "distance_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_distance_slope,
-        .call = mstmm_sweep_loops_distance_slope_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_distance_slope_inputs,
-        .outputs = mstmm_sweep_loops_distance_slope_outputs,
-        .ir_hash = "c14dbb2688a98e5f44d0becd5f83a4b650359ed68214bf22431150c2f22fa2ad",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "distance_drift_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_distance_drift_slope,
-        .call = mstmm_sweep_loops_distance_drift_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_distance_drift_slope_inputs,
-        .outputs = mstmm_sweep_loops_distance_drift_slope_outputs,
-        .ir_hash = "f5c4790f069a6e9a67fa42ec25d08197b495778971c2c230240f2467ac1dfd45",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "plane_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_plane_slope,
-        .call = mstmm_sweep_loops_plane_slope_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_plane_slope_inputs,
-        .outputs = mstmm_sweep_loops_plane_slope_outputs,
-        .ir_hash = "be94bd57c8575f72d74c24553fa62cce78d2c861fe7499d360b2b37ba7b66656",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rolling_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_rolling_slope,
-        .call = mstmm_sweep_loops_rolling_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_rolling_slope_inputs,
-        .outputs = mstmm_sweep_loops_rolling_slope_outputs,
-        .ir_hash = "54b66327eb529cdab24a8bc2294cda221ea1da4a821ff276f79a30db069d967f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rolling_drift_slope",
-        .function = (void (*)(void))mstmm_sweep_loops_rolling_drift_slope,
-        .call = mstmm_sweep_loops_rolling_drift_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_loops_rolling_drift_slope_inputs,
-        .outputs = mstmm_sweep_loops_rolling_drift_slope_outputs,
-        .ir_hash = "081ad1c642f57a5ec5a966b456239b65a6501019bf3235d3ed9c3b5b7191f742",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"relative_pose", MSTMM_FUNCTIONS(mstmm_sweep_loops_relative_pose), 7, 3, (const
+    mstmm_port[]){{"A_C", 9, "", 0, 0}, {"x_C", 3, "m", 0, 0}, {"A_B", 9, "", 0, 0}, {"x_B", 3, "m",
+    0, 0}, {"r_e", 3, "m", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}}, (const
+    mstmm_port[]){{"R_C", 9, "", 0, 0}, {"r_A", 3, "m", 0, 0}, {"d", 3, "m", 0, 0}},
+    "02507fc9e400d4780eb1e086e782089d4e20dd2f275b43cc0f1e89f80e3272fb", 0, NULL},
+  {"gap", MSTMM_FUNCTIONS(mstmm_sweep_loops_gap), 3, 1, (const mstmm_port[]){{"R_e", 9, "", 0, 0},
+    {"R_C", 9, "", 0, 0}, {"d", 3, "m", 0, 0}}, (const mstmm_port[]){{"gap", 6, "m, rad", 0, 0}},
+    "a7540d8f08ea4b1fad7e49a3f89c3d6240d0b67e9f4ecc984651ffe1b820e25e", 0, NULL},
+  {"slip", MSTMM_FUNCTIONS(mstmm_sweep_loops_slip), 7, 1, (const mstmm_port[]){{"R_C", 9, "", 0, 0},
+    {"r_e", 3, "m", 0, 0}, {"d", 3, "m", 0, 0}, {"v_C", 3, "m/s", 0, 0}, {"w_C", 3, "rad/s", 0, 0},
+    {"v_B", 3, "m/s", 0, 0}, {"w_B", 3, "rad/s", 0, 0}}, (const mstmm_port[]){{"slip", 6, "", 0,
+    0}}, "d93a2f782825d0f2a8a9372a6b22d8f7655584830808caebe79e3813445b21fa", 0, NULL},
+  {"drift", MSTMM_FUNCTIONS(mstmm_sweep_loops_drift), 6, 1, (const mstmm_port[]){{"R_C", 9, "", 0,
+    0}, {"r_e", 3, "m", 0, 0}, {"d", 3, "m", 0, 0}, {"slip", 6, "", 0, 0}, {"motion_C", 9, "", 0,
+    0}, {"motion_B", 9, "", 0, 0}}, (const mstmm_port[]){{"drift", 6, "", 0, 0}},
+    "6ebb7adc9d64354ae215110cac984e2b683e96b217f68d79689b50f30f19efdf", 0, NULL},
+  {"required_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_loops_required_acceleration), 2, 1, (const
+    mstmm_port[]){{"gap", 6, "", 0, 0}, {"rate", 1, "1/s^2", 0, 0}}, (const
+    mstmm_port[]){{"relative", 6, "", 0, 0}},
+    "4da93f1cca3b71cb450467a7129fcae1a4353bc6ede28cd8dbd09ea5ecf54853", 0, NULL},
+  {"row", MSTMM_FUNCTIONS(mstmm_sweep_loops_row), 5, 2, (const mstmm_port[]){{"w", 6, "", 0, 0},
+    {"R_C", 9, "", 0, 0}, {"r_e", 3, "m", 0, 0}, {"Rc", 9, "", 0, 0}, {"r_A", 3, "m", 0, 0}}, (const
+    mstmm_port[]){{"J_A", 6, "", 0, 0}, {"J_B", 6, "", 0, 0}},
+    "56a30fc4c6260ab6b52705dd5a2f9a73aa7009e9b4d00bdc4c017fbea9858aca", 0, NULL},
+  {"known_parts", MSTMM_FUNCTIONS(mstmm_sweep_loops_known_parts), 2, 1, (const mstmm_port[]){{"W",
+    36, "", 0, 0}, {"relative", 6, "", 0, 0}}, (const mstmm_port[]){{"l", 6, "", 0, 0}},
+    "9ea2db3105c18cdbc2a378cb635ee804f0a5f0f5706d964ca331741d506ab23e", 0, NULL},
+  {"row_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_loops_row_acceleration), 5, 1, (const
+    mstmm_port[]){{"J_A", 6, "", 0, 0}, {"J_B", 6, "", 0, 0}, {"l", 1, "", 0, 0}, {"delta_A", 6, "",
+    0, 0}, {"delta_B", 6, "", 0, 0}}, (const mstmm_port[]){{"c", 1, "", 0, 0}},
+    "7fece98c7d7c42eb3b514f640ebc6a17bdb06805b4fd78cc10601ad5581c6649", 0, NULL},
+  {"apply_effort", MSTMM_FUNCTIONS(mstmm_sweep_loops_apply_effort), 2, 1, (const mstmm_port[]){{"J",
+    6, "", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"e", 6, "N, N*m", 1, 0}},
+    "1fec122587d8aed5748f1f5116cd4dcff051e56b7ebdb67c1b38b2297baf3759", 0, NULL},
+  {"pivot_inverse", MSTMM_FUNCTIONS(mstmm_sweep_loops_pivot_inverse), 2, 1, (const
+    mstmm_port[]){{"L", 1, "", 0, 0}, {"floor", 1, "", 0, 0}}, (const mstmm_port[]){{"inverse", 1,
+    "", 0, 0}}, "2f1253a927e7f099c403b6bd93624ff5b6ee8fc6e81ada2a8c910bf3e532aca4", 0, NULL},
+  {"eliminate_row", MSTMM_FUNCTIONS(mstmm_sweep_loops_eliminate_row), 3, 2, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"K", 6, "", 0, 0}, {"l", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"S", 21, "", 1, 0}, {"e", 6, "", 1, 0}},
+    "dcd5a5777b37b26e9fcf8c0d8dda0e292befabc39f256f6f30d9a15e1f724758", 0, NULL},
+  {"update_column", MSTMM_FUNCTIONS(mstmm_sweep_loops_update_column), 3, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"K", 6, "", 0, 0}, {"L_p", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"K_p", 6, "", 1, 0}},
+    "1481651ba224fa472d58ac071c515f0af5b699f87961d9173e604524a9e25a6f", 0, NULL},
+  {"update_known_part", MSTMM_FUNCTIONS(mstmm_sweep_loops_update_known_part), 3, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"l", 1, "", 0, 0}, {"L_p", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"l_p", 1, "", 1, 0}},
+    "6a84ae2a29051fe21838892cb4526e068c1f1579c821fc7cf194777a10a840b4", 0, NULL},
+  {"update_coupling", MSTMM_FUNCTIONS(mstmm_sweep_loops_update_coupling), 3, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"L_p", 1, "", 0, 0}, {"L_q", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"L_pq", 1, "", 1, 0}},
+    "6cd97e587d0483eb82d1cd853910a3b719fbc805f657f43d666756ff55f34e98", 0, NULL},
+  {"multiplier", MSTMM_FUNCTIONS(mstmm_sweep_loops_multiplier), 2, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"l", 1, "", 0, 0}}, (const mstmm_port[]){{"x", 1,
+    "N, N*m", 0, 0}}, "f4686b7d1d8320042a7c45ec83a801f6f9cb3240951f3d3acff554cca2ae648e", 0, NULL},
+  {"multiplier_of_motion", MSTMM_FUNCTIONS(mstmm_sweep_loops_multiplier_of_motion), 3, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"K", 6, "", 0, 0}, {"delta", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"x", 1, "", 1, 0}},
+    "75c3160ab341b7d1c5d4295ed6dd9e4d797a1920f357210c6db4e8d831dea40d", 0, NULL},
+  {"multiplier_of_row", MSTMM_FUNCTIONS(mstmm_sweep_loops_multiplier_of_row), 3, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"L_p", 1, "", 0, 0}, {"x_p", 1, "N, N*m", 0, 0}},
+    (const mstmm_port[]){{"x", 1, "", 1, 0}},
+    "b98ff26f6a451d5beb570e8b40f9024cfb3d22df48fef7eaf7fd939b77d7bf54", 0, NULL},
+  {"rotor_row_residual", MSTMM_FUNCTIONS(mstmm_sweep_loops_rotor_row_residual), 3, 1, (const
+    mstmm_port[]){{"softness", 1, "", 0, 0}, {"s", 1, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const
+    mstmm_port[]){{"l", 1, "", 1, 0}},
+    "b5b623253a7e72d4d410f94622e83e776602b5b1b9be704ace5fc08f630be2ec", 0, NULL},
+  {"apply_multiplier", MSTMM_FUNCTIONS(mstmm_sweep_loops_apply_multiplier), 2, 1, (const
+    mstmm_port[]){{"K", 6, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"e", 6, "",
+    1, 0}}, "1ab03232c174a42619411ea737f9bbe2e5d52d278624bcddf62198544ea1c9f3", 0, NULL},
+  {"distance", MSTMM_FUNCTIONS(mstmm_sweep_loops_distance), 2, 2, (const mstmm_port[]){{"p", 1, "m",
+    0, 0}, {"d", 3, "m", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}, {"gap", 6, "m", 0, 0}},
+    "2eca403254221f3d76cee0e90655ce147899b18363dd310eea5d1bb5d4a8c19d", 0, NULL},
+  {"distance_drift", MSTMM_FUNCTIONS(mstmm_sweep_loops_distance_drift), 2, 1, (const
+    mstmm_port[]){{"d", 3, "m", 0, 0}, {"slip", 6, "", 0, 0}}, (const mstmm_port[]){{"drift", 6, "",
+    1, 0}}, "da67ca3e3d2b5ddba2db880af56b615a7ab196052db9a3dd6148c8a71c97206a", 0, NULL},
+  {"plane", MSTMM_FUNCTIONS(mstmm_sweep_loops_plane), 2, 2, (const mstmm_port[]){{"p", 1, "m", 0,
+    0}, {"d", 3, "m", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0, 0}, {"gap", 6, "m", 0, 0}},
+    "a944104caefdfb8c90c44186fe944ee09be5dbe92a61fcf55d2cc50b295fcf92", 0, NULL},
+  {"rolling", MSTMM_FUNCTIONS(mstmm_sweep_loops_rolling), 3, 2, (const mstmm_port[]){{"p", 5,
+    "m, -", 0, 0}, {"R_C", 9, "", 0, 0}, {"d", 3, "m", 0, 0}}, (const mstmm_port[]){{"W", 36, "", 0,
+    0}, {"gap", 6, "m", 0, 0}}, "19bf7cf8036ade55594bfe406415fd8c23cbd01578c63ba2af3e3e5080308404",
+    1, (const mstmm_guard[]){{1, "the disc lies flat on its plane"}}},
+  {"rolling_drift", MSTMM_FUNCTIONS(mstmm_sweep_loops_rolling_drift), 3, 1, (const
+    mstmm_port[]){{"p", 5, "m, -", 0, 0}, {"R_C", 9, "", 0, 0}, {"slip", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"drift", 6, "", 1, 0}},
+    "361e3d7edcb668728e090fe6d9c70e18a08a4401a1c2582f46230f9c995e92f6", 0, NULL},
+  {"relative_pose_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_relative_pose_slope), 13, 3, (const
+    mstmm_port[]){{"A_C", 9, "", 0, 0}, {"x_C", 3, "m", 0, 0}, {"A_B", 9, "", 0, 0}, {"x_B", 3, "m",
+    0, 0}, {"r_e", 3, "m", 0, 0}, {"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"d_A_C", 9, "", 0, 0},
+    {"d_x_C", 3, "m", 0, 0}, {"d_A_B", 9, "", 0, 0}, {"d_x_B", 3, "m", 0, 0}, {"d_Rc", 9, "", 0, 0},
+    {"d_r", 3, "m", 0, 0}}, (const mstmm_port[]){{"d_R_C", 9, "", 0, 0}, {"d_r_A", 3, "m", 0, 0},
+    {"d_d", 3, "m", 0, 0}}, "9703850068bfc22cfeb41ce5dd7a734b84e711c2687eb44517967961d7717ed7", 0,
+    NULL},
+  {"slip_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_slip_slope), 13, 1, (const mstmm_port[]){{"R_C",
+    9, "", 0, 0}, {"r_e", 3, "m", 0, 0}, {"d", 3, "m", 0, 0}, {"v_C", 3, "m/s", 0, 0}, {"w_C", 3,
+    "rad/s", 0, 0}, {"v_B", 3, "m/s", 0, 0}, {"w_B", 3, "rad/s", 0, 0}, {"d_R_C", 9, "", 0, 0},
+    {"d_d", 3, "m", 0, 0}, {"d_v_C", 3, "m/s", 0, 0}, {"d_w_C", 3, "rad/s", 0, 0}, {"d_v_B", 3,
+    "m/s", 0, 0}, {"d_w_B", 3, "rad/s", 0, 0}}, (const mstmm_port[]){{"d_slip", 6, "", 0, 0}},
+    "2825c894254e91f5c161f19ae205d9b49d21a7ea3ed3b1094a0a0e7438928fd1", 0, NULL},
+  {"drift_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_drift_slope), 11, 1, (const
+    mstmm_port[]){{"R_C", 9, "", 0, 0}, {"r_e", 3, "m", 0, 0}, {"d", 3, "m", 0, 0}, {"slip", 6, "",
+    0, 0}, {"motion_C", 9, "", 0, 0}, {"motion_B", 9, "", 0, 0}, {"d_R_C", 9, "", 0, 0}, {"d_d", 3,
+    "m", 0, 0}, {"d_slip", 6, "", 0, 0}, {"d_motion_C", 9, "", 0, 0}, {"d_motion_B", 9, "", 0, 0}},
+    (const mstmm_port[]){{"d_drift", 6, "", 0, 0}},
+    "cce6eae41391c31fc0d5c2fe5882bc60a4446bf8f763f9ace20cafe44f9942ef", 0, NULL},
+  {"row_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_row_slope), 9, 2, (const mstmm_port[]){{"w", 6,
+    "", 0, 0}, {"R_C", 9, "", 0, 0}, {"r_e", 3, "m", 0, 0}, {"Rc", 9, "", 0, 0}, {"r_A", 3, "m", 0,
+    0}, {"d_w", 6, "", 0, 0}, {"d_R_C", 9, "", 0, 0}, {"d_Rc", 9, "", 0, 0}, {"d_r_A", 3, "m", 0,
+    0}}, (const mstmm_port[]){{"d_J_A", 6, "", 0, 0}, {"d_J_B", 6, "", 0, 0}},
+    "eb215ee2b24b8d42488367fe6ded301038817fe63d1de1312fbead672e341b1c", 0, NULL},
+  {"known_parts_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_known_parts_slope), 4, 1, (const
+    mstmm_port[]){{"W", 36, "", 0, 0}, {"relative", 6, "", 0, 0}, {"d_W", 36, "", 0, 0},
+    {"d_relative", 6, "", 0, 0}}, (const mstmm_port[]){{"d_l", 6, "", 0, 0}},
+    "8313b572674687f9c3becf599846586a41627c98ec094570c419298f78da7786", 0, NULL},
+  {"apply_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_apply_effort_slope), 4, 1, (const
+    mstmm_port[]){{"J", 6, "", 0, 0}, {"tau", 1, "N, N*m", 0, 0}, {"d_J", 6, "", 0, 0}, {"d_tau", 1,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_e", 6, "N, N*m", 1, 0}},
+    "b57c42e27eb92e5c679ac4a7a6f19191591d36c193a786ee47f83742c66310e0", 0, NULL},
+  {"apply_multiplier_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_apply_multiplier_slope), 4, 1, (const
+    mstmm_port[]){{"K", 6, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}, {"d_K", 6, "", 0, 0}, {"d_x", 1,
+    "N, N*m", 0, 0}}, (const mstmm_port[]){{"d_e", 6, "", 1, 0}},
+    "f0d2793e4fce63f5f509c191e4371cd4c714dd72e7bda642ed9b94f4467e6549", 0, NULL},
+  {"distance_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_distance_slope), 3, 1, (const
+    mstmm_port[]){{"p", 1, "m", 0, 0}, {"d", 3, "m", 0, 0}, {"d_d", 3, "m", 0, 0}}, (const
+    mstmm_port[]){{"d_W", 36, "", 0, 0}},
+    "a13bce2732633c61be3e2179e674251688d6dd54d42ba2cbf965017a77f7b71d", 0, NULL},
+  {"distance_drift_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_distance_drift_slope), 4, 1, (const
+    mstmm_port[]){{"d", 3, "m", 0, 0}, {"slip", 6, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_slip", 6,
+    "", 0, 0}}, (const mstmm_port[]){{"d_drift", 6, "", 1, 0}},
+    "9ae18b02cd70cbfcf2cceefeda9e5f52095909c20cd81750a1be83a061cfb20d", 0, NULL},
+  {"plane_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_plane_slope), 3, 1, (const mstmm_port[]){{"p",
+    1, "m", 0, 0}, {"d", 3, "m", 0, 0}, {"d_d", 3, "m", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "",
+    0, 0}}, "c7a08ae2ae0df7acbee7c3ee9e28c20ed6f3eae42df54188188c4d480d234bb1", 0, NULL},
+  {"rolling_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_rolling_slope), 5, 1, (const
+    mstmm_port[]){{"p", 5, "m, -", 0, 0}, {"R_C", 9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"d_R_C", 9,
+    "", 0, 0}, {"d_d", 3, "m", 0, 0}}, (const mstmm_port[]){{"d_W", 36, "", 0, 0}},
+    "62481a9c2256a0b3fbbb175a39663d14877648017c82e6c4a787afd9708f4f8d", 0, NULL},
+  {"rolling_drift_slope", MSTMM_FUNCTIONS(mstmm_sweep_loops_rolling_drift_slope), 5, 1, (const
+    mstmm_port[]){{"p", 5, "m, -", 0, 0}, {"R_C", 9, "", 0, 0}, {"slip", 6, "", 0, 0}, {"d_R_C", 9,
+    "", 0, 0}, {"d_slip", 6, "", 0, 0}}, (const mstmm_port[]){{"d_drift", 6, "", 1, 0}},
+    "055322c1e6beef09ce5246b4cf68c58b164329a468ce15252e553f0082ddd162", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_loops = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "loops",
-    .hash = "22fd4ffaf05fb9191475c1e90a12982fa6cb5717394faddbe69217cea57bd762",
+    .hash = "df2061b0588a463c0873feae66a0d7fcb4a28981d4ed8e4ea788fe437d752101",
     .nq = 0,
     .nu = 0,
     .np = 0,

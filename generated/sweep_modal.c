@@ -7,136 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_modal;
-int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict K, const real *restrict D, const real *restrict eta,
-    const real *restrict etad, const real *restrict motion, real *restrict S, real *restrict S_rf,
-    real *restrict A, real *restrict S_ff, real *restrict e, real *restrict e_f);
-int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict eta, const real *restrict etad, const real *restrict v,
-    const real *restrict w, real *restrict S, real *restrict S_rf, real *restrict A,
-    real *restrict h, real *restrict h_f, real *restrict T);
-int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *restrict D,
-    const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d);
-int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
-    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
-    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
-    real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd, real *restrict Psidd);
-int mstmm_sweep_modal_end_motion(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
-    real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
-int mstmm_sweep_modal_frame_motion(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
-    real *restrict H6, real *restrict v, real *restrict w, real *restrict c);
-int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
-    real *restrict H);
-int mstmm_sweep_modal_prescribed_bias(int n, const real *restrict H, const real *restrict s,
-    const real *restrict c, real *restrict c_s);
-int mstmm_sweep_modal_assemble_port(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
-    real *restrict S_rf, real *restrict S_ff, real *restrict e_f);
-int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
-    const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
-    real *restrict e_f);
-int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restrict e,
-    const real *restrict S_rf, const real *restrict S_ff, const real *restrict e_f,
-    real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
-    real *restrict work);
-int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
-    real *restrict etadd);
-int mstmm_sweep_modal_port_deviation(int n, const real *restrict H, const real *restrict etadd,
-    const real *restrict delta_I, real *restrict delta);
-int mstmm_sweep_modal_prescribed_load(int n, const real *restrict S_rf, const real *restrict S_ff,
-    const real *restrict s, real *restrict e, real *restrict e_f);
-int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
-    const real *restrict e_f, real *restrict tau);
-int mstmm_sweep_modal_column_load(int n, const real *restrict Gg, const real *restrict e,
-    const real *restrict e_f, real *restrict e_c);
-int mstmm_sweep_modal_column_acceleration(int n, const real *restrict S_ff,
-    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
-    real *restrict y, real *restrict etadd, real *restrict work);
-int mstmm_sweep_modal_step_stiffness(int n, const real *restrict K, const real *restrict D,
-    const real *restrict rate, const real *restrict sq, real *restrict S_ff);
-int mstmm_sweep_modal_strain_load(int n, const real *restrict K, const real *restrict D,
-    const real *restrict eta, const real *restrict etad, real *restrict e_f);
-int mstmm_sweep_modal_modal_column(int n, const real *restrict H, const real *restrict K,
-    real *restrict K_f);
-int mstmm_sweep_modal_condense_row(int n, const real *restrict S_ff, const real *restrict K_f,
-    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
-    real *restrict work);
-int mstmm_sweep_modal_row_coupling(int n, const real *restrict K_f, const real *restrict Y,
-    real *restrict L_ij);
-int mstmm_sweep_modal_multiplier_acceleration(int n, const real *restrict Y, const real *restrict x,
-    real *restrict etadd);
-int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict K, const real *restrict D, const real *restrict eta,
-    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
-    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
-    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
-    real *restrict d_e_f);
-int mstmm_sweep_modal_momentum_slope(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict eta, const real *restrict etad, const real *restrict v,
-    const real *restrict w, const real *restrict S_rf, const real *restrict A,
-    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
-    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
-    real *restrict d_h, real *restrict d_h_f);
-int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *restrict phi,
-    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
-    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
-    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
-    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
-    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd);
-int mstmm_sweep_modal_end_motion_slope(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
-    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
-    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c);
-int mstmm_sweep_modal_frame_motion_slope(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
-    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
-    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c);
-int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
-    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H);
-int mstmm_sweep_modal_prescribed_bias_slope(int n, const real *restrict H, const real *restrict s,
-    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
-    const real *restrict d_c, real *restrict d_c_s);
-int mstmm_sweep_modal_prescribed_load_slope(int n, const real *restrict S_rf,
-    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
-    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f);
-int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
-    const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
-    const real *restrict d_e_f, real *restrict d_tau);
-
 #ifndef MSTMM_SOLVE_LDL
 #define MSTMM_SOLVE_LDL
 /* x = a^-1 b by a = L D L^T without pivoting: a is n x n (lower triangle read), b and x are n x m.
@@ -217,701 +87,411 @@ int mstmm_solve_ldl(
  * out e_f[n] load required by the modes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_residual_sized(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict K, const real *restrict D, const real *restrict eta,
-    const real *restrict etad, const real *restrict motion, real *restrict S, real *restrict S_rf,
-    real *restrict A, real *restrict S_ff, real *restrict e, real *restrict e_f)
+int mstmm_sweep_modal_residual_sized(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx, in_t Z_xy,
+    in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x, in_t G_y,
+    in_t G_z, in_t M, in_t K, in_t D, in_t eta, in_t etad, in_t motion, out_t S, out_t S_rf,
+    out_t A, out_t S_ff, out_t e, out_t e_f)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = eta[l] * G_x[n * l + k];
-            t1 += t0;
-        }
-        const real t2 = C[k] - t1;
-        S_rf[k] = t2;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += eta[l] * G_x[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t4 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t3 = eta[l] * G_y[n * l + k];
-            t4 += t3;
-        }
-        const real t5 = C[n + k] - t4;
-        S_rf[n + k] = t5;
+    S_rf[k] = C[k] - t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t4 = 0;
+    for (int l = 0; l < n; ++l) {
+      t4 += eta[l] * G_y[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = eta[l] * G_z[n * l + k];
-            t7 += t6;
-        }
-        const real t8 = C[2 * n + k] - t7;
-        S_rf[2 * n + k] = t8;
+    S_rf[n + k] = C[n + k] - t4;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += eta[l] * G_z[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t10 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t9 = eta[l] * Y_x[n * l + k];
-            t10 += t9;
-        }
-        const real t11 = t10 + P[k];
-        S_rf[3 * n + k] = t11;
+    S_rf[2 * n + k] = C[2 * n + k] - t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t10 = 0;
+    for (int l = 0; l < n; ++l) {
+      t10 += eta[l] * Y_x[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t13 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t12 = eta[l] * Y_y[n * l + k];
-            t13 += t12;
-        }
-        const real t14 = t13 + P[n + k];
-        S_rf[4 * n + k] = t14;
+    S_rf[3 * n + k] = t10 + P[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t13 = 0;
+    for (int l = 0; l < n; ++l) {
+      t13 += eta[l] * Y_y[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t16 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t15 = eta[l] * Y_z[n * l + k];
-            t16 += t15;
-        }
-        const real t17 = t16 + P[2 * n + k];
-        S_rf[5 * n + k] = t17;
+    S_rf[4 * n + k] = t13 + P[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t16 = 0;
+    for (int l = 0; l < n; ++l) {
+      t16 += eta[l] * Y_z[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t19 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t18 = eta[l] * Z_xx[n * l + k];
-            t19 += t18;
-        }
-        const real t20 = t19 + B[k];
-        A[k] = t20;
+    S_rf[5 * n + k] = t16 + P[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t19 = 0;
+    for (int l = 0; l < n; ++l) {
+      t19 += eta[l] * Z_xx[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t22 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t21 = eta[l] * Z_xy[n * l + k];
-            t22 += t21;
-        }
-        const real t23 = t22 + B[n + k];
-        A[n + k] = t23;
+    A[k] = t19 + B[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t22 = 0;
+    for (int l = 0; l < n; ++l) {
+      t22 += eta[l] * Z_xy[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t25 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t24 = eta[l] * Z_xz[n * l + k];
-            t25 += t24;
-        }
-        const real t26 = t25 + B[2 * n + k];
-        A[2 * n + k] = t26;
+    A[n + k] = t22 + B[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t25 = 0;
+    for (int l = 0; l < n; ++l) {
+      t25 += eta[l] * Z_xz[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t28 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t27 = eta[l] * Z_yy[n * l + k];
-            t28 += t27;
-        }
-        const real t29 = t28 + B[3 * n + k];
-        A[3 * n + k] = t29;
+    A[2 * n + k] = t25 + B[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t28 = 0;
+    for (int l = 0; l < n; ++l) {
+      t28 += eta[l] * Z_yy[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t31 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t30 = eta[l] * Z_yz[n * l + k];
-            t31 += t30;
-        }
-        const real t32 = t31 + B[4 * n + k];
-        A[4 * n + k] = t32;
+    A[3 * n + k] = t28 + B[3 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t31 = 0;
+    for (int l = 0; l < n; ++l) {
+      t31 += eta[l] * Z_yz[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t34 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t33 = eta[l] * Z_zz[n * l + k];
-            t34 += t33;
-        }
-        const real t35 = t34 + B[5 * n + k];
-        A[5 * n + k] = t35;
+    A[4 * n + k] = t31 + B[4 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t34 = 0;
+    for (int l = 0; l < n; ++l) {
+      t34 += eta[l] * Z_zz[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            S_ff[n * k + l] = M[n * k + l];
-        }
+    A[5 * n + k] = t34 + B[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      S_ff[n * k + l] = M[n * k + l];
     }
-    const real t56 = motion[0] * motion[1];
-    const real t58 = motion[1] * motion[1];
-    const real t59 = motion[2] * motion[2];
-    const real t60 = t58 + t59;
-    const real t61 = 0.5 * t60;
-    const real t64 = motion[0] * motion[2];
-    const real t67 = motion[0] * motion[0];
-    const real t68 = t59 + t67;
-    const real t69 = 0.5 * t68;
-    const real t72 = motion[1] * motion[2];
-    const real t75 = t58 + t67;
-    const real t76 = 0.5 * t75;
-    for (int k = 0; k < n; ++k) {
-        real t37 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t36 = Y_z[n * l + k] * etad[l];
-            t37 += t36;
-        }
-        const real t38 = motion[2] * t37;
-        real t40 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t39 = Y_y[n * l + k] * etad[l];
-            t40 += t39;
-        }
-        const real t41 = motion[1] * t40;
-        real t43 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t42 = Y_x[n * l + k] * etad[l];
-            t43 += t42;
-        }
-        const real t44 = motion[0] * t43;
-        const real t45 = motion[6] * S_rf[k];
-        const real t46 = motion[7] * S_rf[n + k];
-        const real t47 = t45 + t46;
-        const real t48 = motion[8] * S_rf[2 * n + k];
-        const real t49 = t47 + t48;
-        const real t50 = motion[3] * S_rf[3 * n + k];
-        const real t51 = t49 + t50;
-        const real t52 = motion[4] * S_rf[4 * n + k];
-        const real t53 = t51 + t52;
-        const real t54 = motion[5] * S_rf[5 * n + k];
-        const real t55 = t53 + t54;
-        const real t57 = A[n + k] * t56;
-        const real t62 = A[k] * t61;
-        const real t63 = t57 - t62;
-        const real t65 = A[2 * n + k] * t64;
-        const real t66 = t63 + t65;
-        const real t70 = A[3 * n + k] * t69;
-        const real t71 = t66 - t70;
-        const real t73 = A[4 * n + k] * t72;
-        const real t74 = t71 + t73;
-        const real t77 = A[5 * n + k] * t76;
-        const real t78 = t74 - t77;
-        real t80 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t79 = etad[l] * D[n * k + l];
-            t80 += t79;
-        }
-        real t82 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t81 = eta[l] * K[n * k + l];
-            t82 += t81;
-        }
-        const real t83 = t80 + t82;
-        const real t84 = t78 + t83;
-        const real t85 = t55 + t84;
-        real t87 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t86 = etad[l] * Y_x[n * k + l];
-            t87 += t86;
-        }
-        const real t88 = motion[0] * t87;
-        const real t89 = t85 - t88;
-        const real t90 = t44 + t89;
-        real t92 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t91 = etad[l] * Y_y[n * k + l];
-            t92 += t91;
-        }
-        const real t93 = motion[1] * t92;
-        const real t94 = t90 - t93;
-        const real t95 = t41 + t94;
-        real t97 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t96 = etad[l] * Y_z[n * k + l];
-            t97 += t96;
-        }
-        const real t98 = motion[2] * t97;
-        const real t99 = t95 - t98;
-        const real t100 = t38 + t99;
-        e_f[k] = t100;
+  }
+  real t56 = motion[0] * motion[1];
+  real t58 = motion[1] * motion[1];
+  real t59 = motion[2] * motion[2];
+  real t61 = 0.5 * (t58 + t59);
+  real t64 = motion[0] * motion[2];
+  real t67 = motion[0] * motion[0];
+  real t69 = 0.5 * (t59 + t67);
+  real t72 = motion[1] * motion[2];
+  real t76 = 0.5 * (t58 + t67);
+  for (int k = 0; k < n; ++k) {
+    real t37 = 0;
+    for (int l = 0; l < n; ++l) {
+      t37 += Y_z[n * l + k] * etad[l];
     }
-    S[0] = p[0];
-    S[1] = 0.0;
-    S[2] = 0.0;
-    S[3] = 0.0;
-    real t102 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t101 = eta[k] * S_rf[2 * n + k];
-        t102 += t101;
+    real t38 = motion[2] * t37;
+    real t40 = 0;
+    for (int l = 0; l < n; ++l) {
+      t40 += Y_y[n * l + k] * etad[l];
     }
-    const real t103 = 0.5 * t102;
-    real t105 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t104 = C[2 * n + k] * eta[k];
-        t105 += t104;
+    real t41 = motion[1] * t40;
+    real t43 = 0;
+    for (int l = 0; l < n; ++l) {
+      t43 += Y_x[n * l + k] * etad[l];
     }
-    const real t106 = 0.5 * t105;
-    const real t107 = t103 + t106;
-    const real t108 = p[3] + t107;
-    S[4] = t108;
-    real t110 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t109 = eta[k] * S_rf[n + k];
-        t110 += t109;
+    real t44 = motion[0] * t43;
+    real t55 = motion[6] * S_rf[k] + motion[7] * S_rf[n + k] + motion[8] * S_rf[2 * n + k] +
+      motion[3] * S_rf[3 * n + k] + motion[4] * S_rf[4 * n + k] + motion[5] * S_rf[5 * n + k];
+    real t78 = A[n + k] * t56 - A[k] * t61 + A[2 * n + k] * t64 - A[3 * n + k] * t69 + A[4 * n + k]
+      * t72 - A[5 * n + k] * t76;
+    real t80 = 0;
+    for (int l = 0; l < n; ++l) {
+      t80 += etad[l] * D[n * k + l];
     }
-    const real t111 = 0.5 * t110;
-    real t113 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t112 = C[n + k] * eta[k];
-        t113 += t112;
+    real t82 = 0;
+    for (int l = 0; l < n; ++l) {
+      t82 += eta[l] * K[n * k + l];
     }
-    const real t114 = 0.5 * t113;
-    const real t115 = t111 + t114;
-    const real t116 = p[2] + t115;
-    const real t117 = -t116;
-    S[5] = t117;
-    S[6] = p[0];
-    S[7] = 0.0;
-    const real t118 = -t108;
-    S[8] = t118;
-    S[9] = 0.0;
-    real t120 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t119 = S_rf[k] * eta[k];
-        t120 += t119;
+    real t85 = t55 + (t78 + (t80 + t82));
+    real t87 = 0;
+    for (int l = 0; l < n; ++l) {
+      t87 += etad[l] * Y_x[n * k + l];
     }
-    const real t121 = 0.5 * t120;
-    real t123 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t122 = C[k] * eta[k];
-        t123 += t122;
+    real t90 = t44 + (t85 - motion[0] * t87);
+    real t92 = 0;
+    for (int l = 0; l < n; ++l) {
+      t92 += etad[l] * Y_y[n * k + l];
     }
-    const real t124 = 0.5 * t123;
-    const real t125 = t121 + t124;
-    const real t126 = p[1] + t125;
-    S[10] = t126;
-    S[11] = p[0];
-    S[12] = t116;
-    const real t127 = -t126;
-    S[13] = t127;
-    S[14] = 0.0;
-    real t129 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t128 = eta[k] * A[3 * n + k];
-        t129 += t128;
+    real t95 = t41 + (t90 - motion[1] * t92);
+    real t97 = 0;
+    for (int l = 0; l < n; ++l) {
+      t97 += etad[l] * Y_z[n * k + l];
     }
-    const real t130 = 0.5 * t129;
-    real t132 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t131 = B[3 * n + k] * eta[k];
-        t132 += t131;
+    e_f[k] = t38 + (t95 - motion[2] * t97);
+  }
+  S[0] = p[0];
+  S[1] = S[2] = S[3] = 0.0;
+  real t102 = 0;
+  for (int k = 0; k < n; ++k) {
+    t102 += eta[k] * S_rf[2 * n + k];
+  }
+  real t103 = 0.5 * t102;
+  real t105 = 0;
+  for (int k = 0; k < n; ++k) {
+    t105 += C[2 * n + k] * eta[k];
+  }
+  real t108 = p[3] + (t103 + 0.5 * t105);
+  S[4] = t108;
+  real t110 = 0;
+  for (int k = 0; k < n; ++k) {
+    t110 += eta[k] * S_rf[n + k];
+  }
+  real t111 = 0.5 * t110;
+  real t113 = 0;
+  for (int k = 0; k < n; ++k) {
+    t113 += C[n + k] * eta[k];
+  }
+  real t116 = p[2] + (t111 + 0.5 * t113);
+  S[5] = -t116;
+  S[6] = p[0];
+  S[7] = 0.0;
+  S[8] = -t108;
+  S[9] = 0.0;
+  real t120 = 0;
+  for (int k = 0; k < n; ++k) {
+    t120 += S_rf[k] * eta[k];
+  }
+  real t121 = 0.5 * t120;
+  real t123 = 0;
+  for (int k = 0; k < n; ++k) {
+    t123 += C[k] * eta[k];
+  }
+  real t126 = p[1] + (t121 + 0.5 * t123);
+  S[10] = t126;
+  S[11] = p[0];
+  S[12] = t116;
+  S[13] = -t126;
+  S[14] = 0.0;
+  real t129 = 0;
+  for (int k = 0; k < n; ++k) {
+    t129 += eta[k] * A[3 * n + k];
+  }
+  real t130 = 0.5 * t129;
+  real t132 = 0;
+  for (int k = 0; k < n; ++k) {
+    t132 += B[3 * n + k] * eta[k];
+  }
+  real t135 = p[7] + (t130 + 0.5 * t132);
+  real t137 = 0;
+  for (int k = 0; k < n; ++k) {
+    t137 += eta[k] * A[5 * n + k];
+  }
+  real t138 = 0.5 * t137;
+  real t140 = 0;
+  for (int k = 0; k < n; ++k) {
+    t140 += B[5 * n + k] * eta[k];
+  }
+  real t143 = p[9] + (t138 + 0.5 * t140);
+  real t144 = t135 + t143;
+  S[15] = t144;
+  real t146 = 0;
+  for (int k = 0; k < n; ++k) {
+    t146 += eta[k] * A[n + k];
+  }
+  real t147 = 0.5 * t146;
+  real t149 = 0;
+  for (int k = 0; k < n; ++k) {
+    t149 += B[n + k] * eta[k];
+  }
+  real t152 = p[5] + (t147 + 0.5 * t149);
+  S[16] = -t152;
+  real t155 = 0;
+  for (int k = 0; k < n; ++k) {
+    t155 += eta[k] * A[2 * n + k];
+  }
+  real t156 = 0.5 * t155;
+  real t158 = 0;
+  for (int k = 0; k < n; ++k) {
+    t158 += B[2 * n + k] * eta[k];
+  }
+  real t161 = p[6] + (t156 + 0.5 * t158);
+  S[17] = -t161;
+  real t164 = 0;
+  for (int k = 0; k < n; ++k) {
+    t164 += eta[k] * A[k];
+  }
+  real t165 = 0.5 * t164;
+  real t167 = 0;
+  for (int k = 0; k < n; ++k) {
+    t167 += B[k] * eta[k];
+  }
+  real t170 = p[4] + (t165 + 0.5 * t167);
+  real t171 = t170 + t143;
+  S[18] = t171;
+  real t173 = 0;
+  for (int k = 0; k < n; ++k) {
+    t173 += eta[k] * A[4 * n + k];
+  }
+  real t174 = 0.5 * t173;
+  real t176 = 0;
+  for (int k = 0; k < n; ++k) {
+    t176 += B[4 * n + k] * eta[k];
+  }
+  real t179 = p[8] + (t174 + 0.5 * t176);
+  S[19] = -t179;
+  real t181 = t170 + t135;
+  S[20] = t181;
+  real t183 = 0;
+  for (int k = 0; k < n; ++k) {
+    t183 += S_rf[2 * n + k] * etad[k];
+  }
+  real t185 = 2.0 * (motion[1] * t183);
+  real t188 = motion[0] * t116 - motion[1] * t126;
+  real t192 = motion[2] * t126 - motion[0] * t108;
+  real t194 = motion[1] * t188 - motion[2] * t192;
+  real t196 = 0;
+  for (int k = 0; k < n; ++k) {
+    t196 += S_rf[n + k] * etad[k];
+  }
+  real t200 = t185 + (t194 - motion[2] * t196 * 2.0);
+  real t204 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t202 = 0;
+    for (int l = 0; l < n; ++l) {
+      t202 += G_x[n * k + l] * etad[l];
     }
-    const real t133 = 0.5 * t132;
-    const real t134 = t130 + t133;
-    const real t135 = p[7] + t134;
-    real t137 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t136 = eta[k] * A[5 * n + k];
-        t137 += t136;
+    t204 += etad[k] * t202;
+  }
+  e[0] = t200 - t204 + (p[0] * motion[6] + motion[4] * t108 - motion[5] * t116);
+  real t213 = 0;
+  for (int k = 0; k < n; ++k) {
+    t213 += S_rf[k] * etad[k];
+  }
+  real t218 = motion[1] * t108 - motion[2] * t116;
+  real t225 = 2.0 * (motion[2] * t213) + (motion[2] * t218 - motion[0] * t188) - 2.0 * (motion[0] *
+    t183);
+  real t229 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t227 = 0;
+    for (int l = 0; l < n; ++l) {
+      t227 += etad[l] * G_y[n * k + l];
     }
-    const real t138 = 0.5 * t137;
-    real t140 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t139 = B[5 * n + k] * eta[k];
-        t140 += t139;
+    t229 += etad[k] * t227;
+  }
+  e[1] = t225 - t229 + (p[0] * motion[7] - motion[3] * t108 + motion[5] * t126);
+  real t245 = 2.0 * (motion[0] * t196) + (motion[0] * t192 - motion[1] * t218 - 2.0 * (motion[1] *
+    t213));
+  real t249 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t247 = 0;
+    for (int l = 0; l < n; ++l) {
+      t247 += etad[l] * G_z[n * k + l];
     }
-    const real t141 = 0.5 * t140;
-    const real t142 = t138 + t141;
-    const real t143 = p[9] + t142;
-    const real t144 = t135 + t143;
-    S[15] = t144;
-    real t146 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t145 = eta[k] * A[n + k];
-        t146 += t145;
+    t249 += etad[k] * t247;
+  }
+  e[2] = t245 - t249 + (p[0] * motion[8] + motion[3] * t116 - motion[4] * t126);
+  real t260 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t258 = 0;
+    for (int l = 0; l < n; ++l) {
+      t258 += etad[l] * Y_x[n * k + l];
     }
-    const real t147 = 0.5 * t146;
-    real t149 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t148 = B[n + k] * eta[k];
-        t149 += t148;
+    t260 += etad[k] * t258;
+  }
+  real t262 = 0;
+  for (int k = 0; k < n; ++k) {
+    t262 += A[3 * n + k] * etad[k];
+  }
+  real t264 = 0;
+  for (int k = 0; k < n; ++k) {
+    t264 += A[5 * n + k] * etad[k];
+  }
+  real t266 = motion[0] * (t262 + t264);
+  real t268 = 0;
+  for (int k = 0; k < n; ++k) {
+    t268 += etad[k] * S_rf[5 * n + k];
+  }
+  real t274 = t268 + (motion[2] * t181 - motion[0] * t161 - motion[1] * t179);
+  real t276 = t266 + motion[1] * t274;
+  real t278 = 0;
+  for (int k = 0; k < n; ++k) {
+    t278 += etad[k] * S_rf[4 * n + k];
+  }
+  real t284 = t278 + (motion[1] * t171 - motion[0] * t152 - motion[2] * t179);
+  real t286 = t276 - motion[2] * t284;
+  real t288 = 0;
+  for (int k = 0; k < n; ++k) {
+    t288 += A[n + k] * etad[k];
+  }
+  real t290 = t286 - motion[1] * t288;
+  real t292 = 0;
+  for (int k = 0; k < n; ++k) {
+    t292 += A[2 * n + k] * etad[k];
+  }
+  e[3] = t260 + (t290 - motion[2] * t292) + (motion[8] * t116 - motion[7] * t108 + motion[3] * t144
+    - motion[4] * t152 - motion[5] * t161);
+  real t309 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t307 = 0;
+    for (int l = 0; l < n; ++l) {
+      t307 += etad[l] * Y_y[n * k + l];
     }
-    const real t150 = 0.5 * t149;
-    const real t151 = t147 + t150;
-    const real t152 = p[5] + t151;
-    const real t153 = -t152;
-    S[16] = t153;
-    real t155 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t154 = eta[k] * A[2 * n + k];
-        t155 += t154;
+    t309 += etad[k] * t307;
+  }
+  real t311 = 0;
+  for (int k = 0; k < n; ++k) {
+    t311 += etad[k] * S_rf[3 * n + k];
+  }
+  real t317 = t311 + (motion[0] * t144 - motion[1] * t152 - motion[2] * t161);
+  real t318 = motion[2] * t317;
+  real t320 = 0;
+  for (int k = 0; k < n; ++k) {
+    t320 += A[k] * etad[k];
+  }
+  real t327 = t318 + (motion[1] * (t320 + t264) - motion[0] * t274) - motion[0] * t288;
+  real t329 = 0;
+  for (int k = 0; k < n; ++k) {
+    t329 += A[4 * n + k] * etad[k];
+  }
+  e[4] = t309 + (t327 - motion[2] * t329) + (motion[6] * t108 - motion[8] * t126 - motion[3] * t152
+    + motion[4] * t171 - motion[5] * t179);
+  real t346 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t344 = 0;
+    for (int l = 0; l < n; ++l) {
+      t344 += etad[l] * Y_z[n * k + l];
     }
-    const real t156 = 0.5 * t155;
-    real t158 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t157 = B[2 * n + k] * eta[k];
-        t158 += t157;
-    }
-    const real t159 = 0.5 * t158;
-    const real t160 = t156 + t159;
-    const real t161 = p[6] + t160;
-    const real t162 = -t161;
-    S[17] = t162;
-    real t164 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t163 = eta[k] * A[k];
-        t164 += t163;
-    }
-    const real t165 = 0.5 * t164;
-    real t167 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t166 = B[k] * eta[k];
-        t167 += t166;
-    }
-    const real t168 = 0.5 * t167;
-    const real t169 = t165 + t168;
-    const real t170 = p[4] + t169;
-    const real t171 = t170 + t143;
-    S[18] = t171;
-    real t173 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t172 = eta[k] * A[4 * n + k];
-        t173 += t172;
-    }
-    const real t174 = 0.5 * t173;
-    real t176 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t175 = B[4 * n + k] * eta[k];
-        t176 += t175;
-    }
-    const real t177 = 0.5 * t176;
-    const real t178 = t174 + t177;
-    const real t179 = p[8] + t178;
-    const real t180 = -t179;
-    S[19] = t180;
-    const real t181 = t170 + t135;
-    S[20] = t181;
-    real t183 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t182 = S_rf[2 * n + k] * etad[k];
-        t183 += t182;
-    }
-    const real t184 = motion[1] * t183;
-    const real t185 = 2.0 * t184;
-    const real t186 = motion[0] * t116;
-    const real t187 = motion[1] * t126;
-    const real t188 = t186 - t187;
-    const real t189 = motion[1] * t188;
-    const real t190 = motion[2] * t126;
-    const real t191 = motion[0] * t108;
-    const real t192 = t190 - t191;
-    const real t193 = motion[2] * t192;
-    const real t194 = t189 - t193;
-    real t196 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t195 = S_rf[n + k] * etad[k];
-        t196 += t195;
-    }
-    const real t197 = motion[2] * t196;
-    const real t198 = t197 * 2.0;
-    const real t199 = t194 - t198;
-    const real t200 = t185 + t199;
-    real t204 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t202 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t201 = G_x[n * k + l] * etad[l];
-            t202 += t201;
-        }
-        const real t203 = etad[k] * t202;
-        t204 += t203;
-    }
-    const real t205 = t200 - t204;
-    const real t206 = p[0] * motion[6];
-    const real t207 = motion[4] * t108;
-    const real t208 = t206 + t207;
-    const real t209 = motion[5] * t116;
-    const real t210 = t208 - t209;
-    const real t211 = t205 + t210;
-    e[0] = t211;
-    real t213 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t212 = S_rf[k] * etad[k];
-        t213 += t212;
-    }
-    const real t214 = motion[2] * t213;
-    const real t215 = 2.0 * t214;
-    const real t216 = motion[1] * t108;
-    const real t217 = motion[2] * t116;
-    const real t218 = t216 - t217;
-    const real t219 = motion[2] * t218;
-    const real t220 = motion[0] * t188;
-    const real t221 = t219 - t220;
-    const real t222 = t215 + t221;
-    const real t223 = motion[0] * t183;
-    const real t224 = 2.0 * t223;
-    const real t225 = t222 - t224;
-    real t229 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t227 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t226 = etad[l] * G_y[n * k + l];
-            t227 += t226;
-        }
-        const real t228 = etad[k] * t227;
-        t229 += t228;
-    }
-    const real t230 = t225 - t229;
-    const real t231 = p[0] * motion[7];
-    const real t232 = motion[3] * t108;
-    const real t233 = t231 - t232;
-    const real t234 = motion[5] * t126;
-    const real t235 = t233 + t234;
-    const real t236 = t230 + t235;
-    e[1] = t236;
-    const real t237 = motion[0] * t196;
-    const real t238 = 2.0 * t237;
-    const real t239 = motion[0] * t192;
-    const real t240 = motion[1] * t218;
-    const real t241 = t239 - t240;
-    const real t242 = motion[1] * t213;
-    const real t243 = 2.0 * t242;
-    const real t244 = t241 - t243;
-    const real t245 = t238 + t244;
-    real t249 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t247 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t246 = etad[l] * G_z[n * k + l];
-            t247 += t246;
-        }
-        const real t248 = etad[k] * t247;
-        t249 += t248;
-    }
-    const real t250 = t245 - t249;
-    const real t251 = p[0] * motion[8];
-    const real t252 = motion[3] * t116;
-    const real t253 = t251 + t252;
-    const real t254 = motion[4] * t126;
-    const real t255 = t253 - t254;
-    const real t256 = t250 + t255;
-    e[2] = t256;
-    real t260 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t258 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t257 = etad[l] * Y_x[n * k + l];
-            t258 += t257;
-        }
-        const real t259 = etad[k] * t258;
-        t260 += t259;
-    }
-    real t262 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t261 = A[3 * n + k] * etad[k];
-        t262 += t261;
-    }
-    real t264 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t263 = A[5 * n + k] * etad[k];
-        t264 += t263;
-    }
-    const real t265 = t262 + t264;
-    const real t266 = motion[0] * t265;
-    real t268 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t267 = etad[k] * S_rf[5 * n + k];
-        t268 += t267;
-    }
-    const real t269 = motion[2] * t181;
-    const real t270 = motion[0] * t161;
-    const real t271 = t269 - t270;
-    const real t272 = motion[1] * t179;
-    const real t273 = t271 - t272;
-    const real t274 = t268 + t273;
-    const real t275 = motion[1] * t274;
-    const real t276 = t266 + t275;
-    real t278 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t277 = etad[k] * S_rf[4 * n + k];
-        t278 += t277;
-    }
-    const real t279 = motion[1] * t171;
-    const real t280 = motion[0] * t152;
-    const real t281 = t279 - t280;
-    const real t282 = motion[2] * t179;
-    const real t283 = t281 - t282;
-    const real t284 = t278 + t283;
-    const real t285 = motion[2] * t284;
-    const real t286 = t276 - t285;
-    real t288 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t287 = A[n + k] * etad[k];
-        t288 += t287;
-    }
-    const real t289 = motion[1] * t288;
-    const real t290 = t286 - t289;
-    real t292 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t291 = A[2 * n + k] * etad[k];
-        t292 += t291;
-    }
-    const real t293 = motion[2] * t292;
-    const real t294 = t290 - t293;
-    const real t295 = t260 + t294;
-    const real t296 = motion[8] * t116;
-    const real t297 = motion[7] * t108;
-    const real t298 = t296 - t297;
-    const real t299 = motion[3] * t144;
-    const real t300 = t298 + t299;
-    const real t301 = motion[4] * t152;
-    const real t302 = t300 - t301;
-    const real t303 = motion[5] * t161;
-    const real t304 = t302 - t303;
-    const real t305 = t295 + t304;
-    e[3] = t305;
-    real t309 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t307 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t306 = etad[l] * Y_y[n * k + l];
-            t307 += t306;
-        }
-        const real t308 = etad[k] * t307;
-        t309 += t308;
-    }
-    real t311 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t310 = etad[k] * S_rf[3 * n + k];
-        t311 += t310;
-    }
-    const real t312 = motion[0] * t144;
-    const real t313 = motion[1] * t152;
-    const real t314 = t312 - t313;
-    const real t315 = motion[2] * t161;
-    const real t316 = t314 - t315;
-    const real t317 = t311 + t316;
-    const real t318 = motion[2] * t317;
-    real t320 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t319 = A[k] * etad[k];
-        t320 += t319;
-    }
-    const real t321 = t320 + t264;
-    const real t322 = motion[1] * t321;
-    const real t323 = motion[0] * t274;
-    const real t324 = t322 - t323;
-    const real t325 = t318 + t324;
-    const real t326 = motion[0] * t288;
-    const real t327 = t325 - t326;
-    real t329 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t328 = A[4 * n + k] * etad[k];
-        t329 += t328;
-    }
-    const real t330 = motion[2] * t329;
-    const real t331 = t327 - t330;
-    const real t332 = t309 + t331;
-    const real t333 = motion[6] * t108;
-    const real t334 = motion[8] * t126;
-    const real t335 = t333 - t334;
-    const real t336 = motion[3] * t152;
-    const real t337 = t335 - t336;
-    const real t338 = motion[4] * t171;
-    const real t339 = t337 + t338;
-    const real t340 = motion[5] * t179;
-    const real t341 = t339 - t340;
-    const real t342 = t332 + t341;
-    e[4] = t342;
-    real t346 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t344 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t343 = etad[l] * Y_z[n * k + l];
-            t344 += t343;
-        }
-        const real t345 = etad[k] * t344;
-        t346 += t345;
-    }
-    const real t347 = t320 + t262;
-    const real t348 = motion[2] * t347;
-    const real t349 = motion[0] * t284;
-    const real t350 = t348 + t349;
-    const real t351 = motion[1] * t317;
-    const real t352 = t350 - t351;
-    const real t353 = motion[0] * t292;
-    const real t354 = t352 - t353;
-    const real t355 = motion[1] * t329;
-    const real t356 = t354 - t355;
-    const real t357 = t346 + t356;
-    const real t358 = motion[7] * t126;
-    const real t359 = motion[6] * t116;
-    const real t360 = t358 - t359;
-    const real t361 = motion[3] * t161;
-    const real t362 = t360 - t361;
-    const real t363 = motion[4] * t179;
-    const real t364 = t362 - t363;
-    const real t365 = motion[5] * t181;
-    const real t366 = t364 + t365;
-    const real t367 = t357 + t366;
-    e[5] = t367;
-    return 0;
+    t346 += etad[k] * t344;
+  }
+  e[5] = t346 + (motion[2] * (t320 + t262) + motion[0] * t284 - motion[1] * t317 - motion[0] * t292
+    - motion[1] * t329) + (motion[7] * t126 - motion[6] * t116 - motion[3] * t161 - motion[4] * t179
+    + motion[5] * t181);
+  return 0;
 }
 
-int mstmm_sweep_modal_residual(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict K, const real *restrict D, const real *restrict eta,
-    const real *restrict etad, const real *restrict motion, real *restrict S, real *restrict S_rf,
-    real *restrict A, real *restrict S_ff, real *restrict e, real *restrict e_f)
+int mstmm_sweep_modal_residual(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx, in_t Z_xy,
+    in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x, in_t G_y,
+    in_t G_z, in_t M, in_t K, in_t D, in_t eta, in_t etad, in_t motion, out_t S, out_t S_rf,
+    out_t A, out_t S_ff, out_t e, out_t e_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_residual_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
-    case 2: return mstmm_sweep_modal_residual_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
-    case 3: return mstmm_sweep_modal_residual_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
-    case 4: return mstmm_sweep_modal_residual_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
-    default: return mstmm_sweep_modal_residual_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_residual_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+  case 2: return mstmm_sweep_modal_residual_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+  case 3: return mstmm_sweep_modal_residual_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+  case 4: return mstmm_sweep_modal_residual_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+  default: return mstmm_sweep_modal_residual_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S, S_rf, A, S_ff, e, e_f);
+  }
 }
 
-static int mstmm_sweep_modal_residual_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_residual(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_modal_residual_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"C", 3, "", 0, 1},
-    {"P", 3, "", 0, 1},
-    {"B", 6, "", 0, 1},
-    {"Z_xx", 1, "", 0, 2},
-    {"Z_xy", 1, "", 0, 2},
-    {"Z_xz", 1, "", 0, 2},
-    {"Z_yy", 1, "", 0, 2},
-    {"Z_yz", 1, "", 0, 2},
-    {"Z_zz", 1, "", 0, 2},
-    {"Y_x", 1, "", 0, 2},
-    {"Y_y", 1, "", 0, 2},
-    {"Y_z", 1, "", 0, 2},
-    {"G_x", 1, "", 0, 2},
-    {"G_y", 1, "", 0, 2},
-    {"G_z", 1, "", 0, 2},
-    {"M", 1, "", 0, 2},
-    {"K", 1, "", 0, 2},
-    {"D", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-    {"motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_residual_outputs[] = {
-    {"S", 21, "", 0, 0},
-    {"S_rf", 6, "", 0, 1},
-    {"A", 6, "", 0, 1},
-    {"S_ff", 1, "", 0, 2},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_residual, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19],
+  in[20], in[21], out[0], out[1], out[2], out[3], out[4], out[5]))
 
 /* momentum and kinetic energy of a flexible body
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -946,468 +526,284 @@ static const mstmm_port mstmm_sweep_modal_residual_outputs[] = {
  * out T[1] (J) kinetic energy
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_momentum_sized(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict eta, const real *restrict etad, const real *restrict v,
-    const real *restrict w, real *restrict S, real *restrict S_rf, real *restrict A,
-    real *restrict h, real *restrict h_f, real *restrict T)
+int mstmm_sweep_modal_momentum_sized(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx, in_t Z_xy,
+    in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x, in_t G_y,
+    in_t G_z, in_t M, in_t eta, in_t etad, in_t v, in_t w, out_t S, out_t S_rf, out_t A, out_t h,
+    out_t h_f, out_t T)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = eta[l] * G_x[n * l + k];
-            t1 += t0;
-        }
-        const real t2 = C[k] - t1;
-        S_rf[k] = t2;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += eta[l] * G_x[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t4 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t3 = eta[l] * G_y[n * l + k];
-            t4 += t3;
-        }
-        const real t5 = C[n + k] - t4;
-        S_rf[n + k] = t5;
+    S_rf[k] = C[k] - t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t4 = 0;
+    for (int l = 0; l < n; ++l) {
+      t4 += eta[l] * G_y[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = eta[l] * G_z[n * l + k];
-            t7 += t6;
-        }
-        const real t8 = C[2 * n + k] - t7;
-        S_rf[2 * n + k] = t8;
+    S_rf[n + k] = C[n + k] - t4;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += eta[l] * G_z[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t10 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t9 = eta[l] * Y_x[n * l + k];
-            t10 += t9;
-        }
-        const real t11 = t10 + P[k];
-        S_rf[3 * n + k] = t11;
+    S_rf[2 * n + k] = C[2 * n + k] - t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t10 = 0;
+    for (int l = 0; l < n; ++l) {
+      t10 += eta[l] * Y_x[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t13 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t12 = eta[l] * Y_y[n * l + k];
-            t13 += t12;
-        }
-        const real t14 = t13 + P[n + k];
-        S_rf[4 * n + k] = t14;
+    S_rf[3 * n + k] = t10 + P[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t13 = 0;
+    for (int l = 0; l < n; ++l) {
+      t13 += eta[l] * Y_y[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t16 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t15 = eta[l] * Y_z[n * l + k];
-            t16 += t15;
-        }
-        const real t17 = t16 + P[2 * n + k];
-        S_rf[5 * n + k] = t17;
+    S_rf[4 * n + k] = t13 + P[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t16 = 0;
+    for (int l = 0; l < n; ++l) {
+      t16 += eta[l] * Y_z[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t19 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t18 = eta[l] * Z_xx[n * l + k];
-            t19 += t18;
-        }
-        const real t20 = t19 + B[k];
-        A[k] = t20;
+    S_rf[5 * n + k] = t16 + P[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t19 = 0;
+    for (int l = 0; l < n; ++l) {
+      t19 += eta[l] * Z_xx[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t22 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t21 = eta[l] * Z_xy[n * l + k];
-            t22 += t21;
-        }
-        const real t23 = t22 + B[n + k];
-        A[n + k] = t23;
+    A[k] = t19 + B[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t22 = 0;
+    for (int l = 0; l < n; ++l) {
+      t22 += eta[l] * Z_xy[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t25 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t24 = eta[l] * Z_xz[n * l + k];
-            t25 += t24;
-        }
-        const real t26 = t25 + B[2 * n + k];
-        A[2 * n + k] = t26;
+    A[n + k] = t22 + B[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t25 = 0;
+    for (int l = 0; l < n; ++l) {
+      t25 += eta[l] * Z_xz[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t28 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t27 = eta[l] * Z_yy[n * l + k];
-            t28 += t27;
-        }
-        const real t29 = t28 + B[3 * n + k];
-        A[3 * n + k] = t29;
+    A[2 * n + k] = t25 + B[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t28 = 0;
+    for (int l = 0; l < n; ++l) {
+      t28 += eta[l] * Z_yy[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t31 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t30 = eta[l] * Z_yz[n * l + k];
-            t31 += t30;
-        }
-        const real t32 = t31 + B[4 * n + k];
-        A[4 * n + k] = t32;
+    A[3 * n + k] = t28 + B[3 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t31 = 0;
+    for (int l = 0; l < n; ++l) {
+      t31 += eta[l] * Z_yz[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t34 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t33 = eta[l] * Z_zz[n * l + k];
-            t34 += t33;
-        }
-        const real t35 = t34 + B[5 * n + k];
-        A[5 * n + k] = t35;
+    A[4 * n + k] = t31 + B[4 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t34 = 0;
+    for (int l = 0; l < n; ++l) {
+      t34 += eta[l] * Z_zz[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t37 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t36 = M[n * k + l] * etad[l];
-            t37 += t36;
-        }
-        const real t38 = v[0] * S_rf[k];
-        const real t39 = v[1] * S_rf[n + k];
-        const real t40 = t38 + t39;
-        const real t41 = v[2] * S_rf[2 * n + k];
-        const real t42 = t40 + t41;
-        const real t43 = w[0] * S_rf[3 * n + k];
-        const real t44 = t42 + t43;
-        const real t45 = w[1] * S_rf[4 * n + k];
-        const real t46 = t44 + t45;
-        const real t47 = w[2] * S_rf[5 * n + k];
-        const real t48 = t46 + t47;
-        const real t49 = t37 + t48;
-        h_f[k] = t49;
+    A[5 * n + k] = t34 + B[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    real t37 = 0;
+    for (int l = 0; l < n; ++l) {
+      t37 += M[n * k + l] * etad[l];
     }
-    S[0] = p[0];
-    S[1] = 0.0;
-    S[2] = 0.0;
-    S[3] = 0.0;
-    real t51 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t50 = eta[k] * S_rf[2 * n + k];
-        t51 += t50;
-    }
-    const real t52 = 0.5 * t51;
-    real t54 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t53 = C[2 * n + k] * eta[k];
-        t54 += t53;
-    }
-    const real t55 = 0.5 * t54;
-    const real t56 = t52 + t55;
-    const real t57 = p[3] + t56;
-    S[4] = t57;
-    real t59 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t58 = eta[k] * S_rf[n + k];
-        t59 += t58;
-    }
-    const real t60 = 0.5 * t59;
-    real t62 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t61 = C[n + k] * eta[k];
-        t62 += t61;
-    }
-    const real t63 = 0.5 * t62;
-    const real t64 = t60 + t63;
-    const real t65 = p[2] + t64;
-    const real t66 = -t65;
-    S[5] = t66;
-    S[6] = p[0];
-    S[7] = 0.0;
-    const real t67 = -t57;
-    S[8] = t67;
-    S[9] = 0.0;
-    real t69 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t68 = S_rf[k] * eta[k];
-        t69 += t68;
-    }
-    const real t70 = 0.5 * t69;
-    real t72 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t71 = C[k] * eta[k];
-        t72 += t71;
-    }
-    const real t73 = 0.5 * t72;
-    const real t74 = t70 + t73;
-    const real t75 = p[1] + t74;
-    S[10] = t75;
-    S[11] = p[0];
-    S[12] = t65;
-    const real t76 = -t75;
-    S[13] = t76;
-    S[14] = 0.0;
-    real t78 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t77 = eta[k] * A[3 * n + k];
-        t78 += t77;
-    }
-    const real t79 = 0.5 * t78;
-    real t81 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t80 = B[3 * n + k] * eta[k];
-        t81 += t80;
-    }
-    const real t82 = 0.5 * t81;
-    const real t83 = t79 + t82;
-    const real t84 = p[7] + t83;
-    real t86 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t85 = eta[k] * A[5 * n + k];
-        t86 += t85;
-    }
-    const real t87 = 0.5 * t86;
-    real t89 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t88 = B[5 * n + k] * eta[k];
-        t89 += t88;
-    }
-    const real t90 = 0.5 * t89;
-    const real t91 = t87 + t90;
-    const real t92 = p[9] + t91;
-    const real t93 = t84 + t92;
-    S[15] = t93;
-    real t95 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t94 = eta[k] * A[n + k];
-        t95 += t94;
-    }
-    const real t96 = 0.5 * t95;
-    real t98 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t97 = B[n + k] * eta[k];
-        t98 += t97;
-    }
-    const real t99 = 0.5 * t98;
-    const real t100 = t96 + t99;
-    const real t101 = p[5] + t100;
-    const real t102 = -t101;
-    S[16] = t102;
-    real t104 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t103 = eta[k] * A[2 * n + k];
-        t104 += t103;
-    }
-    const real t105 = 0.5 * t104;
-    real t107 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t106 = B[2 * n + k] * eta[k];
-        t107 += t106;
-    }
-    const real t108 = 0.5 * t107;
-    const real t109 = t105 + t108;
-    const real t110 = p[6] + t109;
-    const real t111 = -t110;
-    S[17] = t111;
-    real t113 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t112 = eta[k] * A[k];
-        t113 += t112;
-    }
-    const real t114 = 0.5 * t113;
-    real t116 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t115 = B[k] * eta[k];
-        t116 += t115;
-    }
-    const real t117 = 0.5 * t116;
-    const real t118 = t114 + t117;
-    const real t119 = p[4] + t118;
-    const real t120 = t119 + t92;
-    S[18] = t120;
-    real t122 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t121 = eta[k] * A[4 * n + k];
-        t122 += t121;
-    }
-    const real t123 = 0.5 * t122;
-    real t125 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t124 = B[4 * n + k] * eta[k];
-        t125 += t124;
-    }
-    const real t126 = 0.5 * t125;
-    const real t127 = t123 + t126;
-    const real t128 = p[8] + t127;
-    const real t129 = -t128;
-    S[19] = t129;
-    const real t130 = t119 + t84;
-    S[20] = t130;
-    const real t131 = p[0] * v[0];
-    const real t132 = w[1] * t57;
-    const real t133 = t131 + t132;
-    const real t134 = w[2] * t65;
-    const real t135 = t133 - t134;
-    real t137 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t136 = S_rf[k] * etad[k];
-        t137 += t136;
-    }
-    const real t138 = t135 + t137;
-    h[0] = t138;
-    const real t139 = p[0] * v[1];
-    const real t140 = w[0] * t57;
-    const real t141 = t139 - t140;
-    const real t142 = w[2] * t75;
-    const real t143 = t141 + t142;
-    real t145 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t144 = S_rf[n + k] * etad[k];
-        t145 += t144;
-    }
-    const real t146 = t143 + t145;
-    h[1] = t146;
-    const real t147 = p[0] * v[2];
-    const real t148 = w[0] * t65;
-    const real t149 = t147 + t148;
-    const real t150 = w[1] * t75;
-    const real t151 = t149 - t150;
-    real t153 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t152 = S_rf[2 * n + k] * etad[k];
-        t153 += t152;
-    }
-    const real t154 = t151 + t153;
-    h[2] = t154;
-    const real t155 = v[2] * t65;
-    const real t156 = v[1] * t57;
-    const real t157 = t155 - t156;
-    const real t158 = w[0] * t93;
-    const real t159 = t157 + t158;
-    const real t160 = w[1] * t101;
-    const real t161 = t159 - t160;
-    const real t162 = w[2] * t110;
-    const real t163 = t161 - t162;
-    real t165 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t164 = etad[k] * S_rf[3 * n + k];
-        t165 += t164;
-    }
-    const real t166 = t163 + t165;
-    h[3] = t166;
-    const real t167 = v[0] * t57;
-    const real t168 = v[2] * t75;
-    const real t169 = t167 - t168;
-    const real t170 = w[0] * t101;
-    const real t171 = t169 - t170;
-    const real t172 = w[1] * t120;
-    const real t173 = t171 + t172;
-    const real t174 = w[2] * t128;
-    const real t175 = t173 - t174;
-    real t177 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t176 = etad[k] * S_rf[4 * n + k];
-        t177 += t176;
-    }
-    const real t178 = t175 + t177;
-    h[4] = t178;
-    const real t179 = v[1] * t75;
-    const real t180 = v[0] * t65;
-    const real t181 = t179 - t180;
-    const real t182 = w[0] * t110;
-    const real t183 = t181 - t182;
-    const real t184 = w[1] * t128;
-    const real t185 = t183 - t184;
-    const real t186 = w[2] * t130;
-    const real t187 = t185 + t186;
-    real t189 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t188 = etad[k] * S_rf[5 * n + k];
-        t189 += t188;
-    }
-    const real t190 = t187 + t189;
-    h[5] = t190;
-    const real t191 = v[0] * 0.5;
-    const real t192 = t138 * t191;
-    const real t193 = v[1] * 0.5;
-    const real t194 = t146 * t193;
-    const real t195 = t192 + t194;
-    const real t196 = v[2] * 0.5;
-    const real t197 = t154 * t196;
-    const real t198 = t195 + t197;
-    const real t199 = w[0] * 0.5;
-    const real t200 = t166 * t199;
-    const real t201 = t198 + t200;
-    const real t202 = w[1] * 0.5;
-    const real t203 = t178 * t202;
-    const real t204 = t201 + t203;
-    const real t205 = w[2] * 0.5;
-    const real t206 = t190 * t205;
-    const real t207 = t204 + t206;
-    real t209 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t208 = etad[k] * h_f[k];
-        t209 += t208;
-    }
-    const real t210 = 0.5 * t209;
-    const real t211 = t207 + t210;
-    T[0] = t211;
-    return 0;
+    h_f[k] = t37 + (v[0] * S_rf[k] + v[1] * S_rf[n + k] + v[2] * S_rf[2 * n + k] + w[0] * S_rf[3 * n
+      + k] + w[1] * S_rf[4 * n + k] + w[2] * S_rf[5 * n + k]);
+  }
+  S[0] = p[0];
+  S[1] = S[2] = S[3] = 0.0;
+  real t51 = 0;
+  for (int k = 0; k < n; ++k) {
+    t51 += eta[k] * S_rf[2 * n + k];
+  }
+  real t52 = 0.5 * t51;
+  real t54 = 0;
+  for (int k = 0; k < n; ++k) {
+    t54 += C[2 * n + k] * eta[k];
+  }
+  real t57 = p[3] + (t52 + 0.5 * t54);
+  S[4] = t57;
+  real t59 = 0;
+  for (int k = 0; k < n; ++k) {
+    t59 += eta[k] * S_rf[n + k];
+  }
+  real t60 = 0.5 * t59;
+  real t62 = 0;
+  for (int k = 0; k < n; ++k) {
+    t62 += C[n + k] * eta[k];
+  }
+  real t65 = p[2] + (t60 + 0.5 * t62);
+  S[5] = -t65;
+  S[6] = p[0];
+  S[7] = 0.0;
+  S[8] = -t57;
+  S[9] = 0.0;
+  real t69 = 0;
+  for (int k = 0; k < n; ++k) {
+    t69 += S_rf[k] * eta[k];
+  }
+  real t70 = 0.5 * t69;
+  real t72 = 0;
+  for (int k = 0; k < n; ++k) {
+    t72 += C[k] * eta[k];
+  }
+  real t75 = p[1] + (t70 + 0.5 * t72);
+  S[10] = t75;
+  S[11] = p[0];
+  S[12] = t65;
+  S[13] = -t75;
+  S[14] = 0.0;
+  real t78 = 0;
+  for (int k = 0; k < n; ++k) {
+    t78 += eta[k] * A[3 * n + k];
+  }
+  real t79 = 0.5 * t78;
+  real t81 = 0;
+  for (int k = 0; k < n; ++k) {
+    t81 += B[3 * n + k] * eta[k];
+  }
+  real t84 = p[7] + (t79 + 0.5 * t81);
+  real t86 = 0;
+  for (int k = 0; k < n; ++k) {
+    t86 += eta[k] * A[5 * n + k];
+  }
+  real t87 = 0.5 * t86;
+  real t89 = 0;
+  for (int k = 0; k < n; ++k) {
+    t89 += B[5 * n + k] * eta[k];
+  }
+  real t92 = p[9] + (t87 + 0.5 * t89);
+  real t93 = t84 + t92;
+  S[15] = t93;
+  real t95 = 0;
+  for (int k = 0; k < n; ++k) {
+    t95 += eta[k] * A[n + k];
+  }
+  real t96 = 0.5 * t95;
+  real t98 = 0;
+  for (int k = 0; k < n; ++k) {
+    t98 += B[n + k] * eta[k];
+  }
+  real t101 = p[5] + (t96 + 0.5 * t98);
+  S[16] = -t101;
+  real t104 = 0;
+  for (int k = 0; k < n; ++k) {
+    t104 += eta[k] * A[2 * n + k];
+  }
+  real t105 = 0.5 * t104;
+  real t107 = 0;
+  for (int k = 0; k < n; ++k) {
+    t107 += B[2 * n + k] * eta[k];
+  }
+  real t110 = p[6] + (t105 + 0.5 * t107);
+  S[17] = -t110;
+  real t113 = 0;
+  for (int k = 0; k < n; ++k) {
+    t113 += eta[k] * A[k];
+  }
+  real t114 = 0.5 * t113;
+  real t116 = 0;
+  for (int k = 0; k < n; ++k) {
+    t116 += B[k] * eta[k];
+  }
+  real t119 = p[4] + (t114 + 0.5 * t116);
+  real t120 = t119 + t92;
+  S[18] = t120;
+  real t122 = 0;
+  for (int k = 0; k < n; ++k) {
+    t122 += eta[k] * A[4 * n + k];
+  }
+  real t123 = 0.5 * t122;
+  real t125 = 0;
+  for (int k = 0; k < n; ++k) {
+    t125 += B[4 * n + k] * eta[k];
+  }
+  real t128 = p[8] + (t123 + 0.5 * t125);
+  S[19] = -t128;
+  real t130 = t119 + t84;
+  S[20] = t130;
+  real t135 = p[0] * v[0] + w[1] * t57 - w[2] * t65;
+  real t137 = 0;
+  for (int k = 0; k < n; ++k) {
+    t137 += S_rf[k] * etad[k];
+  }
+  real t138 = t135 + t137;
+  h[0] = t138;
+  real t143 = p[0] * v[1] - w[0] * t57 + w[2] * t75;
+  real t145 = 0;
+  for (int k = 0; k < n; ++k) {
+    t145 += S_rf[n + k] * etad[k];
+  }
+  real t146 = t143 + t145;
+  h[1] = t146;
+  real t151 = p[0] * v[2] + w[0] * t65 - w[1] * t75;
+  real t153 = 0;
+  for (int k = 0; k < n; ++k) {
+    t153 += S_rf[2 * n + k] * etad[k];
+  }
+  real t154 = t151 + t153;
+  h[2] = t154;
+  real t163 = v[2] * t65 - v[1] * t57 + w[0] * t93 - w[1] * t101 - w[2] * t110;
+  real t165 = 0;
+  for (int k = 0; k < n; ++k) {
+    t165 += etad[k] * S_rf[3 * n + k];
+  }
+  real t166 = t163 + t165;
+  h[3] = t166;
+  real t175 = v[0] * t57 - v[2] * t75 - w[0] * t101 + w[1] * t120 - w[2] * t128;
+  real t177 = 0;
+  for (int k = 0; k < n; ++k) {
+    t177 += etad[k] * S_rf[4 * n + k];
+  }
+  real t178 = t175 + t177;
+  h[4] = t178;
+  real t187 = v[1] * t75 - v[0] * t65 - w[0] * t110 - w[1] * t128 + w[2] * t130;
+  real t189 = 0;
+  for (int k = 0; k < n; ++k) {
+    t189 += etad[k] * S_rf[5 * n + k];
+  }
+  real t190 = t187 + t189;
+  h[5] = t190;
+  real t207 = t138 * (v[0] * 0.5) + t146 * (v[1] * 0.5) + t154 * (v[2] * 0.5) + t166 * (w[0] * 0.5)
+    + t178 * (w[1] * 0.5) + t190 * (w[2] * 0.5);
+  real t209 = 0;
+  for (int k = 0; k < n; ++k) {
+    t209 += etad[k] * h_f[k];
+  }
+  T[0] = t207 + 0.5 * t209;
+  return 0;
 }
 
-int mstmm_sweep_modal_momentum(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict eta, const real *restrict etad, const real *restrict v,
-    const real *restrict w, real *restrict S, real *restrict S_rf, real *restrict A,
-    real *restrict h, real *restrict h_f, real *restrict T)
+int mstmm_sweep_modal_momentum(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx, in_t Z_xy,
+    in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x, in_t G_y,
+    in_t G_z, in_t M, in_t eta, in_t etad, in_t v, in_t w, out_t S, out_t S_rf, out_t A, out_t h,
+    out_t h_f, out_t T)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_momentum_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
-    case 2: return mstmm_sweep_modal_momentum_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
-    case 3: return mstmm_sweep_modal_momentum_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
-    case 4: return mstmm_sweep_modal_momentum_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
-    default: return mstmm_sweep_modal_momentum_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_momentum_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+  case 2: return mstmm_sweep_modal_momentum_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+  case 3: return mstmm_sweep_modal_momentum_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+  case 4: return mstmm_sweep_modal_momentum_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+  default: return mstmm_sweep_modal_momentum_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S, S_rf, A, h, h_f, T);
+  }
 }
 
-static int mstmm_sweep_modal_momentum_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_momentum(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_modal_momentum_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"C", 3, "", 0, 1},
-    {"P", 3, "", 0, 1},
-    {"B", 6, "", 0, 1},
-    {"Z_xx", 1, "", 0, 2},
-    {"Z_xy", 1, "", 0, 2},
-    {"Z_xz", 1, "", 0, 2},
-    {"Z_yy", 1, "", 0, 2},
-    {"Z_yz", 1, "", 0, 2},
-    {"Z_zz", 1, "", 0, 2},
-    {"Y_x", 1, "", 0, 2},
-    {"Y_y", 1, "", 0, 2},
-    {"Y_z", 1, "", 0, 2},
-    {"G_x", 1, "", 0, 2},
-    {"G_y", 1, "", 0, 2},
-    {"G_z", 1, "", 0, 2},
-    {"M", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_momentum_outputs[] = {
-    {"S", 21, "", 0, 0},
-    {"S_rf", 6, "", 0, 1},
-    {"A", 6, "", 0, 1},
-    {"h", 6, "N*s, N*m*s", 0, 0},
-    {"h_f", 1, "", 0, 1},
-    {"T", 1, "J", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_momentum, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19],
+  in[20], out[0], out[1], out[2], out[3], out[4], out[5]))
 
 /* strain energy and damping of a flexible body
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -1421,63 +817,42 @@ static const mstmm_port mstmm_sweep_modal_momentum_outputs[] = {
  * out W_d[1] (W) power lost in damping
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_strain_energy_sized(int n, const real *restrict K, const real *restrict D,
-    const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d)
+int mstmm_sweep_modal_strain_energy_sized(int n, in_t K, in_t D, in_t eta, in_t etad, out_t V,
+    out_t W_d)
 {
-    real t3 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = K[n * k + l] * eta[l];
-            t1 += t0;
-        }
-        const real t2 = eta[k] * t1;
-        t3 += t2;
+  real t3 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += K[n * k + l] * eta[l];
     }
-    const real t4 = 0.5 * t3;
-    V[0] = t4;
-    real t8 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t6 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t5 = D[n * k + l] * etad[l];
-            t6 += t5;
-        }
-        const real t7 = etad[k] * t6;
-        t8 += t7;
+    t3 += eta[k] * t1;
+  }
+  V[0] = 0.5 * t3;
+  real t8 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t6 = 0;
+    for (int l = 0; l < n; ++l) {
+      t6 += D[n * k + l] * etad[l];
     }
-    W_d[0] = t8;
-    return 0;
+    t8 += etad[k] * t6;
+  }
+  W_d[0] = t8;
+  return 0;
 }
 
-int mstmm_sweep_modal_strain_energy(int n, const real *restrict K, const real *restrict D,
-    const real *restrict eta, const real *restrict etad, real *restrict V, real *restrict W_d)
+int mstmm_sweep_modal_strain_energy(int n, in_t K, in_t D, in_t eta, in_t etad, out_t V, out_t W_d)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_strain_energy_sized(1, K, D, eta, etad, V, W_d);
-    case 2: return mstmm_sweep_modal_strain_energy_sized(2, K, D, eta, etad, V, W_d);
-    case 3: return mstmm_sweep_modal_strain_energy_sized(3, K, D, eta, etad, V, W_d);
-    case 4: return mstmm_sweep_modal_strain_energy_sized(4, K, D, eta, etad, V, W_d);
-    default: return mstmm_sweep_modal_strain_energy_sized(n, K, D, eta, etad, V, W_d);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_strain_energy_sized(1, K, D, eta, etad, V, W_d);
+  case 2: return mstmm_sweep_modal_strain_energy_sized(2, K, D, eta, etad, V, W_d);
+  case 3: return mstmm_sweep_modal_strain_energy_sized(3, K, D, eta, etad, V, W_d);
+  case 4: return mstmm_sweep_modal_strain_energy_sized(4, K, D, eta, etad, V, W_d);
+  default: return mstmm_sweep_modal_strain_energy_sized(n, K, D, eta, etad, V, W_d);
+  }
 }
 
-static int mstmm_sweep_modal_strain_energy_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_strain_energy(n, in[0], in[1], in[2], in[3], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_modal_strain_energy_inputs[] = {
-    {"K", 1, "", 0, 2},
-    {"D", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_strain_energy_outputs[] = {
-    {"V", 1, "J", 0, 0},
-    {"W_d", 1, "W", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_strain_energy, (n, in[0], in[1], in[2], in[3], out[0], out[1]))
 
 /* section of a flexible body
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -1503,309 +878,214 @@ static const mstmm_port mstmm_sweep_modal_strain_energy_outputs[] = {
  * out Psidd[3] (rad/s2) second rate of Psi at etadd = 0
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_section_sized(int n, const real *restrict r, const real *restrict phi,
-    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
-    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
-    real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd, real *restrict Psidd)
+int mstmm_sweep_modal_section_sized(int n, in_t r, in_t phi, in_t theta, in_t g_x, in_t g_y,
+    in_t g_z, in_t h_x, in_t h_y, in_t h_z, in_t eta, in_t etad, out_t Phi, out_t x, out_t Psi,
+    out_t xd, out_t Psid, out_t xdd, out_t Psidd)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = eta[l] * g_x[n * l + k];
-            t1 += t0;
-        }
-        const real t2 = phi[k] - t1;
-        Phi[k] = t2;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += eta[l] * g_x[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t4 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t3 = eta[l] * g_y[n * l + k];
-            t4 += t3;
-        }
-        const real t5 = phi[n + k] - t4;
-        Phi[n + k] = t5;
+    Phi[k] = phi[k] - t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t4 = 0;
+    for (int l = 0; l < n; ++l) {
+      t4 += eta[l] * g_y[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = eta[l] * g_z[n * l + k];
-            t7 += t6;
-        }
-        const real t8 = phi[2 * n + k] - t7;
-        Phi[2 * n + k] = t8;
+    Phi[n + k] = phi[n + k] - t4;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += eta[l] * g_z[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t10 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t9 = eta[l] * h_x[n * l + k];
-            t10 += t9;
-        }
-        const real t11 = theta[k] - t10;
-        Phi[3 * n + k] = t11;
+    Phi[2 * n + k] = phi[2 * n + k] - t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t10 = 0;
+    for (int l = 0; l < n; ++l) {
+      t10 += eta[l] * h_x[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t13 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t12 = eta[l] * h_y[n * l + k];
-            t13 += t12;
-        }
-        const real t14 = theta[n + k] - t13;
-        Phi[4 * n + k] = t14;
+    Phi[3 * n + k] = theta[k] - t10;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t13 = 0;
+    for (int l = 0; l < n; ++l) {
+      t13 += eta[l] * h_y[n * l + k];
     }
-    for (int k = 0; k < n; ++k) {
-        real t16 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t15 = eta[l] * h_z[n * l + k];
-            t16 += t15;
-        }
-        const real t17 = theta[2 * n + k] - t16;
-        Phi[5 * n + k] = t17;
+    Phi[4 * n + k] = theta[n + k] - t13;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t16 = 0;
+    for (int l = 0; l < n; ++l) {
+      t16 += eta[l] * h_z[n * l + k];
     }
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = Phi[k] * eta[k];
-        t19 += t18;
+    Phi[5 * n + k] = theta[2 * n + k] - t16;
+  }
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += Phi[k] * eta[k];
+  }
+  real t20 = 0.5 * t19;
+  real t22 = 0;
+  for (int k = 0; k < n; ++k) {
+    t22 += phi[k] * eta[k];
+  }
+  x[0] = r[0] + (t20 + 0.5 * t22);
+  real t27 = 0;
+  for (int k = 0; k < n; ++k) {
+    t27 += eta[k] * Phi[n + k];
+  }
+  real t28 = 0.5 * t27;
+  real t30 = 0;
+  for (int k = 0; k < n; ++k) {
+    t30 += phi[n + k] * eta[k];
+  }
+  x[1] = r[1] + (t28 + 0.5 * t30);
+  real t35 = 0;
+  for (int k = 0; k < n; ++k) {
+    t35 += eta[k] * Phi[2 * n + k];
+  }
+  real t36 = 0.5 * t35;
+  real t38 = 0;
+  for (int k = 0; k < n; ++k) {
+    t38 += phi[2 * n + k] * eta[k];
+  }
+  x[2] = r[2] + (t36 + 0.5 * t38);
+  real t43 = 0;
+  for (int k = 0; k < n; ++k) {
+    t43 += eta[k] * Phi[3 * n + k];
+  }
+  real t44 = 0.5 * t43;
+  real t46 = 0;
+  for (int k = 0; k < n; ++k) {
+    t46 += theta[k] * eta[k];
+  }
+  Psi[0] = t44 + 0.5 * t46;
+  real t50 = 0;
+  for (int k = 0; k < n; ++k) {
+    t50 += eta[k] * Phi[4 * n + k];
+  }
+  real t51 = 0.5 * t50;
+  real t53 = 0;
+  for (int k = 0; k < n; ++k) {
+    t53 += theta[n + k] * eta[k];
+  }
+  Psi[1] = t51 + 0.5 * t53;
+  real t57 = 0;
+  for (int k = 0; k < n; ++k) {
+    t57 += eta[k] * Phi[5 * n + k];
+  }
+  real t58 = 0.5 * t57;
+  real t60 = 0;
+  for (int k = 0; k < n; ++k) {
+    t60 += theta[2 * n + k] * eta[k];
+  }
+  Psi[2] = t58 + 0.5 * t60;
+  real t64 = 0;
+  for (int k = 0; k < n; ++k) {
+    t64 += Phi[k] * etad[k];
+  }
+  xd[0] = t64;
+  real t66 = 0;
+  for (int k = 0; k < n; ++k) {
+    t66 += Phi[n + k] * etad[k];
+  }
+  xd[1] = t66;
+  real t68 = 0;
+  for (int k = 0; k < n; ++k) {
+    t68 += Phi[2 * n + k] * etad[k];
+  }
+  xd[2] = t68;
+  real t70 = 0;
+  for (int k = 0; k < n; ++k) {
+    t70 += Phi[3 * n + k] * etad[k];
+  }
+  Psid[0] = t70;
+  real t72 = 0;
+  for (int k = 0; k < n; ++k) {
+    t72 += Phi[4 * n + k] * etad[k];
+  }
+  Psid[1] = t72;
+  real t74 = 0;
+  for (int k = 0; k < n; ++k) {
+    t74 += Phi[5 * n + k] * etad[k];
+  }
+  Psid[2] = t74;
+  real t78 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t76 = 0;
+    for (int l = 0; l < n; ++l) {
+      t76 += g_x[n * k + l] * etad[l];
     }
-    const real t20 = 0.5 * t19;
-    real t22 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t21 = phi[k] * eta[k];
-        t22 += t21;
+    t78 += etad[k] * t76;
+  }
+  xdd[0] = -t78;
+  real t83 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t81 = 0;
+    for (int l = 0; l < n; ++l) {
+      t81 += etad[l] * g_y[n * k + l];
     }
-    const real t23 = 0.5 * t22;
-    const real t24 = t20 + t23;
-    const real t25 = r[0] + t24;
-    x[0] = t25;
-    real t27 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t26 = eta[k] * Phi[n + k];
-        t27 += t26;
+    t83 += etad[k] * t81;
+  }
+  xdd[1] = -t83;
+  real t88 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t86 = 0;
+    for (int l = 0; l < n; ++l) {
+      t86 += etad[l] * g_z[n * k + l];
     }
-    const real t28 = 0.5 * t27;
-    real t30 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t29 = phi[n + k] * eta[k];
-        t30 += t29;
+    t88 += etad[k] * t86;
+  }
+  xdd[2] = -t88;
+  real t93 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t91 = 0;
+    for (int l = 0; l < n; ++l) {
+      t91 += etad[l] * h_x[n * k + l];
     }
-    const real t31 = 0.5 * t30;
-    const real t32 = t28 + t31;
-    const real t33 = r[1] + t32;
-    x[1] = t33;
-    real t35 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t34 = eta[k] * Phi[2 * n + k];
-        t35 += t34;
+    t93 += etad[k] * t91;
+  }
+  Psidd[0] = -t93;
+  real t98 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t96 = 0;
+    for (int l = 0; l < n; ++l) {
+      t96 += etad[l] * h_y[n * k + l];
     }
-    const real t36 = 0.5 * t35;
-    real t38 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t37 = phi[2 * n + k] * eta[k];
-        t38 += t37;
+    t98 += etad[k] * t96;
+  }
+  Psidd[1] = -t98;
+  real t103 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t101 = 0;
+    for (int l = 0; l < n; ++l) {
+      t101 += etad[l] * h_z[n * k + l];
     }
-    const real t39 = 0.5 * t38;
-    const real t40 = t36 + t39;
-    const real t41 = r[2] + t40;
-    x[2] = t41;
-    real t43 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t42 = eta[k] * Phi[3 * n + k];
-        t43 += t42;
-    }
-    const real t44 = 0.5 * t43;
-    real t46 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t45 = theta[k] * eta[k];
-        t46 += t45;
-    }
-    const real t47 = 0.5 * t46;
-    const real t48 = t44 + t47;
-    Psi[0] = t48;
-    real t50 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t49 = eta[k] * Phi[4 * n + k];
-        t50 += t49;
-    }
-    const real t51 = 0.5 * t50;
-    real t53 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t52 = theta[n + k] * eta[k];
-        t53 += t52;
-    }
-    const real t54 = 0.5 * t53;
-    const real t55 = t51 + t54;
-    Psi[1] = t55;
-    real t57 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t56 = eta[k] * Phi[5 * n + k];
-        t57 += t56;
-    }
-    const real t58 = 0.5 * t57;
-    real t60 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t59 = theta[2 * n + k] * eta[k];
-        t60 += t59;
-    }
-    const real t61 = 0.5 * t60;
-    const real t62 = t58 + t61;
-    Psi[2] = t62;
-    real t64 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t63 = Phi[k] * etad[k];
-        t64 += t63;
-    }
-    xd[0] = t64;
-    real t66 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t65 = Phi[n + k] * etad[k];
-        t66 += t65;
-    }
-    xd[1] = t66;
-    real t68 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t67 = Phi[2 * n + k] * etad[k];
-        t68 += t67;
-    }
-    xd[2] = t68;
-    real t70 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t69 = Phi[3 * n + k] * etad[k];
-        t70 += t69;
-    }
-    Psid[0] = t70;
-    real t72 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t71 = Phi[4 * n + k] * etad[k];
-        t72 += t71;
-    }
-    Psid[1] = t72;
-    real t74 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t73 = Phi[5 * n + k] * etad[k];
-        t74 += t73;
-    }
-    Psid[2] = t74;
-    real t78 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t76 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t75 = g_x[n * k + l] * etad[l];
-            t76 += t75;
-        }
-        const real t77 = etad[k] * t76;
-        t78 += t77;
-    }
-    const real t79 = -t78;
-    xdd[0] = t79;
-    real t83 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t81 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t80 = etad[l] * g_y[n * k + l];
-            t81 += t80;
-        }
-        const real t82 = etad[k] * t81;
-        t83 += t82;
-    }
-    const real t84 = -t83;
-    xdd[1] = t84;
-    real t88 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t86 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t85 = etad[l] * g_z[n * k + l];
-            t86 += t85;
-        }
-        const real t87 = etad[k] * t86;
-        t88 += t87;
-    }
-    const real t89 = -t88;
-    xdd[2] = t89;
-    real t93 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t91 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t90 = etad[l] * h_x[n * k + l];
-            t91 += t90;
-        }
-        const real t92 = etad[k] * t91;
-        t93 += t92;
-    }
-    const real t94 = -t93;
-    Psidd[0] = t94;
-    real t98 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t96 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t95 = etad[l] * h_y[n * k + l];
-            t96 += t95;
-        }
-        const real t97 = etad[k] * t96;
-        t98 += t97;
-    }
-    const real t99 = -t98;
-    Psidd[1] = t99;
-    real t103 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t101 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t100 = etad[l] * h_z[n * k + l];
-            t101 += t100;
-        }
-        const real t102 = etad[k] * t101;
-        t103 += t102;
-    }
-    const real t104 = -t103;
-    Psidd[2] = t104;
-    return 0;
+    t103 += etad[k] * t101;
+  }
+  Psidd[2] = -t103;
+  return 0;
 }
 
-int mstmm_sweep_modal_section(int n, const real *restrict r, const real *restrict phi,
-    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
-    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
-    real *restrict Phi, real *restrict x, real *restrict Psi, real *restrict xd,
-    real *restrict Psid, real *restrict xdd, real *restrict Psidd)
+int mstmm_sweep_modal_section(int n, in_t r, in_t phi, in_t theta, in_t g_x, in_t g_y, in_t g_z,
+    in_t h_x, in_t h_y, in_t h_z, in_t eta, in_t etad, out_t Phi, out_t x, out_t Psi, out_t xd,
+    out_t Psid, out_t xdd, out_t Psidd)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_section_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
-    case 2: return mstmm_sweep_modal_section_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
-    case 3: return mstmm_sweep_modal_section_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
-    case 4: return mstmm_sweep_modal_section_sized(4, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
-    default: return mstmm_sweep_modal_section_sized(n, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_section_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+  case 2: return mstmm_sweep_modal_section_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+  case 3: return mstmm_sweep_modal_section_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+  case 4: return mstmm_sweep_modal_section_sized(4, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+  default: return mstmm_sweep_modal_section_sized(n, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, x, Psi, xd, Psid, xdd, Psidd);
+  }
 }
 
-static int mstmm_sweep_modal_section_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_section(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_sweep_modal_section_inputs[] = {
-    {"r", 3, "m", 0, 0},
-    {"phi", 3, "", 0, 1},
-    {"theta", 3, "", 0, 1},
-    {"g_x", 1, "", 0, 2},
-    {"g_y", 1, "", 0, 2},
-    {"g_z", 1, "", 0, 2},
-    {"h_x", 1, "", 0, 2},
-    {"h_y", 1, "", 0, 2},
-    {"h_z", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
-    {"Phi", 6, "", 0, 1},
-    {"x", 3, "m", 0, 0},
-    {"Psi", 3, "rad", 0, 0},
-    {"xd", 3, "m/s", 0, 0},
-    {"Psid", 3, "rad/s", 0, 0},
-    {"xdd", 3, "m/s2", 0, 0},
-    {"Psidd", 3, "rad/s2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_section, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  in[8], in[9], in[10], out[0], out[1], out[2], out[3], out[4], out[5], out[6]))
 
 /* end of a flexible body relative to its floating frame
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -1825,464 +1105,152 @@ static const mstmm_port mstmm_sweep_modal_section_outputs[] = {
  * out w[3] (rad/s) relative angular velocity, outboard axes
  * out c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
  */
-int mstmm_sweep_modal_end_motion(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
-    real *restrict H6, real *restrict v, real *restrict w, real *restrict c)
+int mstmm_sweep_modal_end_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
+    in_t Psidd, out_t R, out_t d, out_t H6, out_t v, out_t w, out_t c)
 {
-    const real t0 = Psi[2] * Psi[2];
-    const real t1 = Psi[0] * Psi[0];
-    const real t2 = Psi[1] * Psi[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = t4 < 2.25;
-    if (!(t5 != 0)) return 1; /* a section rotates by more than 3/2 rad relative to its floating frame */
-    const real t6 = t4 * 8.896791392450574e-22;
-    const real t7 = (-4.110317623312165e-19) + t6;
-    const real t8 = t4 * t7;
-    const real t9 = ((real)1 / (real)6402373705728000) + t8;
-    const real t10 = t4 * t9;
-    const real t11 = (-((real)1 / (real)20922789888000)) + t10;
-    const real t12 = t4 * t11;
-    const real t13 = ((real)1 / (real)87178291200) + t12;
-    const real t14 = t4 * t13;
-    const real t15 = (-((real)1 / (real)479001600)) + t14;
-    const real t16 = t4 * t15;
-    const real t17 = ((real)1 / (real)3628800) + t16;
-    const real t18 = t4 * t17;
-    const real t19 = (-((real)1 / (real)40320)) + t18;
-    const real t20 = t4 * t19;
-    const real t21 = ((real)1 / (real)720) + t20;
-    const real t22 = t4 * t21;
-    const real t23 = (-((real)1 / (real)24)) + t22;
-    const real t24 = t4 * t23;
-    const real t25 = 0.5 + t24;
-    const real t26 = t2 + t0;
-    const real t27 = t25 * t26;
-    const real t28 = 1.0 - t27;
-    const real t29 = R_end[0] * t28;
-    const real t30 = Psi[0] * Psi[1];
-    const real t31 = t25 * t30;
-    const real t32 = t4 * 1.9572941063391263e-20;
-    const real t33 = (-8.22063524662433e-18) + t32;
-    const real t34 = t4 * t33;
-    const real t35 = ((real)1 / (real)355687428096000) + t34;
-    const real t36 = t4 * t35;
-    const real t37 = (-((real)1 / (real)1307674368000)) + t36;
-    const real t38 = t4 * t37;
-    const real t39 = ((real)1 / (real)6227020800) + t38;
-    const real t40 = t4 * t39;
-    const real t41 = (-((real)1 / (real)39916800)) + t40;
-    const real t42 = t4 * t41;
-    const real t43 = ((real)1 / (real)362880) + t42;
-    const real t44 = t4 * t43;
-    const real t45 = (-((real)1 / (real)5040)) + t44;
-    const real t46 = t4 * t45;
-    const real t47 = ((real)1 / (real)120) + t46;
-    const real t48 = t4 * t47;
-    const real t49 = (-((real)1 / (real)6)) + t48;
-    const real t50 = t4 * t49;
-    const real t51 = 1.0 + t50;
-    const real t52 = Psi[2] * t51;
-    const real t53 = t31 - t52;
-    const real t54 = R_end[3] * t53;
-    const real t55 = t29 + t54;
-    const real t56 = Psi[1] * t51;
-    const real t57 = Psi[0] * Psi[2];
-    const real t58 = t25 * t57;
-    const real t59 = t56 + t58;
-    const real t60 = R_end[6] * t59;
-    const real t61 = t55 + t60;
-    R[0] = t61;
-    const real t62 = R_end[1] * t28;
-    const real t63 = R_end[4] * t53;
-    const real t64 = t62 + t63;
-    const real t65 = R_end[7] * t59;
-    const real t66 = t64 + t65;
-    R[1] = t66;
-    const real t67 = R_end[2] * t28;
-    const real t68 = R_end[5] * t53;
-    const real t69 = t67 + t68;
-    const real t70 = R_end[8] * t59;
-    const real t71 = t69 + t70;
-    R[2] = t71;
-    const real t72 = t52 + t31;
-    const real t73 = R_end[0] * t72;
-    const real t74 = t1 + t0;
-    const real t75 = t25 * t74;
-    const real t76 = 1.0 - t75;
-    const real t77 = R_end[3] * t76;
-    const real t78 = t73 + t77;
-    const real t79 = Psi[1] * Psi[2];
-    const real t80 = t25 * t79;
-    const real t81 = Psi[0] * t51;
-    const real t82 = t80 - t81;
-    const real t83 = R_end[6] * t82;
-    const real t84 = t78 + t83;
-    R[3] = t84;
-    const real t85 = R_end[1] * t72;
-    const real t86 = R_end[4] * t76;
-    const real t87 = t85 + t86;
-    const real t88 = R_end[7] * t82;
-    const real t89 = t87 + t88;
-    R[4] = t89;
-    const real t90 = R_end[2] * t72;
-    const real t91 = R_end[5] * t76;
-    const real t92 = t90 + t91;
-    const real t93 = R_end[8] * t82;
-    const real t94 = t92 + t93;
-    R[5] = t94;
-    const real t95 = t58 - t56;
-    const real t96 = R_end[0] * t95;
-    const real t97 = t81 + t80;
-    const real t98 = R_end[3] * t97;
-    const real t99 = t96 + t98;
-    const real t100 = t3 * t25;
-    const real t101 = 1.0 - t100;
-    const real t102 = R_end[6] * t101;
-    const real t103 = t99 + t102;
-    R[6] = t103;
-    const real t104 = R_end[1] * t95;
-    const real t105 = R_end[4] * t97;
-    const real t106 = t104 + t105;
-    const real t107 = R_end[7] * t101;
-    const real t108 = t106 + t107;
-    R[7] = t108;
-    const real t109 = R_end[2] * t95;
-    const real t110 = R_end[5] * t97;
-    const real t111 = t109 + t110;
-    const real t112 = R_end[8] * t101;
-    const real t113 = t111 + t112;
-    R[8] = t113;
-    d[0] = x[0];
-    d[1] = x[1];
-    d[2] = x[2];
-    H6[0] = t61;
-    H6[1] = t84;
-    H6[2] = t103;
-    H6[3] = 0.0;
-    H6[4] = 0.0;
-    H6[5] = 0.0;
-    H6[6] = t66;
-    H6[7] = t89;
-    H6[8] = t108;
-    H6[9] = 0.0;
-    H6[10] = 0.0;
-    H6[11] = 0.0;
-    H6[12] = t71;
-    H6[13] = t94;
-    H6[14] = t113;
-    H6[15] = 0.0;
-    H6[16] = 0.0;
-    H6[17] = 0.0;
-    H6[18] = 0.0;
-    H6[19] = 0.0;
-    H6[20] = 0.0;
-    const real t114 = t4 * 3.868170170630684e-23;
-    const real t115 = (-1.9572941063391263e-20) + t114;
-    const real t116 = t4 * t115;
-    const real t117 = 8.22063524662433e-18 + t116;
-    const real t118 = t4 * t117;
-    const real t119 = (-((real)1 / (real)355687428096000)) + t118;
-    const real t120 = t4 * t119;
-    const real t121 = ((real)1 / (real)1307674368000) + t120;
-    const real t122 = t4 * t121;
-    const real t123 = (-((real)1 / (real)6227020800)) + t122;
-    const real t124 = t4 * t123;
-    const real t125 = ((real)1 / (real)39916800) + t124;
-    const real t126 = t4 * t125;
-    const real t127 = (-((real)1 / (real)362880)) + t126;
-    const real t128 = t4 * t127;
-    const real t129 = ((real)1 / (real)5040) + t128;
-    const real t130 = t4 * t129;
-    const real t131 = (-((real)1 / (real)120)) + t130;
-    const real t132 = t4 * t131;
-    const real t133 = ((real)1 / (real)6) + t132;
-    const real t134 = t133 * t26;
-    const real t135 = 1.0 - t134;
-    const real t136 = R_end[0] * t135;
-    const real t137 = t133 * t30;
-    const real t138 = Psi[2] * t25;
-    const real t139 = t137 - t138;
-    const real t140 = R_end[3] * t139;
-    const real t141 = t136 + t140;
-    const real t142 = Psi[1] * t25;
-    const real t143 = t133 * t57;
-    const real t144 = t142 + t143;
-    const real t145 = R_end[6] * t144;
-    const real t146 = t141 + t145;
-    H6[21] = t146;
-    const real t147 = t138 + t137;
-    const real t148 = R_end[0] * t147;
-    const real t149 = t133 * t74;
-    const real t150 = 1.0 - t149;
-    const real t151 = R_end[3] * t150;
-    const real t152 = t148 + t151;
-    const real t153 = t133 * t79;
-    const real t154 = Psi[0] * t25;
-    const real t155 = t153 - t154;
-    const real t156 = R_end[6] * t155;
-    const real t157 = t152 + t156;
-    H6[22] = t157;
-    const real t158 = t143 - t142;
-    const real t159 = R_end[0] * t158;
-    const real t160 = t154 + t153;
-    const real t161 = R_end[3] * t160;
-    const real t162 = t159 + t161;
-    const real t163 = t3 * t133;
-    const real t164 = 1.0 - t163;
-    const real t165 = R_end[6] * t164;
-    const real t166 = t162 + t165;
-    H6[23] = t166;
-    H6[24] = 0.0;
-    H6[25] = 0.0;
-    H6[26] = 0.0;
-    const real t167 = R_end[1] * t135;
-    const real t168 = R_end[4] * t139;
-    const real t169 = t167 + t168;
-    const real t170 = R_end[7] * t144;
-    const real t171 = t169 + t170;
-    H6[27] = t171;
-    const real t172 = R_end[1] * t147;
-    const real t173 = R_end[4] * t150;
-    const real t174 = t172 + t173;
-    const real t175 = R_end[7] * t155;
-    const real t176 = t174 + t175;
-    H6[28] = t176;
-    const real t177 = R_end[1] * t158;
-    const real t178 = R_end[4] * t160;
-    const real t179 = t177 + t178;
-    const real t180 = R_end[7] * t164;
-    const real t181 = t179 + t180;
-    H6[29] = t181;
-    H6[30] = 0.0;
-    H6[31] = 0.0;
-    H6[32] = 0.0;
-    const real t182 = R_end[2] * t135;
-    const real t183 = R_end[5] * t139;
-    const real t184 = t182 + t183;
-    const real t185 = R_end[8] * t144;
-    const real t186 = t184 + t185;
-    H6[33] = t186;
-    const real t187 = R_end[2] * t147;
-    const real t188 = R_end[5] * t150;
-    const real t189 = t187 + t188;
-    const real t190 = R_end[8] * t155;
-    const real t191 = t189 + t190;
-    H6[34] = t191;
-    const real t192 = R_end[2] * t158;
-    const real t193 = R_end[5] * t160;
-    const real t194 = t192 + t193;
-    const real t195 = R_end[8] * t164;
-    const real t196 = t194 + t195;
-    H6[35] = t196;
-    const real t197 = xd[0] * t61;
-    const real t198 = xd[1] * t84;
-    const real t199 = t197 + t198;
-    const real t200 = xd[2] * t103;
-    const real t201 = t199 + t200;
-    v[0] = t201;
-    const real t202 = xd[0] * t66;
-    const real t203 = xd[1] * t89;
-    const real t204 = t202 + t203;
-    const real t205 = xd[2] * t108;
-    const real t206 = t204 + t205;
-    v[1] = t206;
-    const real t207 = xd[0] * t71;
-    const real t208 = xd[1] * t94;
-    const real t209 = t207 + t208;
-    const real t210 = xd[2] * t113;
-    const real t211 = t209 + t210;
-    v[2] = t211;
-    const real t212 = Psid[0] * t146;
-    const real t213 = Psid[1] * t157;
-    const real t214 = t212 + t213;
-    const real t215 = Psid[2] * t166;
-    const real t216 = t214 + t215;
-    w[0] = t216;
-    const real t217 = Psid[0] * t171;
-    const real t218 = Psid[1] * t176;
-    const real t219 = t217 + t218;
-    const real t220 = Psid[2] * t181;
-    const real t221 = t219 + t220;
-    w[1] = t221;
-    const real t222 = Psid[0] * t186;
-    const real t223 = Psid[1] * t191;
-    const real t224 = t222 + t223;
-    const real t225 = Psid[2] * t196;
-    const real t226 = t224 + t225;
-    w[2] = t226;
-    const real t227 = xdd[0] * t61;
-    const real t228 = xdd[1] * t84;
-    const real t229 = t227 + t228;
-    const real t230 = xdd[2] * t103;
-    const real t231 = t229 + t230;
-    c[0] = t231;
-    const real t232 = xdd[0] * t66;
-    const real t233 = xdd[1] * t89;
-    const real t234 = t232 + t233;
-    const real t235 = xdd[2] * t108;
-    const real t236 = t234 + t235;
-    c[1] = t236;
-    const real t237 = xdd[0] * t71;
-    const real t238 = xdd[1] * t94;
-    const real t239 = t237 + t238;
-    const real t240 = xdd[2] * t113;
-    const real t241 = t239 + t240;
-    c[2] = t241;
-    const real t242 = Psidd[2] * t158;
-    const real t243 = Psidd[1] * t147;
-    const real t244 = Psidd[0] * t135;
-    const real t245 = Psi[2] * Psid[2];
-    const real t246 = Psi[0] * Psid[0];
-    const real t247 = Psi[1] * Psid[1];
-    const real t248 = t246 + t247;
-    const real t249 = t245 + t248;
-    const real t250 = 2.0 * t249;
-    const real t251 = t4 * 3.868170170630684e-22;
-    const real t252 = (-1.7615646957052136e-19) + t251;
-    const real t253 = t4 * t252;
-    const real t254 = 6.576508197299464e-17 + t253;
-    const real t255 = t4 * t254;
-    const real t256 = (-((real)1 / (real)50812489728000)) + t255;
-    const real t257 = t4 * t256;
-    const real t258 = ((real)1 / (real)217945728000) + t257;
-    const real t259 = t4 * t258;
-    const real t260 = (-((real)1 / (real)1245404160)) + t259;
-    const real t261 = t4 * t260;
-    const real t262 = ((real)1 / (real)9979200) + t261;
-    const real t263 = t4 * t262;
-    const real t264 = (-((real)1 / (real)120960)) + t263;
-    const real t265 = t4 * t264;
-    const real t266 = ((real)1 / (real)2520) + t265;
-    const real t267 = t4 * t266;
-    const real t268 = (-((real)1 / (real)120)) + t267;
-    const real t269 = t250 * t268;
-    const real t270 = Psi[0] * Psid[1];
-    const real t271 = Psi[1] * Psid[0];
-    const real t272 = t270 - t271;
-    const real t273 = Psi[1] * t272;
-    const real t274 = Psi[2] * Psid[0];
-    const real t275 = Psi[0] * Psid[2];
-    const real t276 = t274 - t275;
-    const real t277 = Psi[2] * t276;
-    const real t278 = t273 - t277;
-    const real t279 = t269 * t278;
-    const real t280 = Psid[1] * t272;
-    const real t281 = Psid[2] * t276;
-    const real t282 = t280 - t281;
-    const real t283 = t133 * t282;
-    const real t284 = t279 + t283;
-    const real t285 = t244 + t284;
-    const real t286 = t4 * 8.896791392450573e-21;
-    const real t287 = (-3.6992858609809485e-18) + t286;
-    const real t288 = t4 * t287;
-    const real t289 = ((real)1 / (real)800296713216000) + t288;
-    const real t290 = t4 * t289;
-    const real t291 = (-((real)1 / (real)2988969984000)) + t290;
-    const real t292 = t4 * t291;
-    const real t293 = ((real)1 / (real)14529715200) + t292;
-    const real t294 = t4 * t293;
-    const real t295 = (-((real)1 / (real)95800320)) + t294;
-    const real t296 = t4 * t295;
-    const real t297 = ((real)1 / (real)907200) + t296;
-    const real t298 = t4 * t297;
-    const real t299 = (-((real)1 / (real)13440)) + t298;
-    const real t300 = t4 * t299;
-    const real t301 = ((real)1 / (real)360) + t300;
-    const real t302 = t4 * t301;
-    const real t303 = (-((real)1 / (real)24)) + t302;
-    const real t304 = t303 * t250;
-    const real t305 = Psi[1] * Psid[2];
-    const real t306 = Psi[2] * Psid[1];
-    const real t307 = t305 - t306;
-    const real t308 = t304 * t307;
-    const real t309 = t285 - t308;
-    const real t310 = t243 + t309;
-    const real t311 = t242 + t310;
-    const real t312 = R_end[0] * t311;
-    const real t313 = Psidd[0] * t139;
-    const real t314 = Psidd[2] * t160;
-    const real t315 = Psidd[1] * t150;
-    const real t316 = Psi[2] * t307;
-    const real t317 = Psi[0] * t272;
-    const real t318 = t316 - t317;
-    const real t319 = t269 * t318;
-    const real t320 = Psid[2] * t307;
-    const real t321 = Psid[0] * t272;
-    const real t322 = t320 - t321;
-    const real t323 = t133 * t322;
-    const real t324 = t319 + t323;
-    const real t325 = t315 + t324;
-    const real t326 = t304 * t276;
-    const real t327 = t325 - t326;
-    const real t328 = t314 + t327;
-    const real t329 = t313 + t328;
-    const real t330 = R_end[3] * t329;
-    const real t331 = t312 + t330;
-    const real t332 = Psidd[0] * t144;
-    const real t333 = Psidd[1] * t155;
-    const real t334 = Psidd[2] * t164;
-    const real t335 = Psi[0] * t276;
-    const real t336 = Psi[1] * t307;
-    const real t337 = t335 - t336;
-    const real t338 = t269 * t337;
-    const real t339 = Psid[0] * t276;
-    const real t340 = Psid[1] * t307;
-    const real t341 = t339 - t340;
-    const real t342 = t133 * t341;
-    const real t343 = t338 + t342;
-    const real t344 = t334 + t343;
-    const real t345 = t304 * t272;
-    const real t346 = t344 - t345;
-    const real t347 = t333 + t346;
-    const real t348 = t332 + t347;
-    const real t349 = R_end[6] * t348;
-    const real t350 = t331 + t349;
-    c[3] = t350;
-    const real t351 = R_end[1] * t311;
-    const real t352 = R_end[4] * t329;
-    const real t353 = t351 + t352;
-    const real t354 = R_end[7] * t348;
-    const real t355 = t353 + t354;
-    c[4] = t355;
-    const real t356 = R_end[2] * t311;
-    const real t357 = R_end[5] * t329;
-    const real t358 = t356 + t357;
-    const real t359 = R_end[8] * t348;
-    const real t360 = t358 + t359;
-    c[5] = t360;
-    return 0;
+  real t0 = Psi[2] * Psi[2];
+  real t1 = Psi[0] * Psi[0];
+  real t2 = Psi[1] * Psi[1];
+  real t3 = t1 + t2;
+  real t4 = t0 + t3;
+  if (!((t4 < 2.25))) return 1; /* a section rotates by more than 3/2 rad relative to its floating frame */
+  real t25 = 0.5 + t4 * ((-((real)1 / (real)24)) + t4 * (((real)1 / (real)720) + t4 * ((-((real)1 /
+    (real)40320)) + t4 * (((real)1 / (real)3628800) + t4 * ((-((real)1 / (real)479001600)) + t4 *
+    (((real)1 / (real)87178291200) + t4 * ((-((real)1 / (real)20922789888000)) + t4 * (((real)1 /
+    (real)6402373705728000) + t4 * ((-4.110317623312165e-19) + t4 * 8.896791392450574e-22)))))))));
+  real t26 = t2 + t0;
+  real t28 = 1.0 - t25 * t26;
+  real t30 = Psi[0] * Psi[1];
+  real t31 = t25 * t30;
+  real t51 = 1.0 + t4 * ((-((real)1 / (real)6)) + t4 * (((real)1 / (real)120) + t4 * ((-((real)1 /
+    (real)5040)) + t4 * (((real)1 / (real)362880) + t4 * ((-((real)1 / (real)39916800)) + t4 *
+    (((real)1 / (real)6227020800) + t4 * ((-((real)1 / (real)1307674368000)) + t4 * (((real)1 /
+    (real)355687428096000) + t4 * ((-8.22063524662433e-18) + t4 * 1.9572941063391263e-20)))))))));
+  real t52 = Psi[2] * t51;
+  real t53 = t31 - t52;
+  real t56 = Psi[1] * t51;
+  real t57 = Psi[0] * Psi[2];
+  real t58 = t25 * t57;
+  real t59 = t56 + t58;
+  real t61 = R_end[0] * t28 + R_end[3] * t53 + R_end[6] * t59;
+  R[0] = t61;
+  real t66 = R_end[1] * t28 + R_end[4] * t53 + R_end[7] * t59;
+  R[1] = t66;
+  real t71 = R_end[2] * t28 + R_end[5] * t53 + R_end[8] * t59;
+  R[2] = t71;
+  real t72 = t52 + t31;
+  real t74 = t1 + t0;
+  real t76 = 1.0 - t25 * t74;
+  real t79 = Psi[1] * Psi[2];
+  real t80 = t25 * t79;
+  real t81 = Psi[0] * t51;
+  real t82 = t80 - t81;
+  real t84 = R_end[0] * t72 + R_end[3] * t76 + R_end[6] * t82;
+  R[3] = t84;
+  real t89 = R_end[1] * t72 + R_end[4] * t76 + R_end[7] * t82;
+  R[4] = t89;
+  real t94 = R_end[2] * t72 + R_end[5] * t76 + R_end[8] * t82;
+  R[5] = t94;
+  real t95 = t58 - t56;
+  real t97 = t81 + t80;
+  real t101 = 1.0 - t3 * t25;
+  real t103 = R_end[0] * t95 + R_end[3] * t97 + R_end[6] * t101;
+  R[6] = t103;
+  real t108 = R_end[1] * t95 + R_end[4] * t97 + R_end[7] * t101;
+  R[7] = t108;
+  real t113 = R_end[2] * t95 + R_end[5] * t97 + R_end[8] * t101;
+  R[8] = t113;
+  d[0] = x[0];
+  d[1] = x[1];
+  d[2] = x[2];
+  H6[0] = t61;
+  H6[1] = t84;
+  H6[2] = t103;
+  H6[3] = H6[4] = H6[5] = 0.0;
+  H6[6] = t66;
+  H6[7] = t89;
+  H6[8] = t108;
+  H6[9] = H6[10] = H6[11] = 0.0;
+  H6[12] = t71;
+  H6[13] = t94;
+  H6[14] = t113;
+  H6[15] = H6[16] = H6[17] = H6[18] = H6[19] = H6[20] = 0.0;
+  real t133 = ((real)1 / (real)6) + t4 * ((-((real)1 / (real)120)) + t4 * (((real)1 / (real)5040) +
+    t4 * ((-((real)1 / (real)362880)) + t4 * (((real)1 / (real)39916800) + t4 * ((-((real)1 /
+    (real)6227020800)) + t4 * (((real)1 / (real)1307674368000) + t4 * ((-((real)1 /
+    (real)355687428096000)) + t4 * (8.22063524662433e-18 + t4 * ((-1.9572941063391263e-20) + t4 *
+    3.868170170630684e-23)))))))));
+  real t135 = 1.0 - t133 * t26;
+  real t137 = t133 * t30;
+  real t138 = Psi[2] * t25;
+  real t139 = t137 - t138;
+  real t142 = Psi[1] * t25;
+  real t143 = t133 * t57;
+  real t144 = t142 + t143;
+  real t146 = R_end[0] * t135 + R_end[3] * t139 + R_end[6] * t144;
+  H6[21] = t146;
+  real t147 = t138 + t137;
+  real t150 = 1.0 - t133 * t74;
+  real t153 = t133 * t79;
+  real t154 = Psi[0] * t25;
+  real t155 = t153 - t154;
+  real t157 = R_end[0] * t147 + R_end[3] * t150 + R_end[6] * t155;
+  H6[22] = t157;
+  real t158 = t143 - t142;
+  real t160 = t154 + t153;
+  real t164 = 1.0 - t3 * t133;
+  real t166 = R_end[0] * t158 + R_end[3] * t160 + R_end[6] * t164;
+  H6[23] = t166;
+  H6[24] = H6[25] = H6[26] = 0.0;
+  real t171 = R_end[1] * t135 + R_end[4] * t139 + R_end[7] * t144;
+  H6[27] = t171;
+  real t176 = R_end[1] * t147 + R_end[4] * t150 + R_end[7] * t155;
+  H6[28] = t176;
+  real t181 = R_end[1] * t158 + R_end[4] * t160 + R_end[7] * t164;
+  H6[29] = t181;
+  H6[30] = H6[31] = H6[32] = 0.0;
+  real t186 = R_end[2] * t135 + R_end[5] * t139 + R_end[8] * t144;
+  H6[33] = t186;
+  real t191 = R_end[2] * t147 + R_end[5] * t150 + R_end[8] * t155;
+  H6[34] = t191;
+  real t196 = R_end[2] * t158 + R_end[5] * t160 + R_end[8] * t164;
+  H6[35] = t196;
+  v[0] = xd[0] * t61 + xd[1] * t84 + xd[2] * t103;
+  v[1] = xd[0] * t66 + xd[1] * t89 + xd[2] * t108;
+  v[2] = xd[0] * t71 + xd[1] * t94 + xd[2] * t113;
+  w[0] = Psid[0] * t146 + Psid[1] * t157 + Psid[2] * t166;
+  w[1] = Psid[0] * t171 + Psid[1] * t176 + Psid[2] * t181;
+  w[2] = Psid[0] * t186 + Psid[1] * t191 + Psid[2] * t196;
+  c[0] = xdd[0] * t61 + xdd[1] * t84 + xdd[2] * t103;
+  c[1] = xdd[0] * t66 + xdd[1] * t89 + xdd[2] * t108;
+  c[2] = xdd[0] * t71 + xdd[1] * t94 + xdd[2] * t113;
+  real t250 = 2.0 * (Psi[2] * Psid[2] + (Psi[0] * Psid[0] + Psi[1] * Psid[1]));
+  real t269 = t250 * ((-((real)1 / (real)120)) + t4 * (((real)1 / (real)2520) + t4 * ((-((real)1 /
+    (real)120960)) + t4 * (((real)1 / (real)9979200) + t4 * ((-((real)1 / (real)1245404160)) + t4 *
+    (((real)1 / (real)217945728000) + t4 * ((-((real)1 / (real)50812489728000)) + t4 *
+    (6.576508197299464e-17 + t4 * ((-1.7615646957052136e-19) + t4 * 3.868170170630684e-22)))))))));
+  real t272 = Psi[0] * Psid[1] - Psi[1] * Psid[0];
+  real t276 = Psi[2] * Psid[0] - Psi[0] * Psid[2];
+  real t304 = ((-((real)1 / (real)24)) + t4 * (((real)1 / (real)360) + t4 * ((-((real)1 /
+    (real)13440)) + t4 * (((real)1 / (real)907200) + t4 * ((-((real)1 / (real)95800320)) + t4 *
+    (((real)1 / (real)14529715200) + t4 * ((-((real)1 / (real)2988969984000)) + t4 * (((real)1 /
+    (real)800296713216000) + t4 * ((-3.6992858609809485e-18) + t4 * 8.896791392450573e-21))))))))) *
+    t250;
+  real t307 = Psi[1] * Psid[2] - Psi[2] * Psid[1];
+  real t311 = Psidd[2] * t158 + (Psidd[1] * t147 + (Psidd[0] * t135 + (t269 * (Psi[1] * t272 -
+    Psi[2] * t276) + t133 * (Psid[1] * t272 - Psid[2] * t276)) - t304 * t307));
+  real t329 = Psidd[0] * t139 + (Psidd[2] * t160 + (Psidd[1] * t150 + (t269 * (Psi[2] * t307 -
+    Psi[0] * t272) + t133 * (Psid[2] * t307 - Psid[0] * t272)) - t304 * t276));
+  real t348 = Psidd[0] * t144 + (Psidd[1] * t155 + (Psidd[2] * t164 + (t269 * (Psi[0] * t276 -
+    Psi[1] * t307) + t133 * (Psid[0] * t276 - Psid[1] * t307)) - t304 * t272));
+  c[3] = R_end[0] * t311 + R_end[3] * t329 + R_end[6] * t348;
+  c[4] = R_end[1] * t311 + R_end[4] * t329 + R_end[7] * t348;
+  c[5] = R_end[2] * t311 + R_end[5] * t329 + R_end[8] * t348;
+  return 0;
 }
 
-static int mstmm_sweep_modal_end_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_modal_end_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_modal_end_motion_inputs[] = {
-    {"R_end", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"Psi", 3, "rad", 0, 0},
-    {"xd", 3, "m/s", 0, 0},
-    {"Psid", 3, "rad/s", 0, 0},
-    {"xdd", 3, "m/s2", 0, 0},
-    {"Psidd", 3, "rad/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_end_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H6", 36, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_modal_end_motion_guards[] = {
-    {1, "a section rotates by more than 3/2 rad relative to its floating frame"},
-};
+MSTMM_CALL(mstmm_sweep_modal_end_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5]))
 
 /* floating frame relative to the supported end of the body
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -2302,503 +1270,178 @@ static const mstmm_guard mstmm_sweep_modal_end_motion_guards[] = {
  * out w[3] (rad/s) relative angular velocity, outboard axes
  * out c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
  */
-int mstmm_sweep_modal_frame_motion(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, real *restrict R, real *restrict d,
-    real *restrict H6, real *restrict v, real *restrict w, real *restrict c)
+int mstmm_sweep_modal_frame_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
+    in_t Psidd, out_t R, out_t d, out_t H6, out_t v, out_t w, out_t c)
 {
-    const real t0 = Psi[2] * Psi[2];
-    const real t1 = Psi[0] * Psi[0];
-    const real t2 = Psi[1] * Psi[1];
-    const real t3 = t1 + t2;
-    const real t4 = t0 + t3;
-    const real t5 = t4 < 2.25;
-    if (!(t5 != 0)) return 1; /* a section rotates by more than 3/2 rad relative to its floating frame */
-    const real t6 = t4 * 8.896791392450574e-22;
-    const real t7 = (-4.110317623312165e-19) + t6;
-    const real t8 = t4 * t7;
-    const real t9 = ((real)1 / (real)6402373705728000) + t8;
-    const real t10 = t4 * t9;
-    const real t11 = (-((real)1 / (real)20922789888000)) + t10;
-    const real t12 = t4 * t11;
-    const real t13 = ((real)1 / (real)87178291200) + t12;
-    const real t14 = t4 * t13;
-    const real t15 = (-((real)1 / (real)479001600)) + t14;
-    const real t16 = t4 * t15;
-    const real t17 = ((real)1 / (real)3628800) + t16;
-    const real t18 = t4 * t17;
-    const real t19 = (-((real)1 / (real)40320)) + t18;
-    const real t20 = t4 * t19;
-    const real t21 = ((real)1 / (real)720) + t20;
-    const real t22 = t4 * t21;
-    const real t23 = (-((real)1 / (real)24)) + t22;
-    const real t24 = t4 * t23;
-    const real t25 = 0.5 + t24;
-    const real t26 = t2 + t0;
-    const real t27 = t25 * t26;
-    const real t28 = 1.0 - t27;
-    const real t29 = R_end[0] * t28;
-    const real t30 = Psi[0] * Psi[1];
-    const real t31 = t25 * t30;
-    const real t32 = t4 * 1.9572941063391263e-20;
-    const real t33 = (-8.22063524662433e-18) + t32;
-    const real t34 = t4 * t33;
-    const real t35 = ((real)1 / (real)355687428096000) + t34;
-    const real t36 = t4 * t35;
-    const real t37 = (-((real)1 / (real)1307674368000)) + t36;
-    const real t38 = t4 * t37;
-    const real t39 = ((real)1 / (real)6227020800) + t38;
-    const real t40 = t4 * t39;
-    const real t41 = (-((real)1 / (real)39916800)) + t40;
-    const real t42 = t4 * t41;
-    const real t43 = ((real)1 / (real)362880) + t42;
-    const real t44 = t4 * t43;
-    const real t45 = (-((real)1 / (real)5040)) + t44;
-    const real t46 = t4 * t45;
-    const real t47 = ((real)1 / (real)120) + t46;
-    const real t48 = t4 * t47;
-    const real t49 = (-((real)1 / (real)6)) + t48;
-    const real t50 = t4 * t49;
-    const real t51 = 1.0 + t50;
-    const real t52 = Psi[2] * t51;
-    const real t53 = t31 - t52;
-    const real t54 = R_end[3] * t53;
-    const real t55 = t29 + t54;
-    const real t56 = Psi[1] * t51;
-    const real t57 = Psi[0] * Psi[2];
-    const real t58 = t25 * t57;
-    const real t59 = t56 + t58;
-    const real t60 = R_end[6] * t59;
-    const real t61 = t55 + t60;
-    R[0] = t61;
-    const real t62 = t52 + t31;
-    const real t63 = R_end[0] * t62;
-    const real t64 = t1 + t0;
-    const real t65 = t25 * t64;
-    const real t66 = 1.0 - t65;
-    const real t67 = R_end[3] * t66;
-    const real t68 = t63 + t67;
-    const real t69 = Psi[1] * Psi[2];
-    const real t70 = t25 * t69;
-    const real t71 = Psi[0] * t51;
-    const real t72 = t70 - t71;
-    const real t73 = R_end[6] * t72;
-    const real t74 = t68 + t73;
-    R[1] = t74;
-    const real t75 = t58 - t56;
-    const real t76 = R_end[0] * t75;
-    const real t77 = t71 + t70;
-    const real t78 = R_end[3] * t77;
-    const real t79 = t76 + t78;
-    const real t80 = t3 * t25;
-    const real t81 = 1.0 - t80;
-    const real t82 = R_end[6] * t81;
-    const real t83 = t79 + t82;
-    R[2] = t83;
-    const real t84 = R_end[1] * t28;
-    const real t85 = R_end[4] * t53;
-    const real t86 = t84 + t85;
-    const real t87 = R_end[7] * t59;
-    const real t88 = t86 + t87;
-    R[3] = t88;
-    const real t89 = R_end[1] * t62;
-    const real t90 = R_end[4] * t66;
-    const real t91 = t89 + t90;
-    const real t92 = R_end[7] * t72;
-    const real t93 = t91 + t92;
-    R[4] = t93;
-    const real t94 = R_end[1] * t75;
-    const real t95 = R_end[4] * t77;
-    const real t96 = t94 + t95;
-    const real t97 = R_end[7] * t81;
-    const real t98 = t96 + t97;
-    R[5] = t98;
-    const real t99 = R_end[2] * t28;
-    const real t100 = R_end[5] * t53;
-    const real t101 = t99 + t100;
-    const real t102 = R_end[8] * t59;
-    const real t103 = t101 + t102;
-    R[6] = t103;
-    const real t104 = R_end[2] * t62;
-    const real t105 = R_end[5] * t66;
-    const real t106 = t104 + t105;
-    const real t107 = R_end[8] * t72;
-    const real t108 = t106 + t107;
-    R[7] = t108;
-    const real t109 = R_end[2] * t75;
-    const real t110 = R_end[5] * t77;
-    const real t111 = t109 + t110;
-    const real t112 = R_end[8] * t81;
-    const real t113 = t111 + t112;
-    R[8] = t113;
-    const real t114 = x[0] * t61;
-    const real t115 = x[1] * t74;
-    const real t116 = t114 + t115;
-    const real t117 = x[2] * t83;
-    const real t118 = t116 + t117;
-    const real t119 = -t118;
-    d[0] = t119;
-    const real t120 = x[0] * t88;
-    const real t121 = x[1] * t93;
-    const real t122 = t120 + t121;
-    const real t123 = x[2] * t98;
-    const real t124 = t122 + t123;
-    const real t125 = -t124;
-    d[1] = t125;
-    const real t126 = x[0] * t103;
-    const real t127 = x[1] * t108;
-    const real t128 = t126 + t127;
-    const real t129 = x[2] * t113;
-    const real t130 = t128 + t129;
-    const real t131 = -t130;
-    d[2] = t131;
-    H6[0] = (-1.0);
-    H6[1] = 0.0;
-    H6[2] = 0.0;
-    const real t132 = Psi[2] * t25;
-    const real t133 = t4 * 3.868170170630684e-23;
-    const real t134 = (-1.9572941063391263e-20) + t133;
-    const real t135 = t4 * t134;
-    const real t136 = 8.22063524662433e-18 + t135;
-    const real t137 = t4 * t136;
-    const real t138 = (-((real)1 / (real)355687428096000)) + t137;
-    const real t139 = t4 * t138;
-    const real t140 = ((real)1 / (real)1307674368000) + t139;
-    const real t141 = t4 * t140;
-    const real t142 = (-((real)1 / (real)6227020800)) + t141;
-    const real t143 = t4 * t142;
-    const real t144 = ((real)1 / (real)39916800) + t143;
-    const real t145 = t4 * t144;
-    const real t146 = (-((real)1 / (real)362880)) + t145;
-    const real t147 = t4 * t146;
-    const real t148 = ((real)1 / (real)5040) + t147;
-    const real t149 = t4 * t148;
-    const real t150 = (-((real)1 / (real)120)) + t149;
-    const real t151 = t4 * t150;
-    const real t152 = ((real)1 / (real)6) + t151;
-    const real t153 = t152 * t30;
-    const real t154 = t132 + t153;
-    const real t155 = x[2] * t154;
-    const real t156 = t152 * t57;
-    const real t157 = Psi[1] * t25;
-    const real t158 = t156 - t157;
-    const real t159 = x[1] * t158;
-    const real t160 = t155 - t159;
-    H6[3] = t160;
-    const real t161 = t152 * t64;
-    const real t162 = 1.0 - t161;
-    const real t163 = x[2] * t162;
-    const real t164 = Psi[0] * t25;
-    const real t165 = t152 * t69;
-    const real t166 = t164 + t165;
-    const real t167 = x[1] * t166;
-    const real t168 = t163 - t167;
-    H6[4] = t168;
-    const real t169 = t165 - t164;
-    const real t170 = x[2] * t169;
-    const real t171 = t3 * t152;
-    const real t172 = 1.0 - t171;
-    const real t173 = x[1] * t172;
-    const real t174 = t170 - t173;
-    H6[5] = t174;
-    H6[6] = 0.0;
-    H6[7] = (-1.0);
-    H6[8] = 0.0;
-    const real t175 = x[0] * t158;
-    const real t176 = t152 * t26;
-    const real t177 = 1.0 - t176;
-    const real t178 = x[2] * t177;
-    const real t179 = t175 - t178;
-    H6[9] = t179;
-    const real t180 = x[0] * t166;
-    const real t181 = t153 - t132;
-    const real t182 = x[2] * t181;
-    const real t183 = t180 - t182;
-    H6[10] = t183;
-    const real t184 = x[0] * t172;
-    const real t185 = t157 + t156;
-    const real t186 = x[2] * t185;
-    const real t187 = t184 - t186;
-    H6[11] = t187;
-    H6[12] = 0.0;
-    H6[13] = 0.0;
-    H6[14] = (-1.0);
-    const real t188 = x[1] * t177;
-    const real t189 = x[0] * t154;
-    const real t190 = t188 - t189;
-    H6[15] = t190;
-    const real t191 = x[1] * t181;
-    const real t192 = x[0] * t162;
-    const real t193 = t191 - t192;
-    H6[16] = t193;
-    const real t194 = x[1] * t185;
-    const real t195 = x[0] * t169;
-    const real t196 = t194 - t195;
-    H6[17] = t196;
-    H6[18] = 0.0;
-    H6[19] = 0.0;
-    H6[20] = 0.0;
-    const real t197 = (-1.0) + t176;
-    H6[21] = t197;
-    const real t198 = -t181;
-    H6[22] = t198;
-    const real t199 = -t185;
-    H6[23] = t199;
-    H6[24] = 0.0;
-    H6[25] = 0.0;
-    H6[26] = 0.0;
-    const real t200 = -t154;
-    H6[27] = t200;
-    const real t201 = (-1.0) + t161;
-    H6[28] = t201;
-    const real t202 = -t169;
-    H6[29] = t202;
-    H6[30] = 0.0;
-    H6[31] = 0.0;
-    H6[32] = 0.0;
-    const real t203 = -t158;
-    H6[33] = t203;
-    const real t204 = -t166;
-    H6[34] = t204;
-    const real t205 = (-1.0) + t171;
-    H6[35] = t205;
-    const real t206 = Psid[0] * t160;
-    const real t207 = t206 - xd[0];
-    const real t208 = Psid[1] * t168;
-    const real t209 = t207 + t208;
-    const real t210 = Psid[2] * t174;
-    const real t211 = t209 + t210;
-    v[0] = t211;
-    const real t212 = Psid[0] * t179;
-    const real t213 = t212 - xd[1];
-    const real t214 = Psid[1] * t183;
-    const real t215 = t213 + t214;
-    const real t216 = Psid[2] * t187;
-    const real t217 = t215 + t216;
-    v[1] = t217;
-    const real t218 = Psid[0] * t190;
-    const real t219 = t218 - xd[2];
-    const real t220 = Psid[1] * t193;
-    const real t221 = t219 + t220;
-    const real t222 = Psid[2] * t196;
-    const real t223 = t221 + t222;
-    v[2] = t223;
-    const real t224 = Psid[0] * t197;
-    const real t225 = Psid[1] * t181;
-    const real t226 = t224 - t225;
-    const real t227 = Psid[2] * t185;
-    const real t228 = t226 - t227;
-    w[0] = t228;
-    const real t229 = Psid[1] * t201;
-    const real t230 = Psid[0] * t154;
-    const real t231 = t229 - t230;
-    const real t232 = Psid[2] * t169;
-    const real t233 = t231 - t232;
-    w[1] = t233;
-    const real t234 = Psid[2] * t205;
-    const real t235 = Psid[0] * t158;
-    const real t236 = Psid[1] * t166;
-    const real t237 = t235 + t236;
-    const real t238 = t234 - t237;
-    w[2] = t238;
-    const real t239 = Psidd[0] * t154;
-    const real t240 = Psidd[2] * t169;
-    const real t241 = t4 * 8.896791392450573e-21;
-    const real t242 = (-3.6992858609809485e-18) + t241;
-    const real t243 = t4 * t242;
-    const real t244 = ((real)1 / (real)800296713216000) + t243;
-    const real t245 = t4 * t244;
-    const real t246 = (-((real)1 / (real)2988969984000)) + t245;
-    const real t247 = t4 * t246;
-    const real t248 = ((real)1 / (real)14529715200) + t247;
-    const real t249 = t4 * t248;
-    const real t250 = (-((real)1 / (real)95800320)) + t249;
-    const real t251 = t4 * t250;
-    const real t252 = ((real)1 / (real)907200) + t251;
-    const real t253 = t4 * t252;
-    const real t254 = (-((real)1 / (real)13440)) + t253;
-    const real t255 = t4 * t254;
-    const real t256 = ((real)1 / (real)360) + t255;
-    const real t257 = t4 * t256;
-    const real t258 = (-((real)1 / (real)24)) + t257;
-    const real t259 = Psi[2] * Psid[2];
-    const real t260 = Psi[0] * Psid[0];
-    const real t261 = Psi[1] * Psid[1];
-    const real t262 = t260 + t261;
-    const real t263 = t259 + t262;
-    const real t264 = 2.0 * t263;
-    const real t265 = t258 * t264;
-    const real t266 = Psi[2] * Psid[0];
-    const real t267 = Psi[0] * Psid[2];
-    const real t268 = t266 - t267;
-    const real t269 = t265 * t268;
-    const real t270 = Psidd[1] * t162;
-    const real t271 = t4 * 3.868170170630684e-22;
-    const real t272 = (-1.7615646957052136e-19) + t271;
-    const real t273 = t4 * t272;
-    const real t274 = 6.576508197299464e-17 + t273;
-    const real t275 = t4 * t274;
-    const real t276 = (-((real)1 / (real)50812489728000)) + t275;
-    const real t277 = t4 * t276;
-    const real t278 = ((real)1 / (real)217945728000) + t277;
-    const real t279 = t4 * t278;
-    const real t280 = (-((real)1 / (real)1245404160)) + t279;
-    const real t281 = t4 * t280;
-    const real t282 = ((real)1 / (real)9979200) + t281;
-    const real t283 = t4 * t282;
-    const real t284 = (-((real)1 / (real)120960)) + t283;
-    const real t285 = t4 * t284;
-    const real t286 = ((real)1 / (real)2520) + t285;
-    const real t287 = t4 * t286;
-    const real t288 = (-((real)1 / (real)120)) + t287;
-    const real t289 = t264 * t288;
-    const real t290 = Psi[1] * Psid[2];
-    const real t291 = Psi[2] * Psid[1];
-    const real t292 = t290 - t291;
-    const real t293 = Psi[2] * t292;
-    const real t294 = Psi[0] * Psid[1];
-    const real t295 = Psi[1] * Psid[0];
-    const real t296 = t294 - t295;
-    const real t297 = Psi[0] * t296;
-    const real t298 = t293 - t297;
-    const real t299 = t289 * t298;
-    const real t300 = Psid[2] * t292;
-    const real t301 = Psid[0] * t296;
-    const real t302 = t300 - t301;
-    const real t303 = t152 * t302;
-    const real t304 = t299 + t303;
-    const real t305 = t270 + t304;
-    const real t306 = t269 + t305;
-    const real t307 = t240 + t306;
-    const real t308 = t239 + t307;
-    const real t309 = x[2] * t308;
-    const real t310 = t232 - t231;
-    const real t311 = xd[2] * t310;
-    const real t312 = 2.0 * t311;
-    const real t313 = t237 - t234;
-    const real t314 = x[0] * t313;
-    const real t315 = t227 - t226;
-    const real t316 = x[2] * t315;
-    const real t317 = t314 - t316;
-    const real t318 = t313 * t317;
-    const real t319 = x[1] * t315;
-    const real t320 = x[0] * t310;
-    const real t321 = t319 - t320;
-    const real t322 = t310 * t321;
-    const real t323 = t318 - t322;
-    const real t324 = t312 + t323;
-    const real t325 = xd[1] * t313;
-    const real t326 = 2.0 * t325;
-    const real t327 = t324 - t326;
-    const real t328 = t309 + t327;
-    const real t329 = Psidd[0] * t158;
-    const real t330 = Psidd[1] * t166;
-    const real t331 = t265 * t296;
-    const real t332 = Psidd[2] * t172;
-    const real t333 = Psi[0] * t268;
-    const real t334 = Psi[1] * t292;
-    const real t335 = t333 - t334;
-    const real t336 = t289 * t335;
-    const real t337 = Psid[0] * t268;
-    const real t338 = Psid[1] * t292;
-    const real t339 = t337 - t338;
-    const real t340 = t152 * t339;
-    const real t341 = t336 + t340;
-    const real t342 = t332 + t341;
-    const real t343 = t331 + t342;
-    const real t344 = t330 + t343;
-    const real t345 = t329 + t344;
-    const real t346 = x[1] * t345;
-    const real t347 = t328 - t346;
-    const real t348 = t347 - xdd[0];
-    c[0] = t348;
-    const real t349 = x[0] * t345;
-    const real t350 = xd[0] * t313;
-    const real t351 = 2.0 * t350;
-    const real t352 = t315 * t321;
-    const real t353 = x[2] * t310;
-    const real t354 = x[1] * t313;
-    const real t355 = t353 - t354;
-    const real t356 = t313 * t355;
-    const real t357 = t352 - t356;
-    const real t358 = xd[2] * t315;
-    const real t359 = 2.0 * t358;
-    const real t360 = t357 - t359;
-    const real t361 = t351 + t360;
-    const real t362 = Psidd[2] * t185;
-    const real t363 = Psidd[1] * t181;
-    const real t364 = t265 * t292;
-    const real t365 = Psidd[0] * t177;
-    const real t366 = Psi[1] * t296;
-    const real t367 = Psi[2] * t268;
-    const real t368 = t366 - t367;
-    const real t369 = t289 * t368;
-    const real t370 = Psid[1] * t296;
-    const real t371 = Psid[2] * t268;
-    const real t372 = t370 - t371;
-    const real t373 = t152 * t372;
-    const real t374 = t369 + t373;
-    const real t375 = t365 + t374;
-    const real t376 = t364 + t375;
-    const real t377 = t363 + t376;
-    const real t378 = t362 + t377;
-    const real t379 = x[2] * t378;
-    const real t380 = t361 - t379;
-    const real t381 = t349 + t380;
-    const real t382 = t381 - xdd[1];
-    c[1] = t382;
-    const real t383 = x[1] * t378;
-    const real t384 = xd[1] * t315;
-    const real t385 = 2.0 * t384;
-    const real t386 = t310 * t355;
-    const real t387 = t315 * t317;
-    const real t388 = t386 - t387;
-    const real t389 = t385 + t388;
-    const real t390 = xd[0] * t310;
-    const real t391 = 2.0 * t390;
-    const real t392 = t389 - t391;
-    const real t393 = t383 + t392;
-    const real t394 = x[0] * t308;
-    const real t395 = t393 - t394;
-    const real t396 = t395 - xdd[2];
-    c[2] = t396;
-    const real t397 = -t378;
-    c[3] = t397;
-    const real t398 = -t308;
-    c[4] = t398;
-    const real t399 = -t345;
-    c[5] = t399;
-    return 0;
+  real t0 = Psi[2] * Psi[2];
+  real t1 = Psi[0] * Psi[0];
+  real t2 = Psi[1] * Psi[1];
+  real t3 = t1 + t2;
+  real t4 = t0 + t3;
+  if (!((t4 < 2.25))) return 1; /* a section rotates by more than 3/2 rad relative to its floating frame */
+  real t25 = 0.5 + t4 * ((-((real)1 / (real)24)) + t4 * (((real)1 / (real)720) + t4 * ((-((real)1 /
+    (real)40320)) + t4 * (((real)1 / (real)3628800) + t4 * ((-((real)1 / (real)479001600)) + t4 *
+    (((real)1 / (real)87178291200) + t4 * ((-((real)1 / (real)20922789888000)) + t4 * (((real)1 /
+    (real)6402373705728000) + t4 * ((-4.110317623312165e-19) + t4 * 8.896791392450574e-22)))))))));
+  real t26 = t2 + t0;
+  real t28 = 1.0 - t25 * t26;
+  real t30 = Psi[0] * Psi[1];
+  real t31 = t25 * t30;
+  real t51 = 1.0 + t4 * ((-((real)1 / (real)6)) + t4 * (((real)1 / (real)120) + t4 * ((-((real)1 /
+    (real)5040)) + t4 * (((real)1 / (real)362880) + t4 * ((-((real)1 / (real)39916800)) + t4 *
+    (((real)1 / (real)6227020800) + t4 * ((-((real)1 / (real)1307674368000)) + t4 * (((real)1 /
+    (real)355687428096000) + t4 * ((-8.22063524662433e-18) + t4 * 1.9572941063391263e-20)))))))));
+  real t52 = Psi[2] * t51;
+  real t53 = t31 - t52;
+  real t56 = Psi[1] * t51;
+  real t57 = Psi[0] * Psi[2];
+  real t58 = t25 * t57;
+  real t59 = t56 + t58;
+  real t61 = R_end[0] * t28 + R_end[3] * t53 + R_end[6] * t59;
+  R[0] = t61;
+  real t62 = t52 + t31;
+  real t64 = t1 + t0;
+  real t66 = 1.0 - t25 * t64;
+  real t69 = Psi[1] * Psi[2];
+  real t70 = t25 * t69;
+  real t71 = Psi[0] * t51;
+  real t72 = t70 - t71;
+  real t74 = R_end[0] * t62 + R_end[3] * t66 + R_end[6] * t72;
+  R[1] = t74;
+  real t75 = t58 - t56;
+  real t77 = t71 + t70;
+  real t81 = 1.0 - t3 * t25;
+  real t83 = R_end[0] * t75 + R_end[3] * t77 + R_end[6] * t81;
+  R[2] = t83;
+  real t88 = R_end[1] * t28 + R_end[4] * t53 + R_end[7] * t59;
+  R[3] = t88;
+  real t93 = R_end[1] * t62 + R_end[4] * t66 + R_end[7] * t72;
+  R[4] = t93;
+  real t98 = R_end[1] * t75 + R_end[4] * t77 + R_end[7] * t81;
+  R[5] = t98;
+  real t103 = R_end[2] * t28 + R_end[5] * t53 + R_end[8] * t59;
+  R[6] = t103;
+  real t108 = R_end[2] * t62 + R_end[5] * t66 + R_end[8] * t72;
+  R[7] = t108;
+  real t113 = R_end[2] * t75 + R_end[5] * t77 + R_end[8] * t81;
+  R[8] = t113;
+  d[0] = -(x[0] * t61 + x[1] * t74 + x[2] * t83);
+  d[1] = -(x[0] * t88 + x[1] * t93 + x[2] * t98);
+  d[2] = -(x[0] * t103 + x[1] * t108 + x[2] * t113);
+  H6[0] = (-1.0);
+  H6[1] = H6[2] = 0.0;
+  real t132 = Psi[2] * t25;
+  real t152 = ((real)1 / (real)6) + t4 * ((-((real)1 / (real)120)) + t4 * (((real)1 / (real)5040) +
+    t4 * ((-((real)1 / (real)362880)) + t4 * (((real)1 / (real)39916800) + t4 * ((-((real)1 /
+    (real)6227020800)) + t4 * (((real)1 / (real)1307674368000) + t4 * ((-((real)1 /
+    (real)355687428096000)) + t4 * (8.22063524662433e-18 + t4 * ((-1.9572941063391263e-20) + t4 *
+    3.868170170630684e-23)))))))));
+  real t153 = t152 * t30;
+  real t154 = t132 + t153;
+  real t156 = t152 * t57;
+  real t157 = Psi[1] * t25;
+  real t158 = t156 - t157;
+  real t160 = x[2] * t154 - x[1] * t158;
+  H6[3] = t160;
+  real t161 = t152 * t64;
+  real t162 = 1.0 - t161;
+  real t164 = Psi[0] * t25;
+  real t165 = t152 * t69;
+  real t166 = t164 + t165;
+  real t168 = x[2] * t162 - x[1] * t166;
+  H6[4] = t168;
+  real t169 = t165 - t164;
+  real t171 = t3 * t152;
+  real t172 = 1.0 - t171;
+  real t174 = x[2] * t169 - x[1] * t172;
+  H6[5] = t174;
+  H6[6] = 0.0;
+  H6[7] = (-1.0);
+  H6[8] = 0.0;
+  real t176 = t152 * t26;
+  real t177 = 1.0 - t176;
+  real t179 = x[0] * t158 - x[2] * t177;
+  H6[9] = t179;
+  real t181 = t153 - t132;
+  real t183 = x[0] * t166 - x[2] * t181;
+  H6[10] = t183;
+  real t185 = t157 + t156;
+  real t187 = x[0] * t172 - x[2] * t185;
+  H6[11] = t187;
+  H6[12] = H6[13] = 0.0;
+  H6[14] = (-1.0);
+  real t190 = x[1] * t177 - x[0] * t154;
+  H6[15] = t190;
+  real t193 = x[1] * t181 - x[0] * t162;
+  H6[16] = t193;
+  real t196 = x[1] * t185 - x[0] * t169;
+  H6[17] = t196;
+  H6[18] = H6[19] = H6[20] = 0.0;
+  real t197 = (-1.0) + t176;
+  H6[21] = t197;
+  H6[22] = -t181;
+  H6[23] = -t185;
+  H6[24] = H6[25] = H6[26] = 0.0;
+  H6[27] = -t154;
+  real t201 = (-1.0) + t161;
+  H6[28] = t201;
+  H6[29] = -t169;
+  H6[30] = H6[31] = H6[32] = 0.0;
+  H6[33] = -t158;
+  H6[34] = -t166;
+  real t205 = (-1.0) + t171;
+  H6[35] = t205;
+  v[0] = Psid[0] * t160 - xd[0] + Psid[1] * t168 + Psid[2] * t174;
+  v[1] = Psid[0] * t179 - xd[1] + Psid[1] * t183 + Psid[2] * t187;
+  v[2] = Psid[0] * t190 - xd[2] + Psid[1] * t193 + Psid[2] * t196;
+  real t226 = Psid[0] * t197 - Psid[1] * t181;
+  real t227 = Psid[2] * t185;
+  w[0] = t226 - t227;
+  real t231 = Psid[1] * t201 - Psid[0] * t154;
+  real t232 = Psid[2] * t169;
+  w[1] = t231 - t232;
+  real t234 = Psid[2] * t205;
+  real t237 = Psid[0] * t158 + Psid[1] * t166;
+  w[2] = t234 - t237;
+  real t264 = 2.0 * (Psi[2] * Psid[2] + (Psi[0] * Psid[0] + Psi[1] * Psid[1]));
+  real t265 = ((-((real)1 / (real)24)) + t4 * (((real)1 / (real)360) + t4 * ((-((real)1 /
+    (real)13440)) + t4 * (((real)1 / (real)907200) + t4 * ((-((real)1 / (real)95800320)) + t4 *
+    (((real)1 / (real)14529715200) + t4 * ((-((real)1 / (real)2988969984000)) + t4 * (((real)1 /
+    (real)800296713216000) + t4 * ((-3.6992858609809485e-18) + t4 * 8.896791392450573e-21))))))))) *
+    t264;
+  real t268 = Psi[2] * Psid[0] - Psi[0] * Psid[2];
+  real t289 = t264 * ((-((real)1 / (real)120)) + t4 * (((real)1 / (real)2520) + t4 * ((-((real)1 /
+    (real)120960)) + t4 * (((real)1 / (real)9979200) + t4 * ((-((real)1 / (real)1245404160)) + t4 *
+    (((real)1 / (real)217945728000) + t4 * ((-((real)1 / (real)50812489728000)) + t4 *
+    (6.576508197299464e-17 + t4 * ((-1.7615646957052136e-19) + t4 * 3.868170170630684e-22)))))))));
+  real t292 = Psi[1] * Psid[2] - Psi[2] * Psid[1];
+  real t296 = Psi[0] * Psid[1] - Psi[1] * Psid[0];
+  real t308 = Psidd[0] * t154 + (Psidd[2] * t169 + (t265 * t268 + (Psidd[1] * t162 + (t289 * (Psi[2]
+    * t292 - Psi[0] * t296) + t152 * (Psid[2] * t292 - Psid[0] * t296)))));
+  real t310 = t232 - t231;
+  real t313 = t237 - t234;
+  real t315 = t227 - t226;
+  real t317 = x[0] * t313 - x[2] * t315;
+  real t321 = x[1] * t315 - x[0] * t310;
+  real t345 = Psidd[0] * t158 + (Psidd[1] * t166 + (t265 * t296 + (Psidd[2] * t172 + (t289 * (Psi[0]
+    * t268 - Psi[1] * t292) + t152 * (Psid[0] * t268 - Psid[1] * t292)))));
+  c[0] = x[2] * t308 + (2.0 * (xd[2] * t310) + (t313 * t317 - t310 * t321) - 2.0 * (xd[1] * t313)) -
+    x[1] * t345 - xdd[0];
+  real t355 = x[2] * t310 - x[1] * t313;
+  real t378 = Psidd[2] * t185 + (Psidd[1] * t181 + (t265 * t292 + (Psidd[0] * t177 + (t289 * (Psi[1]
+    * t296 - Psi[2] * t268) + t152 * (Psid[1] * t296 - Psid[2] * t268)))));
+  c[1] = x[0] * t345 + (2.0 * (xd[0] * t313) + (t315 * t321 - t313 * t355 - 2.0 * (xd[2] * t315)) -
+    x[2] * t378) - xdd[1];
+  c[2] = x[1] * t378 + (2.0 * (xd[1] * t315) + (t310 * t355 - t315 * t317) - 2.0 * (xd[0] * t310)) -
+    x[0] * t308 - xdd[2];
+  c[3] = -t378;
+  c[4] = -t308;
+  c[5] = -t345;
+  return 0;
 }
 
-static int mstmm_sweep_modal_frame_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_modal_frame_motion(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_modal_frame_motion_inputs[] = {
-    {"R_end", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"Psi", 3, "rad", 0, 0},
-    {"xd", 3, "m/s", 0, 0},
-    {"Psid", 3, "rad/s", 0, 0},
-    {"xdd", 3, "m/s2", 0, 0},
-    {"Psidd", 3, "rad/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_frame_motion_outputs[] = {
-    {"R", 9, "", 0, 0},
-    {"d", 3, "m", 0, 0},
-    {"H6", 36, "", 0, 0},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-};
-
-static const mstmm_guard mstmm_sweep_modal_frame_motion_guards[] = {
-    {1, "a section rotates by more than 3/2 rad relative to its floating frame"},
-};
+MSTMM_CALL(mstmm_sweep_modal_frame_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
+  out[1], out[2], out[3], out[4], out[5]))
 
 /* subspace of a port
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -2809,121 +1452,47 @@ static const mstmm_guard mstmm_sweep_modal_frame_motion_guards[] = {
  * out H[6][n] motion subspace of the modes, rows v then w, outboard axes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_subspace_sized(int n, const real *restrict H6, const real *restrict Phi,
-    real *restrict H)
+int mstmm_sweep_modal_subspace_sized(int n, in_t H6, in_t Phi, out_t H)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = H6[0] * Phi[k];
-        const real t1 = H6[1] * Phi[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = H6[2] * Phi[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = H6[3] * Phi[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = H6[4] * Phi[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = H6[5] * Phi[5 * n + k];
-        const real t10 = t8 + t9;
-        H[k] = t10;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t11 = H6[6] * Phi[k];
-        const real t12 = H6[7] * Phi[n + k];
-        const real t13 = t11 + t12;
-        const real t14 = H6[8] * Phi[2 * n + k];
-        const real t15 = t13 + t14;
-        const real t16 = H6[9] * Phi[3 * n + k];
-        const real t17 = t15 + t16;
-        const real t18 = H6[10] * Phi[4 * n + k];
-        const real t19 = t17 + t18;
-        const real t20 = H6[11] * Phi[5 * n + k];
-        const real t21 = t19 + t20;
-        H[n + k] = t21;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t22 = H6[12] * Phi[k];
-        const real t23 = H6[13] * Phi[n + k];
-        const real t24 = t22 + t23;
-        const real t25 = H6[14] * Phi[2 * n + k];
-        const real t26 = t24 + t25;
-        const real t27 = H6[15] * Phi[3 * n + k];
-        const real t28 = t26 + t27;
-        const real t29 = H6[16] * Phi[4 * n + k];
-        const real t30 = t28 + t29;
-        const real t31 = H6[17] * Phi[5 * n + k];
-        const real t32 = t30 + t31;
-        H[2 * n + k] = t32;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t33 = H6[18] * Phi[k];
-        const real t34 = H6[19] * Phi[n + k];
-        const real t35 = t33 + t34;
-        const real t36 = H6[20] * Phi[2 * n + k];
-        const real t37 = t35 + t36;
-        const real t38 = H6[21] * Phi[3 * n + k];
-        const real t39 = t37 + t38;
-        const real t40 = H6[22] * Phi[4 * n + k];
-        const real t41 = t39 + t40;
-        const real t42 = H6[23] * Phi[5 * n + k];
-        const real t43 = t41 + t42;
-        H[3 * n + k] = t43;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t44 = H6[24] * Phi[k];
-        const real t45 = H6[25] * Phi[n + k];
-        const real t46 = t44 + t45;
-        const real t47 = H6[26] * Phi[2 * n + k];
-        const real t48 = t46 + t47;
-        const real t49 = H6[27] * Phi[3 * n + k];
-        const real t50 = t48 + t49;
-        const real t51 = H6[28] * Phi[4 * n + k];
-        const real t52 = t50 + t51;
-        const real t53 = H6[29] * Phi[5 * n + k];
-        const real t54 = t52 + t53;
-        H[4 * n + k] = t54;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t55 = H6[30] * Phi[k];
-        const real t56 = H6[31] * Phi[n + k];
-        const real t57 = t55 + t56;
-        const real t58 = H6[32] * Phi[2 * n + k];
-        const real t59 = t57 + t58;
-        const real t60 = H6[33] * Phi[3 * n + k];
-        const real t61 = t59 + t60;
-        const real t62 = H6[34] * Phi[4 * n + k];
-        const real t63 = t61 + t62;
-        const real t64 = H6[35] * Phi[5 * n + k];
-        const real t65 = t63 + t64;
-        H[5 * n + k] = t65;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    H[k] = H6[0] * Phi[k] + H6[1] * Phi[n + k] + H6[2] * Phi[2 * n + k] + H6[3] * Phi[3 * n + k] +
+      H6[4] * Phi[4 * n + k] + H6[5] * Phi[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    H[n + k] = H6[6] * Phi[k] + H6[7] * Phi[n + k] + H6[8] * Phi[2 * n + k] + H6[9] * Phi[3 * n + k]
+      + H6[10] * Phi[4 * n + k] + H6[11] * Phi[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    H[2 * n + k] = H6[12] * Phi[k] + H6[13] * Phi[n + k] + H6[14] * Phi[2 * n + k] + H6[15] * Phi[3
+      * n + k] + H6[16] * Phi[4 * n + k] + H6[17] * Phi[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    H[3 * n + k] = H6[18] * Phi[k] + H6[19] * Phi[n + k] + H6[20] * Phi[2 * n + k] + H6[21] * Phi[3
+      * n + k] + H6[22] * Phi[4 * n + k] + H6[23] * Phi[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    H[4 * n + k] = H6[24] * Phi[k] + H6[25] * Phi[n + k] + H6[26] * Phi[2 * n + k] + H6[27] * Phi[3
+      * n + k] + H6[28] * Phi[4 * n + k] + H6[29] * Phi[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    H[5 * n + k] = H6[30] * Phi[k] + H6[31] * Phi[n + k] + H6[32] * Phi[2 * n + k] + H6[33] * Phi[3
+      * n + k] + H6[34] * Phi[4 * n + k] + H6[35] * Phi[5 * n + k];
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_subspace(int n, const real *restrict H6, const real *restrict Phi,
-    real *restrict H)
+int mstmm_sweep_modal_subspace(int n, in_t H6, in_t Phi, out_t H)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_subspace_sized(1, H6, Phi, H);
-    case 2: return mstmm_sweep_modal_subspace_sized(2, H6, Phi, H);
-    case 3: return mstmm_sweep_modal_subspace_sized(3, H6, Phi, H);
-    case 4: return mstmm_sweep_modal_subspace_sized(4, H6, Phi, H);
-    default: return mstmm_sweep_modal_subspace_sized(n, H6, Phi, H);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_subspace_sized(1, H6, Phi, H);
+  case 2: return mstmm_sweep_modal_subspace_sized(2, H6, Phi, H);
+  case 3: return mstmm_sweep_modal_subspace_sized(3, H6, Phi, H);
+  case 4: return mstmm_sweep_modal_subspace_sized(4, H6, Phi, H);
+  default: return mstmm_sweep_modal_subspace_sized(n, H6, Phi, H);
+  }
 }
 
-static int mstmm_sweep_modal_subspace_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_subspace(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_subspace_inputs[] = {
-    {"H6", 36, "", 0, 0},
-    {"Phi", 6, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_subspace_outputs[] = {
-    {"H", 6, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_subspace, (n, in[0], in[1], out[0]))
 
 /* bias of a port with prescribed modal accelerations
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -2935,80 +1504,53 @@ static const mstmm_port mstmm_sweep_modal_subspace_outputs[] = {
  * out c_s[6] relative acceleration
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_prescribed_bias_sized(int n, const real *restrict H, const real *restrict s,
-    const real *restrict c, real *restrict c_s)
+int mstmm_sweep_modal_prescribed_bias_sized(int n, in_t H, in_t s, in_t c, out_t c_s)
 {
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = H[k] * s[k];
-        t1 += t0;
-    }
-    const real t2 = c[0] + t1;
-    c_s[0] = t2;
-    real t4 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t3 = s[k] * H[n + k];
-        t4 += t3;
-    }
-    const real t5 = c[1] + t4;
-    c_s[1] = t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = s[k] * H[2 * n + k];
-        t7 += t6;
-    }
-    const real t8 = c[2] + t7;
-    c_s[2] = t8;
-    real t10 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t9 = s[k] * H[3 * n + k];
-        t10 += t9;
-    }
-    const real t11 = c[3] + t10;
-    c_s[3] = t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = s[k] * H[4 * n + k];
-        t13 += t12;
-    }
-    const real t14 = c[4] + t13;
-    c_s[4] = t14;
-    real t16 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = s[k] * H[5 * n + k];
-        t16 += t15;
-    }
-    const real t17 = c[5] + t16;
-    c_s[5] = t17;
-    return 0;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += H[k] * s[k];
+  }
+  c_s[0] = c[0] + t1;
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += s[k] * H[n + k];
+  }
+  c_s[1] = c[1] + t4;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += s[k] * H[2 * n + k];
+  }
+  c_s[2] = c[2] + t7;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += s[k] * H[3 * n + k];
+  }
+  c_s[3] = c[3] + t10;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += s[k] * H[4 * n + k];
+  }
+  c_s[4] = c[4] + t13;
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += s[k] * H[5 * n + k];
+  }
+  c_s[5] = c[5] + t16;
+  return 0;
 }
 
-int mstmm_sweep_modal_prescribed_bias(int n, const real *restrict H, const real *restrict s,
-    const real *restrict c, real *restrict c_s)
+int mstmm_sweep_modal_prescribed_bias(int n, in_t H, in_t s, in_t c, out_t c_s)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_prescribed_bias_sized(1, H, s, c, c_s);
-    case 2: return mstmm_sweep_modal_prescribed_bias_sized(2, H, s, c, c_s);
-    case 3: return mstmm_sweep_modal_prescribed_bias_sized(3, H, s, c, c_s);
-    case 4: return mstmm_sweep_modal_prescribed_bias_sized(4, H, s, c, c_s);
-    default: return mstmm_sweep_modal_prescribed_bias_sized(n, H, s, c, c_s);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_prescribed_bias_sized(1, H, s, c, c_s);
+  case 2: return mstmm_sweep_modal_prescribed_bias_sized(2, H, s, c, c_s);
+  case 3: return mstmm_sweep_modal_prescribed_bias_sized(3, H, s, c, c_s);
+  case 4: return mstmm_sweep_modal_prescribed_bias_sized(4, H, s, c, c_s);
+  default: return mstmm_sweep_modal_prescribed_bias_sized(n, H, s, c, c_s);
+  }
 }
 
-static int mstmm_sweep_modal_prescribed_bias_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_prescribed_bias(n, in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_prescribed_bias_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"s", 1, "", 0, 1},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_prescribed_bias_outputs[] = {
-    {"c_s", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_prescribed_bias, (n, in[0], in[1], in[2], out[0]))
 
 /* S and e of a port along the modes
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3024,252 +1566,90 @@ static const mstmm_port mstmm_sweep_modal_prescribed_bias_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_assemble_port_sized(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
-    real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
+int mstmm_sweep_modal_assemble_port_sized(int n, in_t Rc, in_t r, in_t H, in_t S, in_t e, out_t U,
+    out_t S_rf, out_t S_ff, out_t e_f)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S[0] * H[k];
-        const real t1 = S[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = S[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = S[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = S[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = S[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        U[k] = t10;
+  for (int k = 0; k < n; ++k) {
+    U[k] = S[0] * H[k] + S[1] * H[n + k] + S[2] * H[2 * n + k] + S[3] * H[3 * n + k] + S[4] * H[4 *
+      n + k] + S[5] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    U[n + k] = S[1] * H[k] + S[6] * H[n + k] + S[7] * H[2 * n + k] + S[8] * H[3 * n + k] + S[9] *
+      H[4 * n + k] + S[10] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    U[2 * n + k] = S[2] * H[k] + S[7] * H[n + k] + S[11] * H[2 * n + k] + S[12] * H[3 * n + k] +
+      S[13] * H[4 * n + k] + S[14] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    U[3 * n + k] = S[3] * H[k] + S[8] * H[n + k] + S[12] * H[2 * n + k] + S[15] * H[3 * n + k] +
+      S[16] * H[4 * n + k] + S[17] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    U[4 * n + k] = S[4] * H[k] + S[9] * H[n + k] + S[13] * H[2 * n + k] + S[16] * H[3 * n + k] +
+      S[18] * H[4 * n + k] + S[19] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    U[5 * n + k] = S[5] * H[k] + S[10] * H[n + k] + S[14] * H[2 * n + k] + S[17] * H[3 * n + k] +
+      S[19] * H[4 * n + k] + S[20] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf[k] += Rc[0] * U[k] + Rc[1] * U[n + k] + Rc[2] * U[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf[n + k] += Rc[3] * U[k] + Rc[4] * U[n + k] + Rc[5] * U[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf[2 * n + k] += Rc[6] * U[k] + Rc[7] * U[n + k] + Rc[8] * U[2 * n + k];
+  }
+  real t88 = Rc[6] * r[1] - Rc[3] * r[2];
+  real t92 = Rc[7] * r[1] - Rc[4] * r[2];
+  real t97 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    S_rf[3 * n + k] += Rc[0] * U[3 * n + k] + Rc[1] * U[4 * n + k] + Rc[2] * U[5 * n + k] + (U[k] *
+      t88 + U[n + k] * t92 + U[2 * n + k] * t97);
+  }
+  real t108 = Rc[0] * r[2] - Rc[6] * r[0];
+  real t112 = Rc[1] * r[2] - Rc[7] * r[0];
+  real t117 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    S_rf[4 * n + k] += Rc[3] * U[3 * n + k] + Rc[4] * U[4 * n + k] + Rc[5] * U[5 * n + k] + (U[k] *
+      t108 + U[n + k] * t112 + U[2 * n + k] * t117);
+  }
+  real t128 = Rc[3] * r[0] - Rc[0] * r[1];
+  real t132 = Rc[4] * r[0] - Rc[1] * r[1];
+  real t137 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    S_rf[5 * n + k] += Rc[6] * U[3 * n + k] + Rc[7] * U[4 * n + k] + Rc[8] * U[5 * n + k] + (U[k] *
+      t128 + U[n + k] * t132 + U[2 * n + k] * t137);
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      S_ff[n * k + l] += H[k] * U[l] + H[n + k] * U[n + l] + H[2 * n + k] * U[2 * n + l] + H[3 * n +
+        k] * U[3 * n + l] + H[4 * n + k] * U[4 * n + l] + H[5 * n + k] * U[5 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        const real t11 = S[1] * H[k];
-        const real t12 = S[6] * H[n + k];
-        const real t13 = t11 + t12;
-        const real t14 = S[7] * H[2 * n + k];
-        const real t15 = t13 + t14;
-        const real t16 = S[8] * H[3 * n + k];
-        const real t17 = t15 + t16;
-        const real t18 = S[9] * H[4 * n + k];
-        const real t19 = t17 + t18;
-        const real t20 = S[10] * H[5 * n + k];
-        const real t21 = t19 + t20;
-        U[n + k] = t21;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t22 = S[2] * H[k];
-        const real t23 = S[7] * H[n + k];
-        const real t24 = t22 + t23;
-        const real t25 = S[11] * H[2 * n + k];
-        const real t26 = t24 + t25;
-        const real t27 = S[12] * H[3 * n + k];
-        const real t28 = t26 + t27;
-        const real t29 = S[13] * H[4 * n + k];
-        const real t30 = t28 + t29;
-        const real t31 = S[14] * H[5 * n + k];
-        const real t32 = t30 + t31;
-        U[2 * n + k] = t32;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t33 = S[3] * H[k];
-        const real t34 = S[8] * H[n + k];
-        const real t35 = t33 + t34;
-        const real t36 = S[12] * H[2 * n + k];
-        const real t37 = t35 + t36;
-        const real t38 = S[15] * H[3 * n + k];
-        const real t39 = t37 + t38;
-        const real t40 = S[16] * H[4 * n + k];
-        const real t41 = t39 + t40;
-        const real t42 = S[17] * H[5 * n + k];
-        const real t43 = t41 + t42;
-        U[3 * n + k] = t43;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t44 = S[4] * H[k];
-        const real t45 = S[9] * H[n + k];
-        const real t46 = t44 + t45;
-        const real t47 = S[13] * H[2 * n + k];
-        const real t48 = t46 + t47;
-        const real t49 = S[16] * H[3 * n + k];
-        const real t50 = t48 + t49;
-        const real t51 = S[18] * H[4 * n + k];
-        const real t52 = t50 + t51;
-        const real t53 = S[19] * H[5 * n + k];
-        const real t54 = t52 + t53;
-        U[4 * n + k] = t54;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t55 = S[5] * H[k];
-        const real t56 = S[10] * H[n + k];
-        const real t57 = t55 + t56;
-        const real t58 = S[14] * H[2 * n + k];
-        const real t59 = t57 + t58;
-        const real t60 = S[17] * H[3 * n + k];
-        const real t61 = t59 + t60;
-        const real t62 = S[19] * H[4 * n + k];
-        const real t63 = t61 + t62;
-        const real t64 = S[20] * H[5 * n + k];
-        const real t65 = t63 + t64;
-        U[5 * n + k] = t65;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t66 = Rc[0] * U[k];
-        const real t67 = Rc[1] * U[n + k];
-        const real t68 = t66 + t67;
-        const real t69 = Rc[2] * U[2 * n + k];
-        const real t70 = t68 + t69;
-        S_rf[k] += t70;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t71 = Rc[3] * U[k];
-        const real t72 = Rc[4] * U[n + k];
-        const real t73 = t71 + t72;
-        const real t74 = Rc[5] * U[2 * n + k];
-        const real t75 = t73 + t74;
-        S_rf[n + k] += t75;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t76 = Rc[6] * U[k];
-        const real t77 = Rc[7] * U[n + k];
-        const real t78 = t76 + t77;
-        const real t79 = Rc[8] * U[2 * n + k];
-        const real t80 = t78 + t79;
-        S_rf[2 * n + k] += t80;
-    }
-    const real t86 = Rc[6] * r[1];
-    const real t87 = Rc[3] * r[2];
-    const real t88 = t86 - t87;
-    const real t90 = Rc[7] * r[1];
-    const real t91 = Rc[4] * r[2];
-    const real t92 = t90 - t91;
-    const real t95 = Rc[8] * r[1];
-    const real t96 = Rc[5] * r[2];
-    const real t97 = t95 - t96;
-    for (int k = 0; k < n; ++k) {
-        const real t81 = Rc[0] * U[3 * n + k];
-        const real t82 = Rc[1] * U[4 * n + k];
-        const real t83 = t81 + t82;
-        const real t84 = Rc[2] * U[5 * n + k];
-        const real t85 = t83 + t84;
-        const real t89 = U[k] * t88;
-        const real t93 = U[n + k] * t92;
-        const real t94 = t89 + t93;
-        const real t98 = U[2 * n + k] * t97;
-        const real t99 = t94 + t98;
-        const real t100 = t85 + t99;
-        S_rf[3 * n + k] += t100;
-    }
-    const real t106 = Rc[0] * r[2];
-    const real t107 = Rc[6] * r[0];
-    const real t108 = t106 - t107;
-    const real t110 = Rc[1] * r[2];
-    const real t111 = Rc[7] * r[0];
-    const real t112 = t110 - t111;
-    const real t115 = Rc[2] * r[2];
-    const real t116 = Rc[8] * r[0];
-    const real t117 = t115 - t116;
-    for (int k = 0; k < n; ++k) {
-        const real t101 = Rc[3] * U[3 * n + k];
-        const real t102 = Rc[4] * U[4 * n + k];
-        const real t103 = t101 + t102;
-        const real t104 = Rc[5] * U[5 * n + k];
-        const real t105 = t103 + t104;
-        const real t109 = U[k] * t108;
-        const real t113 = U[n + k] * t112;
-        const real t114 = t109 + t113;
-        const real t118 = U[2 * n + k] * t117;
-        const real t119 = t114 + t118;
-        const real t120 = t105 + t119;
-        S_rf[4 * n + k] += t120;
-    }
-    const real t126 = Rc[3] * r[0];
-    const real t127 = Rc[0] * r[1];
-    const real t128 = t126 - t127;
-    const real t130 = Rc[4] * r[0];
-    const real t131 = Rc[1] * r[1];
-    const real t132 = t130 - t131;
-    const real t135 = Rc[5] * r[0];
-    const real t136 = Rc[2] * r[1];
-    const real t137 = t135 - t136;
-    for (int k = 0; k < n; ++k) {
-        const real t121 = Rc[6] * U[3 * n + k];
-        const real t122 = Rc[7] * U[4 * n + k];
-        const real t123 = t121 + t122;
-        const real t124 = Rc[8] * U[5 * n + k];
-        const real t125 = t123 + t124;
-        const real t129 = U[k] * t128;
-        const real t133 = U[n + k] * t132;
-        const real t134 = t129 + t133;
-        const real t138 = U[2 * n + k] * t137;
-        const real t139 = t134 + t138;
-        const real t140 = t125 + t139;
-        S_rf[5 * n + k] += t140;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t141 = H[k] * U[l];
-            const real t142 = H[n + k] * U[n + l];
-            const real t143 = t141 + t142;
-            const real t144 = H[2 * n + k] * U[2 * n + l];
-            const real t145 = t143 + t144;
-            const real t146 = H[3 * n + k] * U[3 * n + l];
-            const real t147 = t145 + t146;
-            const real t148 = H[4 * n + k] * U[4 * n + l];
-            const real t149 = t147 + t148;
-            const real t150 = H[5 * n + k] * U[5 * n + l];
-            const real t151 = t149 + t150;
-            S_ff[n * k + l] += t151;
-        }
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t152 = e[0] * H[k];
-        const real t153 = e[1] * H[n + k];
-        const real t154 = t152 + t153;
-        const real t155 = e[2] * H[2 * n + k];
-        const real t156 = t154 + t155;
-        const real t157 = e[3] * H[3 * n + k];
-        const real t158 = t156 + t157;
-        const real t159 = e[4] * H[4 * n + k];
-        const real t160 = t158 + t159;
-        const real t161 = e[5] * H[5 * n + k];
-        const real t162 = t160 + t161;
-        e_f[k] += t162;
-    }
-    return 0;
+  }
+  for (int k = 0; k < n; ++k) {
+    e_f[k] += e[0] * H[k] + e[1] * H[n + k] + e[2] * H[2 * n + k] + e[3] * H[3 * n + k] + e[4] * H[4
+      * n + k] + e[5] * H[5 * n + k];
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_assemble_port(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict S, const real *restrict e, real *restrict U,
-    real *restrict S_rf, real *restrict S_ff, real *restrict e_f)
+int mstmm_sweep_modal_assemble_port(int n, in_t Rc, in_t r, in_t H, in_t S, in_t e, out_t U,
+    out_t S_rf, out_t S_ff, out_t e_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_assemble_port_sized(1, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    case 2: return mstmm_sweep_modal_assemble_port_sized(2, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    case 3: return mstmm_sweep_modal_assemble_port_sized(3, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    case 4: return mstmm_sweep_modal_assemble_port_sized(4, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    default: return mstmm_sweep_modal_assemble_port_sized(n, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_assemble_port_sized(1, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+  case 2: return mstmm_sweep_modal_assemble_port_sized(2, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+  case 3: return mstmm_sweep_modal_assemble_port_sized(3, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+  case 4: return mstmm_sweep_modal_assemble_port_sized(4, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+  default: return mstmm_sweep_modal_assemble_port_sized(n, Rc, r, H, S, e, U, S_rf, S_ff, e_f);
+  }
 }
 
-static int mstmm_sweep_modal_assemble_port_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_assemble_port(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_modal_assemble_port_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 1},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_assemble_port_outputs[] = {
-    {"U", 6, "", 0, 1},
-    {"S_rf", 6, "", 1, 1},
-    {"S_ff", 1, "", 1, 2},
-    {"e_f", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_assemble_port, (n, in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3]))
 
 /* frame relative to the supported section
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3283,175 +1663,62 @@ static const mstmm_port mstmm_sweep_modal_assemble_port_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_rebase_sized(int n, const real *restrict H, const real *restrict S,
-    const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
-    real *restrict e_f)
+int mstmm_sweep_modal_rebase_sized(int n, in_t H, in_t S, in_t e, in_t S_rf, out_t S_rf_I,
+    out_t S_ff, out_t e_f)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S[0] * H[k];
-        const real t1 = S[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = S[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = S[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = S[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = S[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        const real t11 = t10 + S_rf[k];
-        S_rf_I[k] = t11;
+  for (int k = 0; k < n; ++k) {
+    S_rf_I[k] = S[0] * H[k] + S[1] * H[n + k] + S[2] * H[2 * n + k] + S[3] * H[3 * n + k] + S[4] *
+      H[4 * n + k] + S[5] * H[5 * n + k] + S_rf[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf_I[n + k] = S[1] * H[k] + S[6] * H[n + k] + S[7] * H[2 * n + k] + S[8] * H[3 * n + k] + S[9]
+      * H[4 * n + k] + S[10] * H[5 * n + k] + S_rf[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf_I[2 * n + k] = S[2] * H[k] + S[7] * H[n + k] + S[11] * H[2 * n + k] + S[12] * H[3 * n + k]
+      + S[13] * H[4 * n + k] + S[14] * H[5 * n + k] + S_rf[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf_I[3 * n + k] = S[3] * H[k] + S[8] * H[n + k] + S[12] * H[2 * n + k] + S[15] * H[3 * n + k]
+      + S[16] * H[4 * n + k] + S[17] * H[5 * n + k] + S_rf[3 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf_I[4 * n + k] = S[4] * H[k] + S[9] * H[n + k] + S[13] * H[2 * n + k] + S[16] * H[3 * n + k]
+      + S[18] * H[4 * n + k] + S[19] * H[5 * n + k] + S_rf[4 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf_I[5 * n + k] = S[5] * H[k] + S[10] * H[n + k] + S[14] * H[2 * n + k] + S[17] * H[3 * n + k]
+      + S[19] * H[4 * n + k] + S[20] * H[5 * n + k] + S_rf[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      S_ff[n * k + l] += H[k] * S_rf_I[l] + H[n + k] * S_rf_I[n + l] + H[2 * n + k] * S_rf_I[2 * n +
+        l] + H[3 * n + k] * S_rf_I[3 * n + l] + H[4 * n + k] * S_rf_I[4 * n + l] + H[5 * n + k] *
+        S_rf_I[5 * n + l] + (S_rf[k] * H[l] + S_rf[n + k] * H[n + l] + S_rf[2 * n + k] * H[2 * n +
+        l] + S_rf[3 * n + k] * H[3 * n + l] + S_rf[4 * n + k] * H[4 * n + l] + S_rf[5 * n + k] * H[5
+        * n + l]);
     }
-    for (int k = 0; k < n; ++k) {
-        const real t12 = S[1] * H[k];
-        const real t13 = S[6] * H[n + k];
-        const real t14 = t12 + t13;
-        const real t15 = S[7] * H[2 * n + k];
-        const real t16 = t14 + t15;
-        const real t17 = S[8] * H[3 * n + k];
-        const real t18 = t16 + t17;
-        const real t19 = S[9] * H[4 * n + k];
-        const real t20 = t18 + t19;
-        const real t21 = S[10] * H[5 * n + k];
-        const real t22 = t20 + t21;
-        const real t23 = t22 + S_rf[n + k];
-        S_rf_I[n + k] = t23;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t24 = S[2] * H[k];
-        const real t25 = S[7] * H[n + k];
-        const real t26 = t24 + t25;
-        const real t27 = S[11] * H[2 * n + k];
-        const real t28 = t26 + t27;
-        const real t29 = S[12] * H[3 * n + k];
-        const real t30 = t28 + t29;
-        const real t31 = S[13] * H[4 * n + k];
-        const real t32 = t30 + t31;
-        const real t33 = S[14] * H[5 * n + k];
-        const real t34 = t32 + t33;
-        const real t35 = t34 + S_rf[2 * n + k];
-        S_rf_I[2 * n + k] = t35;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t36 = S[3] * H[k];
-        const real t37 = S[8] * H[n + k];
-        const real t38 = t36 + t37;
-        const real t39 = S[12] * H[2 * n + k];
-        const real t40 = t38 + t39;
-        const real t41 = S[15] * H[3 * n + k];
-        const real t42 = t40 + t41;
-        const real t43 = S[16] * H[4 * n + k];
-        const real t44 = t42 + t43;
-        const real t45 = S[17] * H[5 * n + k];
-        const real t46 = t44 + t45;
-        const real t47 = t46 + S_rf[3 * n + k];
-        S_rf_I[3 * n + k] = t47;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t48 = S[4] * H[k];
-        const real t49 = S[9] * H[n + k];
-        const real t50 = t48 + t49;
-        const real t51 = S[13] * H[2 * n + k];
-        const real t52 = t50 + t51;
-        const real t53 = S[16] * H[3 * n + k];
-        const real t54 = t52 + t53;
-        const real t55 = S[18] * H[4 * n + k];
-        const real t56 = t54 + t55;
-        const real t57 = S[19] * H[5 * n + k];
-        const real t58 = t56 + t57;
-        const real t59 = t58 + S_rf[4 * n + k];
-        S_rf_I[4 * n + k] = t59;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t60 = S[5] * H[k];
-        const real t61 = S[10] * H[n + k];
-        const real t62 = t60 + t61;
-        const real t63 = S[14] * H[2 * n + k];
-        const real t64 = t62 + t63;
-        const real t65 = S[17] * H[3 * n + k];
-        const real t66 = t64 + t65;
-        const real t67 = S[19] * H[4 * n + k];
-        const real t68 = t66 + t67;
-        const real t69 = S[20] * H[5 * n + k];
-        const real t70 = t68 + t69;
-        const real t71 = t70 + S_rf[5 * n + k];
-        S_rf_I[5 * n + k] = t71;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t72 = H[k] * S_rf_I[l];
-            const real t73 = H[n + k] * S_rf_I[n + l];
-            const real t74 = t72 + t73;
-            const real t75 = H[2 * n + k] * S_rf_I[2 * n + l];
-            const real t76 = t74 + t75;
-            const real t77 = H[3 * n + k] * S_rf_I[3 * n + l];
-            const real t78 = t76 + t77;
-            const real t79 = H[4 * n + k] * S_rf_I[4 * n + l];
-            const real t80 = t78 + t79;
-            const real t81 = H[5 * n + k] * S_rf_I[5 * n + l];
-            const real t82 = t80 + t81;
-            const real t83 = S_rf[k] * H[l];
-            const real t84 = S_rf[n + k] * H[n + l];
-            const real t85 = t83 + t84;
-            const real t86 = S_rf[2 * n + k] * H[2 * n + l];
-            const real t87 = t85 + t86;
-            const real t88 = S_rf[3 * n + k] * H[3 * n + l];
-            const real t89 = t87 + t88;
-            const real t90 = S_rf[4 * n + k] * H[4 * n + l];
-            const real t91 = t89 + t90;
-            const real t92 = S_rf[5 * n + k] * H[5 * n + l];
-            const real t93 = t91 + t92;
-            const real t94 = t82 + t93;
-            S_ff[n * k + l] += t94;
-        }
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t95 = e[0] * H[k];
-        const real t96 = e[1] * H[n + k];
-        const real t97 = t95 + t96;
-        const real t98 = e[2] * H[2 * n + k];
-        const real t99 = t97 + t98;
-        const real t100 = e[3] * H[3 * n + k];
-        const real t101 = t99 + t100;
-        const real t102 = e[4] * H[4 * n + k];
-        const real t103 = t101 + t102;
-        const real t104 = e[5] * H[5 * n + k];
-        const real t105 = t103 + t104;
-        e_f[k] += t105;
-    }
-    return 0;
+  }
+  for (int k = 0; k < n; ++k) {
+    e_f[k] += e[0] * H[k] + e[1] * H[n + k] + e[2] * H[2 * n + k] + e[3] * H[3 * n + k] + e[4] * H[4
+      * n + k] + e[5] * H[5 * n + k];
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_rebase(int n, const real *restrict H, const real *restrict S,
-    const real *restrict e, const real *restrict S_rf, real *restrict S_rf_I, real *restrict S_ff,
-    real *restrict e_f)
+int mstmm_sweep_modal_rebase(int n, in_t H, in_t S, in_t e, in_t S_rf, out_t S_rf_I, out_t S_ff,
+    out_t e_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_rebase_sized(1, H, S, e, S_rf, S_rf_I, S_ff, e_f);
-    case 2: return mstmm_sweep_modal_rebase_sized(2, H, S, e, S_rf, S_rf_I, S_ff, e_f);
-    case 3: return mstmm_sweep_modal_rebase_sized(3, H, S, e, S_rf, S_rf_I, S_ff, e_f);
-    case 4: return mstmm_sweep_modal_rebase_sized(4, H, S, e, S_rf, S_rf_I, S_ff, e_f);
-    default: return mstmm_sweep_modal_rebase_sized(n, H, S, e, S_rf, S_rf_I, S_ff, e_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_rebase_sized(1, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+  case 2: return mstmm_sweep_modal_rebase_sized(2, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+  case 3: return mstmm_sweep_modal_rebase_sized(3, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+  case 4: return mstmm_sweep_modal_rebase_sized(4, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+  default: return mstmm_sweep_modal_rebase_sized(n, H, S, e, S_rf, S_rf_I, S_ff, e_f);
+  }
 }
 
-static int mstmm_sweep_modal_rebase_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_rebase(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_modal_rebase_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"S_rf", 6, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_rebase_outputs[] = {
-    {"S_rf_I", 6, "", 0, 1},
-    {"S_ff", 1, "", 1, 2},
-    {"e_f", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_rebase, (n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]))
 
 /* modes of a flexible body condensed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3468,264 +1735,184 @@ static const mstmm_port mstmm_sweep_modal_rebase_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_condense_sized(int n, const real *restrict S, const real *restrict e,
-    const real *restrict S_rf, const real *restrict S_ff, const real *restrict e_f,
-    real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
-    real *restrict work)
+int mstmm_sweep_modal_condense_sized(int n, in_t S, in_t e, in_t S_rf, in_t S_ff, in_t e_f,
+    out_t right, out_t Gg, out_t S_c, out_t e_c, out_t work)
 {
-    for (int k = 0; k < n; ++k) {
-        right[7 * k] = S_rf[k];
-    }
-    for (int k = 0; k < n; ++k) {
-        right[7 * k + 1] = S_rf[n + k];
-    }
-    for (int k = 0; k < n; ++k) {
-        right[7 * k + 2] = S_rf[2 * n + k];
-    }
-    for (int k = 0; k < n; ++k) {
-        right[7 * k + 3] = S_rf[3 * n + k];
-    }
-    for (int k = 0; k < n; ++k) {
-        right[7 * k + 4] = S_rf[4 * n + k];
-    }
-    for (int k = 0; k < n; ++k) {
-        right[7 * k + 5] = S_rf[5 * n + k];
-    }
-    for (int k = 0; k < n; ++k) {
-        right[7 * k + 6] = e_f[k];
-    }
-    /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
-    if (mstmm_solve_ldl(n, 7, S_ff, right, Gg, work, 1e-13)) return 1;
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S_rf[k] * Gg[7 * k];
-        t1 += t0;
-    }
-    const real t2 = S[0] - t1;
-    S_c[0] = t2;
-    real t4 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t3 = S_rf[k] * Gg[7 * k + 1];
-        t4 += t3;
-    }
-    const real t5 = S[1] - t4;
-    S_c[1] = t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = S_rf[k] * Gg[7 * k + 2];
-        t7 += t6;
-    }
-    const real t8 = S[2] - t7;
-    S_c[2] = t8;
-    real t10 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t9 = S_rf[k] * Gg[7 * k + 3];
-        t10 += t9;
-    }
-    const real t11 = S[3] - t10;
-    S_c[3] = t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = S_rf[k] * Gg[7 * k + 4];
-        t13 += t12;
-    }
-    const real t14 = S[4] - t13;
-    S_c[4] = t14;
-    real t16 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = S_rf[k] * Gg[7 * k + 5];
-        t16 += t15;
-    }
-    const real t17 = S[5] - t16;
-    S_c[5] = t17;
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = S_rf[n + k] * Gg[7 * k + 1];
-        t19 += t18;
-    }
-    const real t20 = S[6] - t19;
-    S_c[6] = t20;
-    real t22 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t21 = S_rf[n + k] * Gg[7 * k + 2];
-        t22 += t21;
-    }
-    const real t23 = S[7] - t22;
-    S_c[7] = t23;
-    real t25 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t24 = S_rf[n + k] * Gg[7 * k + 3];
-        t25 += t24;
-    }
-    const real t26 = S[8] - t25;
-    S_c[8] = t26;
-    real t28 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t27 = S_rf[n + k] * Gg[7 * k + 4];
-        t28 += t27;
-    }
-    const real t29 = S[9] - t28;
-    S_c[9] = t29;
-    real t31 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t30 = S_rf[n + k] * Gg[7 * k + 5];
-        t31 += t30;
-    }
-    const real t32 = S[10] - t31;
-    S_c[10] = t32;
-    real t34 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t33 = S_rf[2 * n + k] * Gg[7 * k + 2];
-        t34 += t33;
-    }
-    const real t35 = S[11] - t34;
-    S_c[11] = t35;
-    real t37 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t36 = S_rf[2 * n + k] * Gg[7 * k + 3];
-        t37 += t36;
-    }
-    const real t38 = S[12] - t37;
-    S_c[12] = t38;
-    real t40 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t39 = S_rf[2 * n + k] * Gg[7 * k + 4];
-        t40 += t39;
-    }
-    const real t41 = S[13] - t40;
-    S_c[13] = t41;
-    real t43 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t42 = S_rf[2 * n + k] * Gg[7 * k + 5];
-        t43 += t42;
-    }
-    const real t44 = S[14] - t43;
-    S_c[14] = t44;
-    real t46 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t45 = S_rf[3 * n + k] * Gg[7 * k + 3];
-        t46 += t45;
-    }
-    const real t47 = S[15] - t46;
-    S_c[15] = t47;
-    real t49 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t48 = S_rf[3 * n + k] * Gg[7 * k + 4];
-        t49 += t48;
-    }
-    const real t50 = S[16] - t49;
-    S_c[16] = t50;
-    real t52 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t51 = S_rf[3 * n + k] * Gg[7 * k + 5];
-        t52 += t51;
-    }
-    const real t53 = S[17] - t52;
-    S_c[17] = t53;
-    real t55 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t54 = S_rf[4 * n + k] * Gg[7 * k + 4];
-        t55 += t54;
-    }
-    const real t56 = S[18] - t55;
-    S_c[18] = t56;
-    real t58 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t57 = S_rf[4 * n + k] * Gg[7 * k + 5];
-        t58 += t57;
-    }
-    const real t59 = S[19] - t58;
-    S_c[19] = t59;
-    real t61 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t60 = S_rf[5 * n + k] * Gg[7 * k + 5];
-        t61 += t60;
-    }
-    const real t62 = S[20] - t61;
-    S_c[20] = t62;
-    real t64 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t63 = S_rf[k] * Gg[7 * k + 6];
-        t64 += t63;
-    }
-    const real t65 = e[0] - t64;
-    e_c[0] = t65;
-    real t67 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t66 = S_rf[n + k] * Gg[7 * k + 6];
-        t67 += t66;
-    }
-    const real t68 = e[1] - t67;
-    e_c[1] = t68;
-    real t70 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t69 = S_rf[2 * n + k] * Gg[7 * k + 6];
-        t70 += t69;
-    }
-    const real t71 = e[2] - t70;
-    e_c[2] = t71;
-    real t73 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t72 = S_rf[3 * n + k] * Gg[7 * k + 6];
-        t73 += t72;
-    }
-    const real t74 = e[3] - t73;
-    e_c[3] = t74;
-    real t76 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t75 = S_rf[4 * n + k] * Gg[7 * k + 6];
-        t76 += t75;
-    }
-    const real t77 = e[4] - t76;
-    e_c[4] = t77;
-    real t79 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t78 = S_rf[5 * n + k] * Gg[7 * k + 6];
-        t79 += t78;
-    }
-    const real t80 = e[5] - t79;
-    e_c[5] = t80;
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    right[7 * k] = S_rf[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[7 * k + 1] = S_rf[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[7 * k + 2] = S_rf[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[7 * k + 3] = S_rf[3 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[7 * k + 4] = S_rf[4 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[7 * k + 5] = S_rf[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[7 * k + 6] = e_f[k];
+  }
+  /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
+  if (mstmm_solve_ldl(n, 7, S_ff, right, Gg, work, 1e-13)) return 1;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += S_rf[k] * Gg[7 * k];
+  }
+  S_c[0] = S[0] - t1;
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += S_rf[k] * Gg[7 * k + 1];
+  }
+  S_c[1] = S[1] - t4;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += S_rf[k] * Gg[7 * k + 2];
+  }
+  S_c[2] = S[2] - t7;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += S_rf[k] * Gg[7 * k + 3];
+  }
+  S_c[3] = S[3] - t10;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += S_rf[k] * Gg[7 * k + 4];
+  }
+  S_c[4] = S[4] - t13;
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += S_rf[k] * Gg[7 * k + 5];
+  }
+  S_c[5] = S[5] - t16;
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += S_rf[n + k] * Gg[7 * k + 1];
+  }
+  S_c[6] = S[6] - t19;
+  real t22 = 0;
+  for (int k = 0; k < n; ++k) {
+    t22 += S_rf[n + k] * Gg[7 * k + 2];
+  }
+  S_c[7] = S[7] - t22;
+  real t25 = 0;
+  for (int k = 0; k < n; ++k) {
+    t25 += S_rf[n + k] * Gg[7 * k + 3];
+  }
+  S_c[8] = S[8] - t25;
+  real t28 = 0;
+  for (int k = 0; k < n; ++k) {
+    t28 += S_rf[n + k] * Gg[7 * k + 4];
+  }
+  S_c[9] = S[9] - t28;
+  real t31 = 0;
+  for (int k = 0; k < n; ++k) {
+    t31 += S_rf[n + k] * Gg[7 * k + 5];
+  }
+  S_c[10] = S[10] - t31;
+  real t34 = 0;
+  for (int k = 0; k < n; ++k) {
+    t34 += S_rf[2 * n + k] * Gg[7 * k + 2];
+  }
+  S_c[11] = S[11] - t34;
+  real t37 = 0;
+  for (int k = 0; k < n; ++k) {
+    t37 += S_rf[2 * n + k] * Gg[7 * k + 3];
+  }
+  S_c[12] = S[12] - t37;
+  real t40 = 0;
+  for (int k = 0; k < n; ++k) {
+    t40 += S_rf[2 * n + k] * Gg[7 * k + 4];
+  }
+  S_c[13] = S[13] - t40;
+  real t43 = 0;
+  for (int k = 0; k < n; ++k) {
+    t43 += S_rf[2 * n + k] * Gg[7 * k + 5];
+  }
+  S_c[14] = S[14] - t43;
+  real t46 = 0;
+  for (int k = 0; k < n; ++k) {
+    t46 += S_rf[3 * n + k] * Gg[7 * k + 3];
+  }
+  S_c[15] = S[15] - t46;
+  real t49 = 0;
+  for (int k = 0; k < n; ++k) {
+    t49 += S_rf[3 * n + k] * Gg[7 * k + 4];
+  }
+  S_c[16] = S[16] - t49;
+  real t52 = 0;
+  for (int k = 0; k < n; ++k) {
+    t52 += S_rf[3 * n + k] * Gg[7 * k + 5];
+  }
+  S_c[17] = S[17] - t52;
+  real t55 = 0;
+  for (int k = 0; k < n; ++k) {
+    t55 += S_rf[4 * n + k] * Gg[7 * k + 4];
+  }
+  S_c[18] = S[18] - t55;
+  real t58 = 0;
+  for (int k = 0; k < n; ++k) {
+    t58 += S_rf[4 * n + k] * Gg[7 * k + 5];
+  }
+  S_c[19] = S[19] - t58;
+  real t61 = 0;
+  for (int k = 0; k < n; ++k) {
+    t61 += S_rf[5 * n + k] * Gg[7 * k + 5];
+  }
+  S_c[20] = S[20] - t61;
+  real t64 = 0;
+  for (int k = 0; k < n; ++k) {
+    t64 += S_rf[k] * Gg[7 * k + 6];
+  }
+  e_c[0] = e[0] - t64;
+  real t67 = 0;
+  for (int k = 0; k < n; ++k) {
+    t67 += S_rf[n + k] * Gg[7 * k + 6];
+  }
+  e_c[1] = e[1] - t67;
+  real t70 = 0;
+  for (int k = 0; k < n; ++k) {
+    t70 += S_rf[2 * n + k] * Gg[7 * k + 6];
+  }
+  e_c[2] = e[2] - t70;
+  real t73 = 0;
+  for (int k = 0; k < n; ++k) {
+    t73 += S_rf[3 * n + k] * Gg[7 * k + 6];
+  }
+  e_c[3] = e[3] - t73;
+  real t76 = 0;
+  for (int k = 0; k < n; ++k) {
+    t76 += S_rf[4 * n + k] * Gg[7 * k + 6];
+  }
+  e_c[4] = e[4] - t76;
+  real t79 = 0;
+  for (int k = 0; k < n; ++k) {
+    t79 += S_rf[5 * n + k] * Gg[7 * k + 6];
+  }
+  e_c[5] = e[5] - t79;
+  return 0;
 }
 
-int mstmm_sweep_modal_condense(int n, const real *restrict S, const real *restrict e,
-    const real *restrict S_rf, const real *restrict S_ff, const real *restrict e_f,
-    real *restrict right, real *restrict Gg, real *restrict S_c, real *restrict e_c,
-    real *restrict work)
+int mstmm_sweep_modal_condense(int n, in_t S, in_t e, in_t S_rf, in_t S_ff, in_t e_f, out_t right,
+    out_t Gg, out_t S_c, out_t e_c, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_condense_sized(1, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
-    case 2: return mstmm_sweep_modal_condense_sized(2, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
-    case 3: return mstmm_sweep_modal_condense_sized(3, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
-    case 4: return mstmm_sweep_modal_condense_sized(4, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
-    default: return mstmm_sweep_modal_condense_sized(n, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_condense_sized(1, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+  case 2: return mstmm_sweep_modal_condense_sized(2, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+  case 3: return mstmm_sweep_modal_condense_sized(3, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+  case 4: return mstmm_sweep_modal_condense_sized(4, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+  default: return mstmm_sweep_modal_condense_sized(n, S, e, S_rf, S_ff, e_f, right, Gg, S_c, e_c, work);
+  }
 }
 
-static int mstmm_sweep_modal_condense_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_condense(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3], out[4]);
-}
-
-static const mstmm_port mstmm_sweep_modal_condense_inputs[] = {
-    {"S", 21, "", 0, 0},
-    {"e", 6, "N, N*m", 0, 0},
-    {"S_rf", 6, "", 0, 1},
-    {"S_ff", 1, "", 0, 2},
-    {"e_f", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_condense_outputs[] = {
-    {"right", 7, "", 0, 1},
-    {"Gg", 7, "", 0, 1},
-    {"S_c", 21, "", 0, 0},
-    {"e_c", 6, "N, N*m", 0, 0},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_modal_condense_guards[] = {
-    {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_modal_condense, (n, in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3], out[4]))
 
 /* modal accelerations recovered
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3735,53 +1922,28 @@ static const mstmm_guard mstmm_sweep_modal_condense_guards[] = {
  * out etadd[n] modal accelerations
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_recover_sized(int n, const real *restrict Gg, const real *restrict delta_I,
-    real *restrict etadd)
+int mstmm_sweep_modal_recover_sized(int n, in_t Gg, in_t delta_I, out_t etadd)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = delta_I[0] * Gg[7 * k];
-        const real t1 = delta_I[1] * Gg[7 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = delta_I[2] * Gg[7 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = delta_I[3] * Gg[7 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = delta_I[4] * Gg[7 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = delta_I[5] * Gg[7 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = Gg[7 * k + 6] + t10;
-        const real t12 = -t11;
-        etadd[k] = t12;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    etadd[k] = -(Gg[7 * k + 6] + (delta_I[0] * Gg[7 * k] + delta_I[1] * Gg[7 * k + 1] + delta_I[2] *
+      Gg[7 * k + 2] + delta_I[3] * Gg[7 * k + 3] + delta_I[4] * Gg[7 * k + 4] + delta_I[5] * Gg[7 *
+      k + 5]));
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_recover(int n, const real *restrict Gg, const real *restrict delta_I,
-    real *restrict etadd)
+int mstmm_sweep_modal_recover(int n, in_t Gg, in_t delta_I, out_t etadd)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_recover_sized(1, Gg, delta_I, etadd);
-    case 2: return mstmm_sweep_modal_recover_sized(2, Gg, delta_I, etadd);
-    case 3: return mstmm_sweep_modal_recover_sized(3, Gg, delta_I, etadd);
-    case 4: return mstmm_sweep_modal_recover_sized(4, Gg, delta_I, etadd);
-    default: return mstmm_sweep_modal_recover_sized(n, Gg, delta_I, etadd);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_recover_sized(1, Gg, delta_I, etadd);
+  case 2: return mstmm_sweep_modal_recover_sized(2, Gg, delta_I, etadd);
+  case 3: return mstmm_sweep_modal_recover_sized(3, Gg, delta_I, etadd);
+  case 4: return mstmm_sweep_modal_recover_sized(4, Gg, delta_I, etadd);
+  default: return mstmm_sweep_modal_recover_sized(n, Gg, delta_I, etadd);
+  }
 }
 
-static int mstmm_sweep_modal_recover_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_recover(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_recover_inputs[] = {
-    {"Gg", 7, "", 0, 1},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_recover_outputs[] = {
-    {"etadd", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_recover, (n, in[0], in[1], out[0]))
 
 /* deviation with the modes' part
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3792,80 +1954,53 @@ static const mstmm_port mstmm_sweep_modal_recover_outputs[] = {
  * out delta[6] deviation of the body's acceleration, at P
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_port_deviation_sized(int n, const real *restrict H,
-    const real *restrict etadd, const real *restrict delta_I, real *restrict delta)
+int mstmm_sweep_modal_port_deviation_sized(int n, in_t H, in_t etadd, in_t delta_I, out_t delta)
 {
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = H[k] * etadd[k];
-        t1 += t0;
-    }
-    const real t2 = delta_I[0] + t1;
-    delta[0] = t2;
-    real t4 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t3 = etadd[k] * H[n + k];
-        t4 += t3;
-    }
-    const real t5 = delta_I[1] + t4;
-    delta[1] = t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = etadd[k] * H[2 * n + k];
-        t7 += t6;
-    }
-    const real t8 = delta_I[2] + t7;
-    delta[2] = t8;
-    real t10 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t9 = etadd[k] * H[3 * n + k];
-        t10 += t9;
-    }
-    const real t11 = delta_I[3] + t10;
-    delta[3] = t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = etadd[k] * H[4 * n + k];
-        t13 += t12;
-    }
-    const real t14 = delta_I[4] + t13;
-    delta[4] = t14;
-    real t16 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = etadd[k] * H[5 * n + k];
-        t16 += t15;
-    }
-    const real t17 = delta_I[5] + t16;
-    delta[5] = t17;
-    return 0;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += H[k] * etadd[k];
+  }
+  delta[0] = delta_I[0] + t1;
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += etadd[k] * H[n + k];
+  }
+  delta[1] = delta_I[1] + t4;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += etadd[k] * H[2 * n + k];
+  }
+  delta[2] = delta_I[2] + t7;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += etadd[k] * H[3 * n + k];
+  }
+  delta[3] = delta_I[3] + t10;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += etadd[k] * H[4 * n + k];
+  }
+  delta[4] = delta_I[4] + t13;
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += etadd[k] * H[5 * n + k];
+  }
+  delta[5] = delta_I[5] + t16;
+  return 0;
 }
 
-int mstmm_sweep_modal_port_deviation(int n, const real *restrict H, const real *restrict etadd,
-    const real *restrict delta_I, real *restrict delta)
+int mstmm_sweep_modal_port_deviation(int n, in_t H, in_t etadd, in_t delta_I, out_t delta)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_port_deviation_sized(1, H, etadd, delta_I, delta);
-    case 2: return mstmm_sweep_modal_port_deviation_sized(2, H, etadd, delta_I, delta);
-    case 3: return mstmm_sweep_modal_port_deviation_sized(3, H, etadd, delta_I, delta);
-    case 4: return mstmm_sweep_modal_port_deviation_sized(4, H, etadd, delta_I, delta);
-    default: return mstmm_sweep_modal_port_deviation_sized(n, H, etadd, delta_I, delta);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_port_deviation_sized(1, H, etadd, delta_I, delta);
+  case 2: return mstmm_sweep_modal_port_deviation_sized(2, H, etadd, delta_I, delta);
+  case 3: return mstmm_sweep_modal_port_deviation_sized(3, H, etadd, delta_I, delta);
+  case 4: return mstmm_sweep_modal_port_deviation_sized(4, H, etadd, delta_I, delta);
+  default: return mstmm_sweep_modal_port_deviation_sized(n, H, etadd, delta_I, delta);
+  }
 }
 
-static int mstmm_sweep_modal_port_deviation_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_port_deviation(n, in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_port_deviation_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"etadd", 1, "", 0, 1},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_port_deviation_outputs[] = {
-    {"delta", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_port_deviation, (n, in[0], in[1], in[2], out[0]))
 
 /* loads of prescribed modal accelerations
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3877,83 +2012,60 @@ static const mstmm_port mstmm_sweep_modal_port_deviation_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_prescribed_load_sized(int n, const real *restrict S_rf,
-    const real *restrict S_ff, const real *restrict s, real *restrict e, real *restrict e_f)
+int mstmm_sweep_modal_prescribed_load_sized(int n, in_t S_rf, in_t S_ff, in_t s, out_t e, out_t e_f)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = S_ff[n * k + l] * s[l];
-            t1 += t0;
-        }
-        e_f[k] += t1;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += S_ff[n * k + l] * s[l];
     }
-    real t3 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t2 = S_rf[k] * s[k];
-        t3 += t2;
-    }
-    e[0] += t3;
-    real t5 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t4 = s[k] * S_rf[n + k];
-        t5 += t4;
-    }
-    e[1] += t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = s[k] * S_rf[2 * n + k];
-        t7 += t6;
-    }
-    e[2] += t7;
-    real t9 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t8 = s[k] * S_rf[3 * n + k];
-        t9 += t8;
-    }
-    e[3] += t9;
-    real t11 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t10 = s[k] * S_rf[4 * n + k];
-        t11 += t10;
-    }
-    e[4] += t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = s[k] * S_rf[5 * n + k];
-        t13 += t12;
-    }
-    e[5] += t13;
-    return 0;
+    e_f[k] += t1;
+  }
+  real t3 = 0;
+  for (int k = 0; k < n; ++k) {
+    t3 += S_rf[k] * s[k];
+  }
+  e[0] += t3;
+  real t5 = 0;
+  for (int k = 0; k < n; ++k) {
+    t5 += s[k] * S_rf[n + k];
+  }
+  e[1] += t5;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += s[k] * S_rf[2 * n + k];
+  }
+  e[2] += t7;
+  real t9 = 0;
+  for (int k = 0; k < n; ++k) {
+    t9 += s[k] * S_rf[3 * n + k];
+  }
+  e[3] += t9;
+  real t11 = 0;
+  for (int k = 0; k < n; ++k) {
+    t11 += s[k] * S_rf[4 * n + k];
+  }
+  e[4] += t11;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += s[k] * S_rf[5 * n + k];
+  }
+  e[5] += t13;
+  return 0;
 }
 
-int mstmm_sweep_modal_prescribed_load(int n, const real *restrict S_rf, const real *restrict S_ff,
-    const real *restrict s, real *restrict e, real *restrict e_f)
+int mstmm_sweep_modal_prescribed_load(int n, in_t S_rf, in_t S_ff, in_t s, out_t e, out_t e_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_prescribed_load_sized(1, S_rf, S_ff, s, e, e_f);
-    case 2: return mstmm_sweep_modal_prescribed_load_sized(2, S_rf, S_ff, s, e, e_f);
-    case 3: return mstmm_sweep_modal_prescribed_load_sized(3, S_rf, S_ff, s, e, e_f);
-    case 4: return mstmm_sweep_modal_prescribed_load_sized(4, S_rf, S_ff, s, e, e_f);
-    default: return mstmm_sweep_modal_prescribed_load_sized(n, S_rf, S_ff, s, e, e_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_prescribed_load_sized(1, S_rf, S_ff, s, e, e_f);
+  case 2: return mstmm_sweep_modal_prescribed_load_sized(2, S_rf, S_ff, s, e, e_f);
+  case 3: return mstmm_sweep_modal_prescribed_load_sized(3, S_rf, S_ff, s, e, e_f);
+  case 4: return mstmm_sweep_modal_prescribed_load_sized(4, S_rf, S_ff, s, e, e_f);
+  default: return mstmm_sweep_modal_prescribed_load_sized(n, S_rf, S_ff, s, e, e_f);
+  }
 }
 
-static int mstmm_sweep_modal_prescribed_load_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_prescribed_load(n, in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_modal_prescribed_load_inputs[] = {
-    {"S_rf", 6, "", 0, 1},
-    {"S_ff", 1, "", 0, 2},
-    {"s", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_prescribed_load_outputs[] = {
-    {"e", 6, "N, N*m", 1, 0},
-    {"e_f", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_prescribed_load, (n, in[0], in[1], in[2], out[0], out[1]))
 
 /* efforts on the modes
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -3964,53 +2076,27 @@ static const mstmm_port mstmm_sweep_modal_prescribed_load_outputs[] = {
  * out tau[n] efforts on the modes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_modal_effort_sized(int n, const real *restrict H, const real *restrict e,
-    const real *restrict e_f, real *restrict tau)
+int mstmm_sweep_modal_modal_effort_sized(int n, in_t H, in_t e, in_t e_f, out_t tau)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = e[0] * H[k];
-        const real t1 = e[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = e[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = e[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = e[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = e[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        const real t11 = t10 + e_f[k];
-        tau[k] = t11;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    tau[k] = e[0] * H[k] + e[1] * H[n + k] + e[2] * H[2 * n + k] + e[3] * H[3 * n + k] + e[4] * H[4
+      * n + k] + e[5] * H[5 * n + k] + e_f[k];
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_modal_effort(int n, const real *restrict H, const real *restrict e,
-    const real *restrict e_f, real *restrict tau)
+int mstmm_sweep_modal_modal_effort(int n, in_t H, in_t e, in_t e_f, out_t tau)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_modal_effort_sized(1, H, e, e_f, tau);
-    case 2: return mstmm_sweep_modal_modal_effort_sized(2, H, e, e_f, tau);
-    case 3: return mstmm_sweep_modal_modal_effort_sized(3, H, e, e_f, tau);
-    case 4: return mstmm_sweep_modal_modal_effort_sized(4, H, e, e_f, tau);
-    default: return mstmm_sweep_modal_modal_effort_sized(n, H, e, e_f, tau);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_modal_effort_sized(1, H, e, e_f, tau);
+  case 2: return mstmm_sweep_modal_modal_effort_sized(2, H, e, e_f, tau);
+  case 3: return mstmm_sweep_modal_modal_effort_sized(3, H, e, e_f, tau);
+  case 4: return mstmm_sweep_modal_modal_effort_sized(4, H, e, e_f, tau);
+  default: return mstmm_sweep_modal_modal_effort_sized(n, H, e, e_f, tau);
+  }
 }
 
-static int mstmm_sweep_modal_modal_effort_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_modal_effort(n, in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_modal_effort_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_modal_effort_outputs[] = {
-    {"tau", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_modal_effort, (n, in[0], in[1], in[2], out[0]))
 
 /* load of a flexible body condensed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4021,80 +2107,53 @@ static const mstmm_port mstmm_sweep_modal_modal_effort_outputs[] = {
  * out e_c[6] (N, N*m) e without modes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_column_load_sized(int n, const real *restrict Gg, const real *restrict e,
-    const real *restrict e_f, real *restrict e_c)
+int mstmm_sweep_modal_column_load_sized(int n, in_t Gg, in_t e, in_t e_f, out_t e_c)
 {
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = Gg[7 * k] * e_f[k];
-        t1 += t0;
-    }
-    const real t2 = e[0] - t1;
-    e_c[0] = t2;
-    real t4 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t3 = e_f[k] * Gg[7 * k + 1];
-        t4 += t3;
-    }
-    const real t5 = e[1] - t4;
-    e_c[1] = t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = e_f[k] * Gg[7 * k + 2];
-        t7 += t6;
-    }
-    const real t8 = e[2] - t7;
-    e_c[2] = t8;
-    real t10 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t9 = e_f[k] * Gg[7 * k + 3];
-        t10 += t9;
-    }
-    const real t11 = e[3] - t10;
-    e_c[3] = t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = e_f[k] * Gg[7 * k + 4];
-        t13 += t12;
-    }
-    const real t14 = e[4] - t13;
-    e_c[4] = t14;
-    real t16 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = e_f[k] * Gg[7 * k + 5];
-        t16 += t15;
-    }
-    const real t17 = e[5] - t16;
-    e_c[5] = t17;
-    return 0;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += Gg[7 * k] * e_f[k];
+  }
+  e_c[0] = e[0] - t1;
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += e_f[k] * Gg[7 * k + 1];
+  }
+  e_c[1] = e[1] - t4;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += e_f[k] * Gg[7 * k + 2];
+  }
+  e_c[2] = e[2] - t7;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += e_f[k] * Gg[7 * k + 3];
+  }
+  e_c[3] = e[3] - t10;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += e_f[k] * Gg[7 * k + 4];
+  }
+  e_c[4] = e[4] - t13;
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += e_f[k] * Gg[7 * k + 5];
+  }
+  e_c[5] = e[5] - t16;
+  return 0;
 }
 
-int mstmm_sweep_modal_column_load(int n, const real *restrict Gg, const real *restrict e,
-    const real *restrict e_f, real *restrict e_c)
+int mstmm_sweep_modal_column_load(int n, in_t Gg, in_t e, in_t e_f, out_t e_c)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_column_load_sized(1, Gg, e, e_f, e_c);
-    case 2: return mstmm_sweep_modal_column_load_sized(2, Gg, e, e_f, e_c);
-    case 3: return mstmm_sweep_modal_column_load_sized(3, Gg, e, e_f, e_c);
-    case 4: return mstmm_sweep_modal_column_load_sized(4, Gg, e, e_f, e_c);
-    default: return mstmm_sweep_modal_column_load_sized(n, Gg, e, e_f, e_c);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_column_load_sized(1, Gg, e, e_f, e_c);
+  case 2: return mstmm_sweep_modal_column_load_sized(2, Gg, e, e_f, e_c);
+  case 3: return mstmm_sweep_modal_column_load_sized(3, Gg, e, e_f, e_c);
+  case 4: return mstmm_sweep_modal_column_load_sized(4, Gg, e, e_f, e_c);
+  default: return mstmm_sweep_modal_column_load_sized(n, Gg, e, e_f, e_c);
+  }
 }
 
-static int mstmm_sweep_modal_column_load_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_column_load(n, in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_column_load_inputs[] = {
-    {"Gg", 7, "", 0, 1},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_column_load_outputs[] = {
-    {"e_c", 6, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_column_load, (n, in[0], in[1], in[2], out[0]))
 
 /* modal accelerations due to a load
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4108,65 +2167,32 @@ static const mstmm_port mstmm_sweep_modal_column_load_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_column_acceleration_sized(int n, const real *restrict S_ff,
-    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
-    real *restrict y, real *restrict etadd, real *restrict work)
+int mstmm_sweep_modal_column_acceleration_sized(int n, in_t S_ff, in_t e_f, in_t Gg, in_t delta_I,
+    out_t y, out_t etadd, out_t work)
 {
-    /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
-    if (mstmm_solve_ldl(n, 1, S_ff, e_f, y, work, 1e-13)) return 1;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = delta_I[0] * Gg[7 * k];
-        const real t1 = delta_I[1] * Gg[7 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = delta_I[2] * Gg[7 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = delta_I[3] * Gg[7 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = delta_I[4] * Gg[7 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = delta_I[5] * Gg[7 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = y[k] + t10;
-        const real t12 = -t11;
-        etadd[k] = t12;
-    }
-    return 0;
+  /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
+  if (mstmm_solve_ldl(n, 1, S_ff, e_f, y, work, 1e-13)) return 1;
+  for (int k = 0; k < n; ++k) {
+    etadd[k] = -(y[k] + (delta_I[0] * Gg[7 * k] + delta_I[1] * Gg[7 * k + 1] + delta_I[2] * Gg[7 * k
+      + 2] + delta_I[3] * Gg[7 * k + 3] + delta_I[4] * Gg[7 * k + 4] + delta_I[5] * Gg[7 * k + 5]));
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_column_acceleration(int n, const real *restrict S_ff,
-    const real *restrict e_f, const real *restrict Gg, const real *restrict delta_I,
-    real *restrict y, real *restrict etadd, real *restrict work)
+int mstmm_sweep_modal_column_acceleration(int n, in_t S_ff, in_t e_f, in_t Gg, in_t delta_I,
+    out_t y, out_t etadd, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_column_acceleration_sized(1, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    case 2: return mstmm_sweep_modal_column_acceleration_sized(2, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    case 3: return mstmm_sweep_modal_column_acceleration_sized(3, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    case 4: return mstmm_sweep_modal_column_acceleration_sized(4, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    default: return mstmm_sweep_modal_column_acceleration_sized(n, S_ff, e_f, Gg, delta_I, y, etadd, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_column_acceleration_sized(1, S_ff, e_f, Gg, delta_I, y, etadd, work);
+  case 2: return mstmm_sweep_modal_column_acceleration_sized(2, S_ff, e_f, Gg, delta_I, y, etadd, work);
+  case 3: return mstmm_sweep_modal_column_acceleration_sized(3, S_ff, e_f, Gg, delta_I, y, etadd, work);
+  case 4: return mstmm_sweep_modal_column_acceleration_sized(4, S_ff, e_f, Gg, delta_I, y, etadd, work);
+  default: return mstmm_sweep_modal_column_acceleration_sized(n, S_ff, e_f, Gg, delta_I, y, etadd, work);
+  }
 }
 
-static int mstmm_sweep_modal_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_column_acceleration(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_modal_column_acceleration_inputs[] = {
-    {"S_ff", 1, "", 0, 2},
-    {"e_f", 1, "", 0, 1},
-    {"Gg", 7, "", 0, 1},
-    {"delta_I", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_column_acceleration_outputs[] = {
-    {"y", 1, "", 0, 1},
-    {"etadd", 1, "", 0, 1},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_modal_column_acceleration_guards[] = {
-    {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_modal_column_acceleration, (n, in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* modal rows within a step
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4178,48 +2204,29 @@ static const mstmm_guard mstmm_sweep_modal_column_acceleration_guards[] = {
  * out S_ff[n][n] rows and columns of the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_step_stiffness_sized(int n, const real *restrict K, const real *restrict D,
-    const real *restrict rate, const real *restrict sq, real *restrict S_ff)
+int mstmm_sweep_modal_step_stiffness_sized(int n, in_t K, in_t D, in_t rate, in_t sq, out_t S_ff)
 {
-    const real t1 = 1.0 / sq[0];
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t0 = rate[0] * D[n * k + l];
-            const real t2 = t1 * K[n * k + l];
-            const real t3 = t0 + t2;
-            S_ff[n * k + l] += t3;
-        }
+  real t1 = 1.0 / sq[0];
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      S_ff[n * k + l] += rate[0] * D[n * k + l] + t1 * K[n * k + l];
     }
-    return 0;
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_step_stiffness(int n, const real *restrict K, const real *restrict D,
-    const real *restrict rate, const real *restrict sq, real *restrict S_ff)
+int mstmm_sweep_modal_step_stiffness(int n, in_t K, in_t D, in_t rate, in_t sq, out_t S_ff)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_step_stiffness_sized(1, K, D, rate, sq, S_ff);
-    case 2: return mstmm_sweep_modal_step_stiffness_sized(2, K, D, rate, sq, S_ff);
-    case 3: return mstmm_sweep_modal_step_stiffness_sized(3, K, D, rate, sq, S_ff);
-    case 4: return mstmm_sweep_modal_step_stiffness_sized(4, K, D, rate, sq, S_ff);
-    default: return mstmm_sweep_modal_step_stiffness_sized(n, K, D, rate, sq, S_ff);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_step_stiffness_sized(1, K, D, rate, sq, S_ff);
+  case 2: return mstmm_sweep_modal_step_stiffness_sized(2, K, D, rate, sq, S_ff);
+  case 3: return mstmm_sweep_modal_step_stiffness_sized(3, K, D, rate, sq, S_ff);
+  case 4: return mstmm_sweep_modal_step_stiffness_sized(4, K, D, rate, sq, S_ff);
+  default: return mstmm_sweep_modal_step_stiffness_sized(n, K, D, rate, sq, S_ff);
+  }
 }
 
-static int mstmm_sweep_modal_step_stiffness_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_step_stiffness(n, in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_step_stiffness_inputs[] = {
-    {"K", 1, "", 0, 2},
-    {"D", 1, "", 0, 2},
-    {"rate", 1, "s", 0, 0},
-    {"sq", 1, "1/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_step_stiffness_outputs[] = {
-    {"S_ff", 1, "", 1, 2},
-};
+MSTMM_CALL(mstmm_sweep_modal_step_stiffness, (n, in[0], in[1], in[2], in[3], out[0]))
 
 /* load of a change of the modes
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4231,53 +2238,34 @@ static const mstmm_port mstmm_sweep_modal_step_stiffness_outputs[] = {
  * out e_f[n] load required by the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_strain_load_sized(int n, const real *restrict K, const real *restrict D,
-    const real *restrict eta, const real *restrict etad, real *restrict e_f)
+int mstmm_sweep_modal_strain_load_sized(int n, in_t K, in_t D, in_t eta, in_t etad, out_t e_f)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = D[n * k + l] * etad[l];
-            t1 += t0;
-        }
-        real t3 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t2 = K[n * k + l] * eta[l];
-            t3 += t2;
-        }
-        const real t4 = t1 + t3;
-        e_f[k] += t4;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += D[n * k + l] * etad[l];
     }
-    return 0;
-}
-
-int mstmm_sweep_modal_strain_load(int n, const real *restrict K, const real *restrict D,
-    const real *restrict eta, const real *restrict etad, real *restrict e_f)
-{
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_strain_load_sized(1, K, D, eta, etad, e_f);
-    case 2: return mstmm_sweep_modal_strain_load_sized(2, K, D, eta, etad, e_f);
-    case 3: return mstmm_sweep_modal_strain_load_sized(3, K, D, eta, etad, e_f);
-    case 4: return mstmm_sweep_modal_strain_load_sized(4, K, D, eta, etad, e_f);
-    default: return mstmm_sweep_modal_strain_load_sized(n, K, D, eta, etad, e_f);
+    real t3 = 0;
+    for (int l = 0; l < n; ++l) {
+      t3 += K[n * k + l] * eta[l];
     }
+    e_f[k] += t1 + t3;
+  }
+  return 0;
 }
 
-static int mstmm_sweep_modal_strain_load_call(int n, const real *const *in, real *const *out)
+int mstmm_sweep_modal_strain_load(int n, in_t K, in_t D, in_t eta, in_t etad, out_t e_f)
 {
-    return mstmm_sweep_modal_strain_load(n, in[0], in[1], in[2], in[3], out[0]);
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_strain_load_sized(1, K, D, eta, etad, e_f);
+  case 2: return mstmm_sweep_modal_strain_load_sized(2, K, D, eta, etad, e_f);
+  case 3: return mstmm_sweep_modal_strain_load_sized(3, K, D, eta, etad, e_f);
+  case 4: return mstmm_sweep_modal_strain_load_sized(4, K, D, eta, etad, e_f);
+  default: return mstmm_sweep_modal_strain_load_sized(n, K, D, eta, etad, e_f);
+  }
 }
 
-static const mstmm_port mstmm_sweep_modal_strain_load_inputs[] = {
-    {"K", 1, "", 0, 2},
-    {"D", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_strain_load_outputs[] = {
-    {"e_f", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_strain_load, (n, in[0], in[1], in[2], in[3], out[0]))
 
 /* row on the modes
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4286,51 +2274,27 @@ static const mstmm_port mstmm_sweep_modal_strain_load_outputs[] = {
  * out K_f[n] column of the row on the modes, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_modal_column_sized(int n, const real *restrict H, const real *restrict K,
-    real *restrict K_f)
+int mstmm_sweep_modal_modal_column_sized(int n, in_t H, in_t K, out_t K_f)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = K[0] * H[k];
-        const real t1 = K[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = K[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = K[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = K[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = K[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        K_f[k] += t10;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    K_f[k] += K[0] * H[k] + K[1] * H[n + k] + K[2] * H[2 * n + k] + K[3] * H[3 * n + k] + K[4] * H[4
+      * n + k] + K[5] * H[5 * n + k];
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_modal_column(int n, const real *restrict H, const real *restrict K,
-    real *restrict K_f)
+int mstmm_sweep_modal_modal_column(int n, in_t H, in_t K, out_t K_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_modal_column_sized(1, H, K, K_f);
-    case 2: return mstmm_sweep_modal_modal_column_sized(2, H, K, K_f);
-    case 3: return mstmm_sweep_modal_modal_column_sized(3, H, K, K_f);
-    case 4: return mstmm_sweep_modal_modal_column_sized(4, H, K, K_f);
-    default: return mstmm_sweep_modal_modal_column_sized(n, H, K, K_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_modal_column_sized(1, H, K, K_f);
+  case 2: return mstmm_sweep_modal_modal_column_sized(2, H, K, K_f);
+  case 3: return mstmm_sweep_modal_modal_column_sized(3, H, K, K_f);
+  case 4: return mstmm_sweep_modal_modal_column_sized(4, H, K, K_f);
+  default: return mstmm_sweep_modal_modal_column_sized(n, H, K, K_f);
+  }
 }
 
-static int mstmm_sweep_modal_modal_column_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_modal_column(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_modal_column_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"K", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_modal_column_outputs[] = {
-    {"K_f", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_modal_column, (n, in[0], in[1], out[0]))
 
 /* row of a flexible body condensed
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4343,98 +2307,62 @@ static const mstmm_port mstmm_sweep_modal_modal_column_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_condense_row_sized(int n, const real *restrict S_ff, const real *restrict K_f,
-    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
-    real *restrict work)
+int mstmm_sweep_modal_condense_row_sized(int n, in_t S_ff, in_t K_f, in_t Gg, out_t Y, out_t K,
+    out_t l_, out_t work)
 {
-    /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
-    if (mstmm_solve_ldl(n, 1, S_ff, K_f, Y, work, 1e-13)) return 1;
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = Gg[7 * k] * K_f[k];
-        t1 += t0;
-    }
-    const real t2 = -t1;
-    K[0] += t2;
-    real t4 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t3 = K_f[k] * Gg[7 * k + 1];
-        t4 += t3;
-    }
-    const real t5 = -t4;
-    K[1] += t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = K_f[k] * Gg[7 * k + 2];
-        t7 += t6;
-    }
-    const real t8 = -t7;
-    K[2] += t8;
-    real t10 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t9 = K_f[k] * Gg[7 * k + 3];
-        t10 += t9;
-    }
-    const real t11 = -t10;
-    K[3] += t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = K_f[k] * Gg[7 * k + 4];
-        t13 += t12;
-    }
-    const real t14 = -t13;
-    K[4] += t14;
-    real t16 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = K_f[k] * Gg[7 * k + 5];
-        t16 += t15;
-    }
-    const real t17 = -t16;
-    K[5] += t17;
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = K_f[k] * Gg[7 * k + 6];
-        t19 += t18;
-    }
-    const real t20 = -t19;
-    l_[0] += t20;
-    return 0;
+  /* a pivot of S_ff vanishes: a motion of the modes is undetermined */
+  if (mstmm_solve_ldl(n, 1, S_ff, K_f, Y, work, 1e-13)) return 1;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += Gg[7 * k] * K_f[k];
+  }
+  K[0] += -t1;
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += K_f[k] * Gg[7 * k + 1];
+  }
+  K[1] += -t4;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += K_f[k] * Gg[7 * k + 2];
+  }
+  K[2] += -t7;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += K_f[k] * Gg[7 * k + 3];
+  }
+  K[3] += -t10;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += K_f[k] * Gg[7 * k + 4];
+  }
+  K[4] += -t13;
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += K_f[k] * Gg[7 * k + 5];
+  }
+  K[5] += -t16;
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += K_f[k] * Gg[7 * k + 6];
+  }
+  l_[0] += -t19;
+  return 0;
 }
 
-int mstmm_sweep_modal_condense_row(int n, const real *restrict S_ff, const real *restrict K_f,
-    const real *restrict Gg, real *restrict Y, real *restrict K, real *restrict l_,
-    real *restrict work)
+int mstmm_sweep_modal_condense_row(int n, in_t S_ff, in_t K_f, in_t Gg, out_t Y, out_t K, out_t l_,
+    out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_condense_row_sized(1, S_ff, K_f, Gg, Y, K, l_, work);
-    case 2: return mstmm_sweep_modal_condense_row_sized(2, S_ff, K_f, Gg, Y, K, l_, work);
-    case 3: return mstmm_sweep_modal_condense_row_sized(3, S_ff, K_f, Gg, Y, K, l_, work);
-    case 4: return mstmm_sweep_modal_condense_row_sized(4, S_ff, K_f, Gg, Y, K, l_, work);
-    default: return mstmm_sweep_modal_condense_row_sized(n, S_ff, K_f, Gg, Y, K, l_, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_condense_row_sized(1, S_ff, K_f, Gg, Y, K, l_, work);
+  case 2: return mstmm_sweep_modal_condense_row_sized(2, S_ff, K_f, Gg, Y, K, l_, work);
+  case 3: return mstmm_sweep_modal_condense_row_sized(3, S_ff, K_f, Gg, Y, K, l_, work);
+  case 4: return mstmm_sweep_modal_condense_row_sized(4, S_ff, K_f, Gg, Y, K, l_, work);
+  default: return mstmm_sweep_modal_condense_row_sized(n, S_ff, K_f, Gg, Y, K, l_, work);
+  }
 }
 
-static int mstmm_sweep_modal_condense_row_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_condense_row(n, in[0], in[1], in[2], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_modal_condense_row_inputs[] = {
-    {"S_ff", 1, "", 0, 2},
-    {"K_f", 1, "", 0, 1},
-    {"Gg", 7, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_condense_row_outputs[] = {
-    {"Y", 1, "", 0, 1},
-    {"K", 6, "", 1, 0},
-    {"l", 1, "", 1, 0},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_modal_condense_row_guards[] = {
-    {1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_modal_condense_row, (n, in[0], in[1], in[2], out[0], out[1], out[2], out[3]))
 
 /* rows coupled by modes
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4443,43 +2371,28 @@ static const mstmm_guard mstmm_sweep_modal_condense_row_guards[] = {
  * out L_ij[1] entry of L, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_row_coupling_sized(int n, const real *restrict K_f, const real *restrict Y,
-    real *restrict L_ij)
+int mstmm_sweep_modal_row_coupling_sized(int n, in_t K_f, in_t Y, out_t L_ij)
 {
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = K_f[k] * Y[k];
-        t1 += t0;
-    }
-    L_ij[0] += t1;
-    return 0;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += K_f[k] * Y[k];
+  }
+  L_ij[0] += t1;
+  return 0;
 }
 
-int mstmm_sweep_modal_row_coupling(int n, const real *restrict K_f, const real *restrict Y,
-    real *restrict L_ij)
+int mstmm_sweep_modal_row_coupling(int n, in_t K_f, in_t Y, out_t L_ij)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_row_coupling_sized(1, K_f, Y, L_ij);
-    case 2: return mstmm_sweep_modal_row_coupling_sized(2, K_f, Y, L_ij);
-    case 3: return mstmm_sweep_modal_row_coupling_sized(3, K_f, Y, L_ij);
-    case 4: return mstmm_sweep_modal_row_coupling_sized(4, K_f, Y, L_ij);
-    default: return mstmm_sweep_modal_row_coupling_sized(n, K_f, Y, L_ij);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_row_coupling_sized(1, K_f, Y, L_ij);
+  case 2: return mstmm_sweep_modal_row_coupling_sized(2, K_f, Y, L_ij);
+  case 3: return mstmm_sweep_modal_row_coupling_sized(3, K_f, Y, L_ij);
+  case 4: return mstmm_sweep_modal_row_coupling_sized(4, K_f, Y, L_ij);
+  default: return mstmm_sweep_modal_row_coupling_sized(n, K_f, Y, L_ij);
+  }
 }
 
-static int mstmm_sweep_modal_row_coupling_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_row_coupling(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_row_coupling_inputs[] = {
-    {"K_f", 1, "", 0, 1},
-    {"Y", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_row_coupling_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_row_coupling, (n, in[0], in[1], out[0]))
 
 /* modal accelerations by a multiplier
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -4488,42 +2401,26 @@ static const mstmm_port mstmm_sweep_modal_row_coupling_outputs[] = {
  * out etadd[n] modal accelerations, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_multiplier_acceleration_sized(int n, const real *restrict Y,
-    const real *restrict x, real *restrict etadd)
+int mstmm_sweep_modal_multiplier_acceleration_sized(int n, in_t Y, in_t x, out_t etadd)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = x[0] * Y[k];
-        const real t1 = -t0;
-        etadd[k] += t1;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    etadd[k] += -(x[0] * Y[k]);
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_multiplier_acceleration(int n, const real *restrict Y, const real *restrict x,
-    real *restrict etadd)
+int mstmm_sweep_modal_multiplier_acceleration(int n, in_t Y, in_t x, out_t etadd)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_multiplier_acceleration_sized(1, Y, x, etadd);
-    case 2: return mstmm_sweep_modal_multiplier_acceleration_sized(2, Y, x, etadd);
-    case 3: return mstmm_sweep_modal_multiplier_acceleration_sized(3, Y, x, etadd);
-    case 4: return mstmm_sweep_modal_multiplier_acceleration_sized(4, Y, x, etadd);
-    default: return mstmm_sweep_modal_multiplier_acceleration_sized(n, Y, x, etadd);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_multiplier_acceleration_sized(1, Y, x, etadd);
+  case 2: return mstmm_sweep_modal_multiplier_acceleration_sized(2, Y, x, etadd);
+  case 3: return mstmm_sweep_modal_multiplier_acceleration_sized(3, Y, x, etadd);
+  case 4: return mstmm_sweep_modal_multiplier_acceleration_sized(4, Y, x, etadd);
+  default: return mstmm_sweep_modal_multiplier_acceleration_sized(n, Y, x, etadd);
+  }
 }
 
-static int mstmm_sweep_modal_multiplier_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_multiplier_acceleration(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_multiplier_acceleration_inputs[] = {
-    {"Y", 1, "", 0, 1},
-    {"x", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_multiplier_acceleration_outputs[] = {
-    {"etadd", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_multiplier_acceleration, (n, in[0], in[1], out[0]))
 
 /* residual and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -4562,1176 +2459,658 @@ static const mstmm_port mstmm_sweep_modal_multiplier_acceleration_outputs[] = {
  * out d_e_f[n] derivative of e_f
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_residual_slope_sized(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict K, const real *restrict D, const real *restrict eta,
-    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
-    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
-    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
-    real *restrict d_e_f)
+int mstmm_sweep_modal_residual_slope_sized(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx,
+    in_t Z_xy, in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x,
+    in_t G_y, in_t G_z, in_t M, in_t K, in_t D, in_t eta, in_t etad, in_t motion, in_t S_rf, in_t A,
+    in_t d_eta, in_t d_etad, in_t d_motion, out_t d_S_rf, out_t d_A, out_t d_e, out_t d_e_f)
 {
-    (void)P;
-    (void)M;
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = G_x[n * l + k] * d_eta[l];
-            t1 += t0;
-        }
-        const real t2 = -t1;
-        d_S_rf[k] = t2;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t4 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t3 = G_y[n * l + k] * d_eta[l];
-            t4 += t3;
-        }
-        const real t5 = -t4;
-        d_S_rf[n + k] = t5;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = G_z[n * l + k] * d_eta[l];
-            t7 += t6;
-        }
-        const real t8 = -t7;
-        d_S_rf[2 * n + k] = t8;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t10 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t9 = Y_x[n * l + k] * d_eta[l];
-            t10 += t9;
-        }
-        d_S_rf[3 * n + k] = t10;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t12 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t11 = Y_y[n * l + k] * d_eta[l];
-            t12 += t11;
-        }
-        d_S_rf[4 * n + k] = t12;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t14 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t13 = Y_z[n * l + k] * d_eta[l];
-            t14 += t13;
-        }
-        d_S_rf[5 * n + k] = t14;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t16 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t15 = Z_xx[n * l + k] * d_eta[l];
-            t16 += t15;
-        }
-        d_A[k] = t16;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t18 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t17 = Z_xy[n * l + k] * d_eta[l];
-            t18 += t17;
-        }
-        d_A[n + k] = t18;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t20 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t19 = Z_xz[n * l + k] * d_eta[l];
-            t20 += t19;
-        }
-        d_A[2 * n + k] = t20;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t22 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t21 = Z_yy[n * l + k] * d_eta[l];
-            t22 += t21;
-        }
-        d_A[3 * n + k] = t22;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t24 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t23 = Z_yz[n * l + k] * d_eta[l];
-            t24 += t23;
-        }
-        d_A[4 * n + k] = t24;
-    }
-    for (int k = 0; k < n; ++k) {
-        real t26 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t25 = Z_zz[n * l + k] * d_eta[l];
-            t26 += t25;
-        }
-        d_A[5 * n + k] = t26;
-    }
-    real t28 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t27 = S_rf[2 * n + k] * eta[k];
-        t28 += t27;
-    }
-    const real t29 = 0.5 * t28;
-    real t31 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t30 = C[2 * n + k] * eta[k];
-        t31 += t30;
-    }
-    const real t32 = 0.5 * t31;
-    const real t33 = t29 + t32;
-    const real t34 = t33 + p[3];
-    const real t35 = t34 * d_motion[4];
-    real t37 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t36 = C[2 * n + k] * d_eta[k];
-        t37 += t36;
-    }
-    const real t38 = 0.5 * t37;
-    real t42 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t39 = eta[k] * d_S_rf[2 * n + k];
-        const real t40 = S_rf[2 * n + k] * d_eta[k];
-        const real t41 = t39 + t40;
-        t42 += t41;
-    }
-    const real t43 = 0.5 * t42;
-    const real t44 = t38 + t43;
-    const real t45 = motion[4] * t44;
-    const real t46 = t35 + t45;
-    const real t47 = p[0] * d_motion[6];
-    const real t48 = t46 + t47;
-    real t50 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t49 = S_rf[n + k] * eta[k];
-        t50 += t49;
-    }
-    const real t51 = 0.5 * t50;
-    real t53 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t52 = C[n + k] * eta[k];
-        t53 += t52;
-    }
-    const real t54 = 0.5 * t53;
-    const real t55 = t51 + t54;
-    const real t56 = t55 + p[2];
-    const real t57 = t56 * d_motion[5];
-    real t59 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t58 = C[n + k] * d_eta[k];
-        t59 += t58;
-    }
-    const real t60 = 0.5 * t59;
-    real t64 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t61 = eta[k] * d_S_rf[n + k];
-        const real t62 = S_rf[n + k] * d_eta[k];
-        const real t63 = t61 + t62;
-        t64 += t63;
-    }
-    const real t65 = 0.5 * t64;
-    const real t66 = t60 + t65;
-    const real t67 = motion[5] * t66;
-    const real t68 = t57 + t67;
-    const real t69 = t48 - t68;
-    const real t70 = motion[0] * t56;
-    real t72 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t71 = S_rf[k] * eta[k];
-        t72 += t71;
-    }
-    const real t73 = 0.5 * t72;
-    real t75 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t74 = C[k] * eta[k];
-        t75 += t74;
-    }
-    const real t76 = 0.5 * t75;
-    const real t77 = t73 + t76;
-    const real t78 = t77 + p[1];
-    const real t79 = motion[1] * t78;
-    const real t80 = t70 - t79;
-    const real t81 = t80 * d_motion[1];
-    const real t82 = t56 * d_motion[0];
-    const real t83 = motion[0] * t66;
-    const real t84 = t82 + t83;
-    const real t85 = t78 * d_motion[1];
-    real t87 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t86 = C[k] * d_eta[k];
-        t87 += t86;
-    }
-    const real t88 = 0.5 * t87;
-    real t92 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t89 = eta[k] * d_S_rf[k];
-        const real t90 = S_rf[k] * d_eta[k];
-        const real t91 = t89 + t90;
-        t92 += t91;
-    }
-    const real t93 = 0.5 * t92;
-    const real t94 = t88 + t93;
-    const real t95 = motion[1] * t94;
-    const real t96 = t85 + t95;
-    const real t97 = t84 - t96;
-    const real t98 = motion[1] * t97;
-    const real t99 = t81 + t98;
-    const real t100 = motion[2] * t78;
-    const real t101 = motion[0] * t34;
-    const real t102 = t100 - t101;
-    const real t103 = t102 * d_motion[2];
-    const real t104 = t78 * d_motion[2];
-    const real t105 = motion[2] * t94;
-    const real t106 = t104 + t105;
-    const real t107 = t34 * d_motion[0];
-    const real t108 = motion[0] * t44;
-    const real t109 = t107 + t108;
-    const real t110 = t106 - t109;
-    const real t111 = motion[2] * t110;
-    const real t112 = t103 + t111;
-    const real t113 = t99 - t112;
-    real t115 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t114 = S_rf[n + k] * etad[k];
-        t115 += t114;
-    }
-    const real t116 = t115 * d_motion[2];
-    real t120 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t117 = etad[k] * d_S_rf[n + k];
-        const real t118 = S_rf[n + k] * d_etad[k];
-        const real t119 = t117 + t118;
-        t120 += t119;
-    }
-    const real t121 = motion[2] * t120;
-    const real t122 = t116 + t121;
-    const real t123 = 2.0 * t122;
-    const real t124 = t113 - t123;
-    real t126 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t125 = S_rf[2 * n + k] * etad[k];
-        t126 += t125;
-    }
-    const real t127 = t126 * d_motion[1];
-    real t131 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t128 = etad[k] * d_S_rf[2 * n + k];
-        const real t129 = S_rf[2 * n + k] * d_etad[k];
-        const real t130 = t128 + t129;
-        t131 += t130;
-    }
-    const real t132 = motion[1] * t131;
-    const real t133 = t127 + t132;
-    const real t134 = 2.0 * t133;
-    const real t135 = t124 + t134;
-    real t143 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t137 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t136 = etad[l] * G_x[n * k + l];
-            t137 += t136;
-        }
-        const real t138 = t137 * d_etad[k];
-        real t140 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t139 = G_x[n * k + l] * d_etad[l];
-            t140 += t139;
-        }
-        const real t141 = etad[k] * t140;
-        const real t142 = t138 + t141;
-        t143 += t142;
-    }
-    const real t144 = t135 - t143;
-    const real t145 = t69 + t144;
-    d_e[0] = t145;
-    const real t146 = t78 * d_motion[5];
-    const real t147 = motion[5] * t94;
-    const real t148 = t146 + t147;
-    const real t149 = p[0] * d_motion[7];
-    const real t150 = t34 * d_motion[3];
-    const real t151 = motion[3] * t44;
-    const real t152 = t150 + t151;
-    const real t153 = t149 - t152;
-    const real t154 = t148 + t153;
-    const real t155 = motion[1] * t34;
-    const real t156 = motion[2] * t56;
-    const real t157 = t155 - t156;
-    const real t158 = t157 * d_motion[2];
-    const real t159 = t34 * d_motion[1];
-    const real t160 = motion[1] * t44;
-    const real t161 = t159 + t160;
-    const real t162 = t56 * d_motion[2];
-    const real t163 = motion[2] * t66;
-    const real t164 = t162 + t163;
-    const real t165 = t161 - t164;
-    const real t166 = motion[2] * t165;
-    const real t167 = t158 + t166;
-    const real t168 = t80 * d_motion[0];
-    const real t169 = motion[0] * t97;
-    const real t170 = t168 + t169;
-    const real t171 = t167 - t170;
-    real t173 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t172 = S_rf[k] * etad[k];
-        t173 += t172;
-    }
-    const real t174 = t173 * d_motion[2];
-    real t178 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t175 = etad[k] * d_S_rf[k];
-        const real t176 = S_rf[k] * d_etad[k];
-        const real t177 = t175 + t176;
-        t178 += t177;
-    }
-    const real t179 = motion[2] * t178;
-    const real t180 = t174 + t179;
-    const real t181 = 2.0 * t180;
-    const real t182 = t171 + t181;
-    const real t183 = t126 * d_motion[0];
-    const real t184 = motion[0] * t131;
-    const real t185 = t183 + t184;
-    const real t186 = 2.0 * t185;
-    const real t187 = t182 - t186;
-    real t195 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t189 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t188 = etad[l] * G_y[n * k + l];
-            t189 += t188;
-        }
-        const real t190 = t189 * d_etad[k];
-        real t192 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t191 = G_y[n * k + l] * d_etad[l];
-            t192 += t191;
-        }
-        const real t193 = etad[k] * t192;
-        const real t194 = t190 + t193;
-        t195 += t194;
-    }
-    const real t196 = t187 - t195;
-    const real t197 = t154 + t196;
-    d_e[1] = t197;
-    const real t198 = t56 * d_motion[3];
-    const real t199 = motion[3] * t66;
-    const real t200 = t198 + t199;
-    const real t201 = p[0] * d_motion[8];
-    const real t202 = t200 + t201;
-    const real t203 = t78 * d_motion[4];
-    const real t204 = motion[4] * t94;
-    const real t205 = t203 + t204;
-    const real t206 = t202 - t205;
-    const real t207 = t102 * d_motion[0];
-    const real t208 = motion[0] * t110;
-    const real t209 = t207 + t208;
-    const real t210 = t157 * d_motion[1];
-    const real t211 = motion[1] * t165;
-    const real t212 = t210 + t211;
-    const real t213 = t209 - t212;
-    const real t214 = t173 * d_motion[1];
-    const real t215 = motion[1] * t178;
-    const real t216 = t214 + t215;
-    const real t217 = 2.0 * t216;
-    const real t218 = t213 - t217;
-    const real t219 = t115 * d_motion[0];
-    const real t220 = motion[0] * t120;
-    const real t221 = t219 + t220;
-    const real t222 = 2.0 * t221;
-    const real t223 = t218 + t222;
-    real t231 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t225 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t224 = etad[l] * G_z[n * k + l];
-            t225 += t224;
-        }
-        const real t226 = t225 * d_etad[k];
-        real t228 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t227 = G_z[n * k + l] * d_etad[l];
-            t228 += t227;
-        }
-        const real t229 = etad[k] * t228;
-        const real t230 = t226 + t229;
-        t231 += t230;
-    }
-    const real t232 = t223 - t231;
-    const real t233 = t206 + t232;
-    d_e[2] = t233;
-    real t235 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t234 = A[3 * n + k] * eta[k];
-        t235 += t234;
-    }
-    const real t236 = 0.5 * t235;
-    real t238 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t237 = B[3 * n + k] * eta[k];
-        t238 += t237;
-    }
-    const real t239 = 0.5 * t238;
-    const real t240 = t236 + t239;
-    const real t241 = t240 + p[7];
-    real t243 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t242 = A[5 * n + k] * eta[k];
-        t243 += t242;
-    }
-    const real t244 = 0.5 * t243;
-    real t246 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t245 = B[5 * n + k] * eta[k];
-        t246 += t245;
-    }
-    const real t247 = 0.5 * t246;
-    const real t248 = t244 + t247;
-    const real t249 = t248 + p[9];
-    const real t250 = t241 + t249;
-    const real t251 = t250 * d_motion[3];
-    real t253 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t252 = B[5 * n + k] * d_eta[k];
-        t253 += t252;
-    }
-    const real t254 = 0.5 * t253;
-    real t258 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t255 = eta[k] * d_A[5 * n + k];
-        const real t256 = A[5 * n + k] * d_eta[k];
-        const real t257 = t255 + t256;
-        t258 += t257;
-    }
-    const real t259 = 0.5 * t258;
-    const real t260 = t254 + t259;
-    real t262 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t261 = B[3 * n + k] * d_eta[k];
-        t262 += t261;
-    }
-    const real t263 = 0.5 * t262;
-    real t267 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t264 = eta[k] * d_A[3 * n + k];
-        const real t265 = A[3 * n + k] * d_eta[k];
-        const real t266 = t264 + t265;
-        t267 += t266;
-    }
-    const real t268 = 0.5 * t267;
-    const real t269 = t263 + t268;
-    const real t270 = t260 + t269;
-    const real t271 = motion[3] * t270;
-    const real t272 = t251 + t271;
-    const real t273 = t56 * d_motion[8];
-    const real t274 = motion[8] * t66;
-    const real t275 = t273 + t274;
-    const real t276 = t34 * d_motion[7];
-    const real t277 = motion[7] * t44;
-    const real t278 = t276 + t277;
-    const real t279 = t275 - t278;
-    const real t280 = t272 + t279;
-    real t282 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t281 = A[n + k] * eta[k];
-        t282 += t281;
-    }
-    const real t283 = 0.5 * t282;
-    real t285 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t284 = B[n + k] * eta[k];
-        t285 += t284;
-    }
-    const real t286 = 0.5 * t285;
-    const real t287 = t283 + t286;
-    const real t288 = t287 + p[5];
-    const real t289 = t288 * d_motion[4];
-    real t291 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t290 = B[n + k] * d_eta[k];
-        t291 += t290;
-    }
-    const real t292 = 0.5 * t291;
-    real t296 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t293 = eta[k] * d_A[n + k];
-        const real t294 = A[n + k] * d_eta[k];
-        const real t295 = t293 + t294;
-        t296 += t295;
-    }
-    const real t297 = 0.5 * t296;
-    const real t298 = t292 + t297;
-    const real t299 = motion[4] * t298;
-    const real t300 = t289 + t299;
-    const real t301 = t280 - t300;
-    real t303 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t302 = A[2 * n + k] * eta[k];
-        t303 += t302;
-    }
-    const real t304 = 0.5 * t303;
-    real t306 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t305 = B[2 * n + k] * eta[k];
-        t306 += t305;
-    }
-    const real t307 = 0.5 * t306;
-    const real t308 = t304 + t307;
-    const real t309 = t308 + p[6];
-    const real t310 = t309 * d_motion[5];
-    real t312 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t311 = B[2 * n + k] * d_eta[k];
-        t312 += t311;
-    }
-    const real t313 = 0.5 * t312;
-    real t317 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t314 = eta[k] * d_A[2 * n + k];
-        const real t315 = A[2 * n + k] * d_eta[k];
-        const real t316 = t314 + t315;
-        t317 += t316;
-    }
-    const real t318 = 0.5 * t317;
-    const real t319 = t313 + t318;
-    const real t320 = motion[5] * t319;
-    const real t321 = t310 + t320;
-    const real t322 = t301 - t321;
-    real t324 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t323 = S_rf[5 * n + k] * etad[k];
-        t324 += t323;
-    }
-    real t326 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t325 = A[k] * eta[k];
-        t326 += t325;
-    }
-    const real t327 = 0.5 * t326;
-    real t329 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t328 = B[k] * eta[k];
-        t329 += t328;
-    }
-    const real t330 = 0.5 * t329;
-    const real t331 = t327 + t330;
-    const real t332 = t331 + p[4];
-    const real t333 = t241 + t332;
-    const real t334 = motion[2] * t333;
-    const real t335 = motion[0] * t309;
-    const real t336 = t334 - t335;
-    real t338 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t337 = A[4 * n + k] * eta[k];
-        t338 += t337;
-    }
-    const real t339 = 0.5 * t338;
-    real t341 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t340 = B[4 * n + k] * eta[k];
-        t341 += t340;
-    }
-    const real t342 = 0.5 * t341;
-    const real t343 = t339 + t342;
-    const real t344 = t343 + p[8];
-    const real t345 = motion[1] * t344;
-    const real t346 = t336 - t345;
-    const real t347 = t324 + t346;
-    const real t348 = t347 * d_motion[1];
-    const real t349 = t333 * d_motion[2];
-    real t351 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t350 = B[k] * d_eta[k];
-        t351 += t350;
-    }
-    const real t352 = 0.5 * t351;
-    real t356 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t353 = eta[k] * d_A[k];
-        const real t354 = A[k] * d_eta[k];
-        const real t355 = t353 + t354;
-        t356 += t355;
-    }
-    const real t357 = 0.5 * t356;
-    const real t358 = t352 + t357;
-    const real t359 = t269 + t358;
-    const real t360 = motion[2] * t359;
-    const real t361 = t349 + t360;
-    const real t362 = t309 * d_motion[0];
-    const real t363 = motion[0] * t319;
-    const real t364 = t362 + t363;
-    const real t365 = t361 - t364;
-    const real t366 = t344 * d_motion[1];
-    real t368 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t367 = B[4 * n + k] * d_eta[k];
-        t368 += t367;
-    }
-    const real t369 = 0.5 * t368;
-    real t373 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t370 = eta[k] * d_A[4 * n + k];
-        const real t371 = A[4 * n + k] * d_eta[k];
-        const real t372 = t370 + t371;
-        t373 += t372;
-    }
-    const real t374 = 0.5 * t373;
-    const real t375 = t369 + t374;
-    const real t376 = motion[1] * t375;
-    const real t377 = t366 + t376;
-    const real t378 = t365 - t377;
-    real t382 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t379 = etad[k] * d_S_rf[5 * n + k];
-        const real t380 = S_rf[5 * n + k] * d_etad[k];
-        const real t381 = t379 + t380;
-        t382 += t381;
-    }
-    const real t383 = t378 + t382;
-    const real t384 = motion[1] * t383;
-    const real t385 = t348 + t384;
-    real t387 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t386 = A[3 * n + k] * etad[k];
-        t387 += t386;
-    }
-    real t389 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t388 = A[5 * n + k] * etad[k];
-        t389 += t388;
-    }
-    const real t390 = t387 + t389;
-    const real t391 = t390 * d_motion[0];
-    real t395 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t392 = etad[k] * d_A[5 * n + k];
-        const real t393 = A[5 * n + k] * d_etad[k];
-        const real t394 = t392 + t393;
-        t395 += t394;
-    }
-    real t399 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t396 = etad[k] * d_A[3 * n + k];
-        const real t397 = A[3 * n + k] * d_etad[k];
-        const real t398 = t396 + t397;
-        t399 += t398;
-    }
-    const real t400 = t395 + t399;
-    const real t401 = motion[0] * t400;
-    const real t402 = t391 + t401;
-    const real t403 = t385 + t402;
-    real t405 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t404 = S_rf[4 * n + k] * etad[k];
-        t405 += t404;
-    }
-    const real t406 = t249 + t332;
-    const real t407 = motion[1] * t406;
-    const real t408 = motion[0] * t288;
-    const real t409 = t407 - t408;
-    const real t410 = motion[2] * t344;
-    const real t411 = t409 - t410;
-    const real t412 = t405 + t411;
-    const real t413 = t412 * d_motion[2];
-    const real t414 = t406 * d_motion[1];
-    const real t415 = t260 + t358;
-    const real t416 = motion[1] * t415;
-    const real t417 = t414 + t416;
-    const real t418 = t288 * d_motion[0];
-    const real t419 = motion[0] * t298;
-    const real t420 = t418 + t419;
-    const real t421 = t417 - t420;
-    const real t422 = t344 * d_motion[2];
-    const real t423 = motion[2] * t375;
-    const real t424 = t422 + t423;
-    const real t425 = t421 - t424;
-    real t429 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t426 = etad[k] * d_S_rf[4 * n + k];
-        const real t427 = S_rf[4 * n + k] * d_etad[k];
-        const real t428 = t426 + t427;
-        t429 += t428;
-    }
-    const real t430 = t425 + t429;
-    const real t431 = motion[2] * t430;
-    const real t432 = t413 + t431;
-    const real t433 = t403 - t432;
-    real t435 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t434 = A[n + k] * etad[k];
-        t435 += t434;
-    }
-    const real t436 = t435 * d_motion[1];
-    real t440 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t437 = etad[k] * d_A[n + k];
-        const real t438 = A[n + k] * d_etad[k];
-        const real t439 = t437 + t438;
-        t440 += t439;
-    }
-    const real t441 = motion[1] * t440;
-    const real t442 = t436 + t441;
-    const real t443 = t433 - t442;
-    real t445 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t444 = A[2 * n + k] * etad[k];
-        t445 += t444;
-    }
-    const real t446 = t445 * d_motion[2];
-    real t450 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t447 = etad[k] * d_A[2 * n + k];
-        const real t448 = A[2 * n + k] * d_etad[k];
-        const real t449 = t447 + t448;
-        t450 += t449;
-    }
-    const real t451 = motion[2] * t450;
-    const real t452 = t446 + t451;
-    const real t453 = t443 - t452;
-    real t461 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t455 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t454 = Y_x[n * k + l] * d_etad[l];
-            t455 += t454;
-        }
-        const real t456 = etad[k] * t455;
-        real t458 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t457 = etad[l] * Y_x[n * k + l];
-            t458 += t457;
-        }
-        const real t459 = t458 * d_etad[k];
-        const real t460 = t456 + t459;
-        t461 += t460;
-    }
-    const real t462 = t453 + t461;
-    const real t463 = t322 + t462;
-    d_e[3] = t463;
-    const real t464 = t406 * d_motion[4];
-    const real t465 = motion[4] * t415;
-    const real t466 = t464 + t465;
-    const real t467 = t34 * d_motion[6];
-    const real t468 = motion[6] * t44;
-    const real t469 = t467 + t468;
-    const real t470 = t78 * d_motion[8];
-    const real t471 = motion[8] * t94;
-    const real t472 = t470 + t471;
-    const real t473 = t469 - t472;
-    const real t474 = t288 * d_motion[3];
-    const real t475 = motion[3] * t298;
-    const real t476 = t474 + t475;
-    const real t477 = t473 - t476;
-    const real t478 = t466 + t477;
-    const real t479 = t344 * d_motion[5];
-    const real t480 = motion[5] * t375;
-    const real t481 = t479 + t480;
-    const real t482 = t478 - t481;
-    real t484 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t483 = A[k] * etad[k];
-        t484 += t483;
-    }
-    const real t485 = t389 + t484;
-    const real t486 = t485 * d_motion[1];
-    real t490 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t487 = etad[k] * d_A[k];
-        const real t488 = A[k] * d_etad[k];
-        const real t489 = t487 + t488;
-        t490 += t489;
-    }
-    const real t491 = t395 + t490;
-    const real t492 = motion[1] * t491;
-    const real t493 = t486 + t492;
-    const real t494 = t347 * d_motion[0];
-    const real t495 = motion[0] * t383;
-    const real t496 = t494 + t495;
-    const real t497 = t493 - t496;
-    real t499 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t498 = S_rf[3 * n + k] * etad[k];
-        t499 += t498;
-    }
-    const real t500 = motion[0] * t250;
-    const real t501 = motion[1] * t288;
-    const real t502 = t500 - t501;
-    const real t503 = motion[2] * t309;
-    const real t504 = t502 - t503;
-    const real t505 = t499 + t504;
-    const real t506 = t505 * d_motion[2];
-    const real t507 = t250 * d_motion[0];
-    const real t508 = motion[0] * t270;
-    const real t509 = t507 + t508;
-    const real t510 = t288 * d_motion[1];
-    const real t511 = motion[1] * t298;
-    const real t512 = t510 + t511;
-    const real t513 = t509 - t512;
-    const real t514 = t309 * d_motion[2];
-    const real t515 = motion[2] * t319;
-    const real t516 = t514 + t515;
-    const real t517 = t513 - t516;
-    real t521 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t518 = etad[k] * d_S_rf[3 * n + k];
-        const real t519 = S_rf[3 * n + k] * d_etad[k];
-        const real t520 = t518 + t519;
-        t521 += t520;
-    }
-    const real t522 = t517 + t521;
-    const real t523 = motion[2] * t522;
-    const real t524 = t506 + t523;
-    const real t525 = t497 + t524;
-    const real t526 = t435 * d_motion[0];
-    const real t527 = motion[0] * t440;
-    const real t528 = t526 + t527;
-    const real t529 = t525 - t528;
-    real t531 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t530 = A[4 * n + k] * etad[k];
-        t531 += t530;
-    }
-    const real t532 = t531 * d_motion[2];
-    real t536 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t533 = etad[k] * d_A[4 * n + k];
-        const real t534 = A[4 * n + k] * d_etad[k];
-        const real t535 = t533 + t534;
-        t536 += t535;
-    }
-    const real t537 = motion[2] * t536;
-    const real t538 = t532 + t537;
-    const real t539 = t529 - t538;
-    real t547 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t541 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t540 = Y_y[n * k + l] * d_etad[l];
-            t541 += t540;
-        }
-        const real t542 = etad[k] * t541;
-        real t544 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t543 = etad[l] * Y_y[n * k + l];
-            t544 += t543;
-        }
-        const real t545 = t544 * d_etad[k];
-        const real t546 = t542 + t545;
-        t547 += t546;
-    }
-    const real t548 = t539 + t547;
-    const real t549 = t482 + t548;
-    d_e[4] = t549;
-    const real t550 = t333 * d_motion[5];
-    const real t551 = motion[5] * t359;
-    const real t552 = t550 + t551;
-    const real t553 = t78 * d_motion[7];
-    const real t554 = motion[7] * t94;
-    const real t555 = t553 + t554;
-    const real t556 = t56 * d_motion[6];
-    const real t557 = motion[6] * t66;
-    const real t558 = t556 + t557;
-    const real t559 = t555 - t558;
-    const real t560 = t309 * d_motion[3];
-    const real t561 = motion[3] * t319;
-    const real t562 = t560 + t561;
-    const real t563 = t559 - t562;
-    const real t564 = t344 * d_motion[4];
-    const real t565 = motion[4] * t375;
-    const real t566 = t564 + t565;
-    const real t567 = t563 - t566;
-    const real t568 = t552 + t567;
-    const real t569 = t412 * d_motion[0];
-    const real t570 = motion[0] * t430;
-    const real t571 = t569 + t570;
-    const real t572 = t387 + t484;
-    const real t573 = t572 * d_motion[2];
-    const real t574 = t399 + t490;
-    const real t575 = motion[2] * t574;
-    const real t576 = t573 + t575;
-    const real t577 = t571 + t576;
-    const real t578 = t505 * d_motion[1];
-    const real t579 = motion[1] * t522;
-    const real t580 = t578 + t579;
-    const real t581 = t577 - t580;
-    const real t582 = t445 * d_motion[0];
-    const real t583 = motion[0] * t450;
-    const real t584 = t582 + t583;
-    const real t585 = t581 - t584;
-    const real t586 = t531 * d_motion[1];
-    const real t587 = motion[1] * t536;
-    const real t588 = t586 + t587;
-    const real t589 = t585 - t588;
-    real t597 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t591 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t590 = Y_z[n * k + l] * d_etad[l];
-            t591 += t590;
-        }
-        const real t592 = etad[k] * t591;
-        real t594 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t593 = etad[l] * Y_z[n * k + l];
-            t594 += t593;
-        }
-        const real t595 = t594 * d_etad[k];
-        const real t596 = t592 + t595;
-        t597 += t596;
-    }
-    const real t598 = t589 + t597;
-    const real t599 = t568 + t598;
-    d_e[5] = t599;
-    const real t605 = motion[2] * d_motion[1];
-    const real t606 = motion[1] * d_motion[2];
-    const real t607 = t605 + t606;
-    const real t609 = motion[1] * motion[2];
-    const real t612 = motion[2] * d_motion[0];
-    const real t613 = motion[0] * d_motion[2];
-    const real t614 = t612 + t613;
-    const real t616 = motion[0] * motion[2];
-    const real t619 = motion[1] * d_motion[0];
-    const real t620 = motion[0] * d_motion[1];
-    const real t621 = t619 + t620;
-    const real t623 = motion[0] * motion[1];
-    const real t626 = motion[1] * d_motion[1];
-    const real t627 = t626 + t626;
-    const real t628 = motion[2] * d_motion[2];
-    const real t629 = t628 + t628;
-    const real t630 = t627 + t629;
-    const real t631 = 0.5 * t630;
-    const real t633 = motion[1] * motion[1];
-    const real t634 = motion[2] * motion[2];
-    const real t635 = t633 + t634;
-    const real t636 = t635 * 0.5;
-    const real t641 = motion[0] * d_motion[0];
-    const real t642 = t641 + t641;
-    const real t643 = t642 + t629;
-    const real t644 = 0.5 * t643;
-    const real t646 = motion[0] * motion[0];
-    const real t647 = t634 + t646;
-    const real t648 = 0.5 * t647;
-    const real t653 = t642 + t627;
-    const real t654 = 0.5 * t653;
-    const real t656 = t633 + t646;
-    const real t657 = 0.5 * t656;
-    for (int k = 0; k < n; ++k) {
-        real t601 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t600 = K[n * k + l] * d_eta[l];
-            t601 += t600;
-        }
-        real t603 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t602 = D[n * k + l] * d_etad[l];
-            t603 += t602;
-        }
-        const real t604 = t601 + t603;
-        const real t608 = A[4 * n + k] * t607;
-        const real t610 = t609 * d_A[4 * n + k];
-        const real t611 = t608 + t610;
-        const real t615 = A[2 * n + k] * t614;
-        const real t617 = t616 * d_A[2 * n + k];
-        const real t618 = t615 + t617;
-        const real t622 = A[n + k] * t621;
-        const real t624 = t623 * d_A[n + k];
-        const real t625 = t622 + t624;
-        const real t632 = A[k] * t631;
-        const real t637 = t636 * d_A[k];
-        const real t638 = t632 + t637;
-        const real t639 = t625 - t638;
-        const real t640 = t618 + t639;
-        const real t645 = A[3 * n + k] * t644;
-        const real t649 = t648 * d_A[3 * n + k];
-        const real t650 = t645 + t649;
-        const real t651 = t640 - t650;
-        const real t652 = t611 + t651;
-        const real t655 = A[5 * n + k] * t654;
-        const real t658 = t657 * d_A[5 * n + k];
-        const real t659 = t655 + t658;
-        const real t660 = t652 - t659;
-        const real t661 = t604 + t660;
-        const real t662 = S_rf[5 * n + k] * d_motion[5];
-        const real t663 = motion[5] * d_S_rf[5 * n + k];
-        const real t664 = t662 + t663;
-        const real t665 = S_rf[4 * n + k] * d_motion[4];
-        const real t666 = motion[4] * d_S_rf[4 * n + k];
-        const real t667 = t665 + t666;
-        const real t668 = S_rf[3 * n + k] * d_motion[3];
-        const real t669 = motion[3] * d_S_rf[3 * n + k];
-        const real t670 = t668 + t669;
-        const real t671 = S_rf[2 * n + k] * d_motion[8];
-        const real t672 = motion[8] * d_S_rf[2 * n + k];
-        const real t673 = t671 + t672;
-        const real t674 = S_rf[n + k] * d_motion[7];
-        const real t675 = motion[7] * d_S_rf[n + k];
-        const real t676 = t674 + t675;
-        const real t677 = S_rf[k] * d_motion[6];
-        const real t678 = motion[6] * d_S_rf[k];
-        const real t679 = t677 + t678;
-        const real t680 = t676 + t679;
-        const real t681 = t673 + t680;
-        const real t682 = t670 + t681;
-        const real t683 = t667 + t682;
-        const real t684 = t664 + t683;
-        const real t685 = t661 + t684;
-        real t687 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t686 = etad[l] * Y_x[n * k + l];
-            t687 += t686;
-        }
-        const real t688 = t687 * d_motion[0];
-        real t690 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t689 = Y_x[n * k + l] * d_etad[l];
-            t690 += t689;
-        }
-        const real t691 = motion[0] * t690;
-        const real t692 = t688 + t691;
-        const real t693 = t685 - t692;
-        real t695 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t694 = Y_x[n * l + k] * etad[l];
-            t695 += t694;
-        }
-        const real t696 = t695 * d_motion[0];
-        real t698 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t697 = Y_x[n * l + k] * d_etad[l];
-            t698 += t697;
-        }
-        const real t699 = motion[0] * t698;
-        const real t700 = t696 + t699;
-        const real t701 = t693 + t700;
-        real t703 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t702 = etad[l] * Y_y[n * k + l];
-            t703 += t702;
-        }
-        const real t704 = t703 * d_motion[1];
-        real t706 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t705 = Y_y[n * k + l] * d_etad[l];
-            t706 += t705;
-        }
-        const real t707 = motion[1] * t706;
-        const real t708 = t704 + t707;
-        const real t709 = t701 - t708;
-        real t711 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t710 = Y_y[n * l + k] * etad[l];
-            t711 += t710;
-        }
-        const real t712 = t711 * d_motion[1];
-        real t714 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t713 = Y_y[n * l + k] * d_etad[l];
-            t714 += t713;
-        }
-        const real t715 = motion[1] * t714;
-        const real t716 = t712 + t715;
-        const real t717 = t709 + t716;
-        real t719 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t718 = etad[l] * Y_z[n * k + l];
-            t719 += t718;
-        }
-        const real t720 = t719 * d_motion[2];
-        real t722 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t721 = Y_z[n * k + l] * d_etad[l];
-            t722 += t721;
-        }
-        const real t723 = motion[2] * t722;
-        const real t724 = t720 + t723;
-        const real t725 = t717 - t724;
-        real t727 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t726 = Y_z[n * l + k] * etad[l];
-            t727 += t726;
-        }
-        const real t728 = t727 * d_motion[2];
-        real t730 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t729 = Y_z[n * l + k] * d_etad[l];
-            t730 += t729;
-        }
-        const real t731 = motion[2] * t730;
-        const real t732 = t728 + t731;
-        const real t733 = t725 + t732;
-        d_e_f[k] = t733;
-    }
-    return 0;
+  (void)P;
+  (void)M;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += G_x[n * l + k] * d_eta[l];
+    }
+    d_S_rf[k] = -t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t4 = 0;
+    for (int l = 0; l < n; ++l) {
+      t4 += G_y[n * l + k] * d_eta[l];
+    }
+    d_S_rf[n + k] = -t4;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += G_z[n * l + k] * d_eta[l];
+    }
+    d_S_rf[2 * n + k] = -t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t10 = 0;
+    for (int l = 0; l < n; ++l) {
+      t10 += Y_x[n * l + k] * d_eta[l];
+    }
+    d_S_rf[3 * n + k] = t10;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t12 = 0;
+    for (int l = 0; l < n; ++l) {
+      t12 += Y_y[n * l + k] * d_eta[l];
+    }
+    d_S_rf[4 * n + k] = t12;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t14 = 0;
+    for (int l = 0; l < n; ++l) {
+      t14 += Y_z[n * l + k] * d_eta[l];
+    }
+    d_S_rf[5 * n + k] = t14;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t16 = 0;
+    for (int l = 0; l < n; ++l) {
+      t16 += Z_xx[n * l + k] * d_eta[l];
+    }
+    d_A[k] = t16;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t18 = 0;
+    for (int l = 0; l < n; ++l) {
+      t18 += Z_xy[n * l + k] * d_eta[l];
+    }
+    d_A[n + k] = t18;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t20 = 0;
+    for (int l = 0; l < n; ++l) {
+      t20 += Z_xz[n * l + k] * d_eta[l];
+    }
+    d_A[2 * n + k] = t20;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t22 = 0;
+    for (int l = 0; l < n; ++l) {
+      t22 += Z_yy[n * l + k] * d_eta[l];
+    }
+    d_A[3 * n + k] = t22;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t24 = 0;
+    for (int l = 0; l < n; ++l) {
+      t24 += Z_yz[n * l + k] * d_eta[l];
+    }
+    d_A[4 * n + k] = t24;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t26 = 0;
+    for (int l = 0; l < n; ++l) {
+      t26 += Z_zz[n * l + k] * d_eta[l];
+    }
+    d_A[5 * n + k] = t26;
+  }
+  real t28 = 0;
+  for (int k = 0; k < n; ++k) {
+    t28 += S_rf[2 * n + k] * eta[k];
+  }
+  real t29 = 0.5 * t28;
+  real t31 = 0;
+  for (int k = 0; k < n; ++k) {
+    t31 += C[2 * n + k] * eta[k];
+  }
+  real t34 = t29 + 0.5 * t31 + p[3];
+  real t35 = t34 * d_motion[4];
+  real t37 = 0;
+  for (int k = 0; k < n; ++k) {
+    t37 += C[2 * n + k] * d_eta[k];
+  }
+  real t38 = 0.5 * t37;
+  real t42 = 0;
+  for (int k = 0; k < n; ++k) {
+    t42 += eta[k] * d_S_rf[2 * n + k] + S_rf[2 * n + k] * d_eta[k];
+  }
+  real t44 = t38 + 0.5 * t42;
+  real t48 = t35 + motion[4] * t44 + p[0] * d_motion[6];
+  real t50 = 0;
+  for (int k = 0; k < n; ++k) {
+    t50 += S_rf[n + k] * eta[k];
+  }
+  real t51 = 0.5 * t50;
+  real t53 = 0;
+  for (int k = 0; k < n; ++k) {
+    t53 += C[n + k] * eta[k];
+  }
+  real t56 = t51 + 0.5 * t53 + p[2];
+  real t57 = t56 * d_motion[5];
+  real t59 = 0;
+  for (int k = 0; k < n; ++k) {
+    t59 += C[n + k] * d_eta[k];
+  }
+  real t60 = 0.5 * t59;
+  real t64 = 0;
+  for (int k = 0; k < n; ++k) {
+    t64 += eta[k] * d_S_rf[n + k] + S_rf[n + k] * d_eta[k];
+  }
+  real t66 = t60 + 0.5 * t64;
+  real t69 = t48 - (t57 + motion[5] * t66);
+  real t70 = motion[0] * t56;
+  real t72 = 0;
+  for (int k = 0; k < n; ++k) {
+    t72 += S_rf[k] * eta[k];
+  }
+  real t73 = 0.5 * t72;
+  real t75 = 0;
+  for (int k = 0; k < n; ++k) {
+    t75 += C[k] * eta[k];
+  }
+  real t78 = t73 + 0.5 * t75 + p[1];
+  real t80 = t70 - motion[1] * t78;
+  real t81 = t80 * d_motion[1];
+  real t84 = t56 * d_motion[0] + motion[0] * t66;
+  real t85 = t78 * d_motion[1];
+  real t87 = 0;
+  for (int k = 0; k < n; ++k) {
+    t87 += C[k] * d_eta[k];
+  }
+  real t88 = 0.5 * t87;
+  real t92 = 0;
+  for (int k = 0; k < n; ++k) {
+    t92 += eta[k] * d_S_rf[k] + S_rf[k] * d_eta[k];
+  }
+  real t94 = t88 + 0.5 * t92;
+  real t97 = t84 - (t85 + motion[1] * t94);
+  real t102 = motion[2] * t78 - motion[0] * t34;
+  real t110 = t78 * d_motion[2] + motion[2] * t94 - (t34 * d_motion[0] + motion[0] * t44);
+  real t113 = t81 + motion[1] * t97 - (t102 * d_motion[2] + motion[2] * t110);
+  real t115 = 0;
+  for (int k = 0; k < n; ++k) {
+    t115 += S_rf[n + k] * etad[k];
+  }
+  real t116 = t115 * d_motion[2];
+  real t120 = 0;
+  for (int k = 0; k < n; ++k) {
+    t120 += etad[k] * d_S_rf[n + k] + S_rf[n + k] * d_etad[k];
+  }
+  real t124 = t113 - 2.0 * (t116 + motion[2] * t120);
+  real t126 = 0;
+  for (int k = 0; k < n; ++k) {
+    t126 += S_rf[2 * n + k] * etad[k];
+  }
+  real t127 = t126 * d_motion[1];
+  real t131 = 0;
+  for (int k = 0; k < n; ++k) {
+    t131 += etad[k] * d_S_rf[2 * n + k] + S_rf[2 * n + k] * d_etad[k];
+  }
+  real t135 = t124 + 2.0 * (t127 + motion[1] * t131);
+  real t143 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t137 = 0;
+    for (int l = 0; l < n; ++l) {
+      t137 += etad[l] * G_x[n * k + l];
+    }
+    real t138 = t137 * d_etad[k];
+    real t140 = 0;
+    for (int l = 0; l < n; ++l) {
+      t140 += G_x[n * k + l] * d_etad[l];
+    }
+    t143 += t138 + etad[k] * t140;
+  }
+  d_e[0] = t69 + (t135 - t143);
+  real t154 = t78 * d_motion[5] + motion[5] * t94 + (p[0] * d_motion[7] - (t34 * d_motion[3] +
+    motion[3] * t44));
+  real t157 = motion[1] * t34 - motion[2] * t56;
+  real t165 = t34 * d_motion[1] + motion[1] * t44 - (t56 * d_motion[2] + motion[2] * t66);
+  real t171 = t157 * d_motion[2] + motion[2] * t165 - (t80 * d_motion[0] + motion[0] * t97);
+  real t173 = 0;
+  for (int k = 0; k < n; ++k) {
+    t173 += S_rf[k] * etad[k];
+  }
+  real t174 = t173 * d_motion[2];
+  real t178 = 0;
+  for (int k = 0; k < n; ++k) {
+    t178 += etad[k] * d_S_rf[k] + S_rf[k] * d_etad[k];
+  }
+  real t187 = t171 + 2.0 * (t174 + motion[2] * t178) - 2.0 * (t126 * d_motion[0] + motion[0] *
+    t131);
+  real t195 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t189 = 0;
+    for (int l = 0; l < n; ++l) {
+      t189 += etad[l] * G_y[n * k + l];
+    }
+    real t190 = t189 * d_etad[k];
+    real t192 = 0;
+    for (int l = 0; l < n; ++l) {
+      t192 += G_y[n * k + l] * d_etad[l];
+    }
+    t195 += t190 + etad[k] * t192;
+  }
+  d_e[1] = t154 + (t187 - t195);
+  real t206 = t56 * d_motion[3] + motion[3] * t66 + p[0] * d_motion[8] - (t78 * d_motion[4] +
+    motion[4] * t94);
+  real t223 = t102 * d_motion[0] + motion[0] * t110 - (t157 * d_motion[1] + motion[1] * t165) - 2.0
+    * (t173 * d_motion[1] + motion[1] * t178) + 2.0 * (t115 * d_motion[0] + motion[0] * t120);
+  real t231 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t225 = 0;
+    for (int l = 0; l < n; ++l) {
+      t225 += etad[l] * G_z[n * k + l];
+    }
+    real t226 = t225 * d_etad[k];
+    real t228 = 0;
+    for (int l = 0; l < n; ++l) {
+      t228 += G_z[n * k + l] * d_etad[l];
+    }
+    t231 += t226 + etad[k] * t228;
+  }
+  d_e[2] = t206 + (t223 - t231);
+  real t235 = 0;
+  for (int k = 0; k < n; ++k) {
+    t235 += A[3 * n + k] * eta[k];
+  }
+  real t236 = 0.5 * t235;
+  real t238 = 0;
+  for (int k = 0; k < n; ++k) {
+    t238 += B[3 * n + k] * eta[k];
+  }
+  real t241 = t236 + 0.5 * t238 + p[7];
+  real t243 = 0;
+  for (int k = 0; k < n; ++k) {
+    t243 += A[5 * n + k] * eta[k];
+  }
+  real t244 = 0.5 * t243;
+  real t246 = 0;
+  for (int k = 0; k < n; ++k) {
+    t246 += B[5 * n + k] * eta[k];
+  }
+  real t249 = t244 + 0.5 * t246 + p[9];
+  real t250 = t241 + t249;
+  real t251 = t250 * d_motion[3];
+  real t253 = 0;
+  for (int k = 0; k < n; ++k) {
+    t253 += B[5 * n + k] * d_eta[k];
+  }
+  real t254 = 0.5 * t253;
+  real t258 = 0;
+  for (int k = 0; k < n; ++k) {
+    t258 += eta[k] * d_A[5 * n + k] + A[5 * n + k] * d_eta[k];
+  }
+  real t260 = t254 + 0.5 * t258;
+  real t262 = 0;
+  for (int k = 0; k < n; ++k) {
+    t262 += B[3 * n + k] * d_eta[k];
+  }
+  real t263 = 0.5 * t262;
+  real t267 = 0;
+  for (int k = 0; k < n; ++k) {
+    t267 += eta[k] * d_A[3 * n + k] + A[3 * n + k] * d_eta[k];
+  }
+  real t269 = t263 + 0.5 * t267;
+  real t270 = t260 + t269;
+  real t280 = t251 + motion[3] * t270 + (t56 * d_motion[8] + motion[8] * t66 - (t34 * d_motion[7] +
+    motion[7] * t44));
+  real t282 = 0;
+  for (int k = 0; k < n; ++k) {
+    t282 += A[n + k] * eta[k];
+  }
+  real t283 = 0.5 * t282;
+  real t285 = 0;
+  for (int k = 0; k < n; ++k) {
+    t285 += B[n + k] * eta[k];
+  }
+  real t288 = t283 + 0.5 * t285 + p[5];
+  real t289 = t288 * d_motion[4];
+  real t291 = 0;
+  for (int k = 0; k < n; ++k) {
+    t291 += B[n + k] * d_eta[k];
+  }
+  real t292 = 0.5 * t291;
+  real t296 = 0;
+  for (int k = 0; k < n; ++k) {
+    t296 += eta[k] * d_A[n + k] + A[n + k] * d_eta[k];
+  }
+  real t298 = t292 + 0.5 * t296;
+  real t301 = t280 - (t289 + motion[4] * t298);
+  real t303 = 0;
+  for (int k = 0; k < n; ++k) {
+    t303 += A[2 * n + k] * eta[k];
+  }
+  real t304 = 0.5 * t303;
+  real t306 = 0;
+  for (int k = 0; k < n; ++k) {
+    t306 += B[2 * n + k] * eta[k];
+  }
+  real t309 = t304 + 0.5 * t306 + p[6];
+  real t310 = t309 * d_motion[5];
+  real t312 = 0;
+  for (int k = 0; k < n; ++k) {
+    t312 += B[2 * n + k] * d_eta[k];
+  }
+  real t313 = 0.5 * t312;
+  real t317 = 0;
+  for (int k = 0; k < n; ++k) {
+    t317 += eta[k] * d_A[2 * n + k] + A[2 * n + k] * d_eta[k];
+  }
+  real t319 = t313 + 0.5 * t317;
+  real t322 = t301 - (t310 + motion[5] * t319);
+  real t324 = 0;
+  for (int k = 0; k < n; ++k) {
+    t324 += S_rf[5 * n + k] * etad[k];
+  }
+  real t326 = 0;
+  for (int k = 0; k < n; ++k) {
+    t326 += A[k] * eta[k];
+  }
+  real t327 = 0.5 * t326;
+  real t329 = 0;
+  for (int k = 0; k < n; ++k) {
+    t329 += B[k] * eta[k];
+  }
+  real t332 = t327 + 0.5 * t329 + p[4];
+  real t333 = t241 + t332;
+  real t336 = motion[2] * t333 - motion[0] * t309;
+  real t338 = 0;
+  for (int k = 0; k < n; ++k) {
+    t338 += A[4 * n + k] * eta[k];
+  }
+  real t339 = 0.5 * t338;
+  real t341 = 0;
+  for (int k = 0; k < n; ++k) {
+    t341 += B[4 * n + k] * eta[k];
+  }
+  real t344 = t339 + 0.5 * t341 + p[8];
+  real t347 = t324 + (t336 - motion[1] * t344);
+  real t348 = t347 * d_motion[1];
+  real t349 = t333 * d_motion[2];
+  real t351 = 0;
+  for (int k = 0; k < n; ++k) {
+    t351 += B[k] * d_eta[k];
+  }
+  real t352 = 0.5 * t351;
+  real t356 = 0;
+  for (int k = 0; k < n; ++k) {
+    t356 += eta[k] * d_A[k] + A[k] * d_eta[k];
+  }
+  real t358 = t352 + 0.5 * t356;
+  real t359 = t269 + t358;
+  real t365 = t349 + motion[2] * t359 - (t309 * d_motion[0] + motion[0] * t319);
+  real t366 = t344 * d_motion[1];
+  real t368 = 0;
+  for (int k = 0; k < n; ++k) {
+    t368 += B[4 * n + k] * d_eta[k];
+  }
+  real t369 = 0.5 * t368;
+  real t373 = 0;
+  for (int k = 0; k < n; ++k) {
+    t373 += eta[k] * d_A[4 * n + k] + A[4 * n + k] * d_eta[k];
+  }
+  real t375 = t369 + 0.5 * t373;
+  real t378 = t365 - (t366 + motion[1] * t375);
+  real t382 = 0;
+  for (int k = 0; k < n; ++k) {
+    t382 += etad[k] * d_S_rf[5 * n + k] + S_rf[5 * n + k] * d_etad[k];
+  }
+  real t383 = t378 + t382;
+  real t385 = t348 + motion[1] * t383;
+  real t387 = 0;
+  for (int k = 0; k < n; ++k) {
+    t387 += A[3 * n + k] * etad[k];
+  }
+  real t389 = 0;
+  for (int k = 0; k < n; ++k) {
+    t389 += A[5 * n + k] * etad[k];
+  }
+  real t391 = (t387 + t389) * d_motion[0];
+  real t395 = 0;
+  for (int k = 0; k < n; ++k) {
+    t395 += etad[k] * d_A[5 * n + k] + A[5 * n + k] * d_etad[k];
+  }
+  real t399 = 0;
+  for (int k = 0; k < n; ++k) {
+    t399 += etad[k] * d_A[3 * n + k] + A[3 * n + k] * d_etad[k];
+  }
+  real t403 = t385 + (t391 + motion[0] * (t395 + t399));
+  real t405 = 0;
+  for (int k = 0; k < n; ++k) {
+    t405 += S_rf[4 * n + k] * etad[k];
+  }
+  real t406 = t249 + t332;
+  real t412 = t405 + (motion[1] * t406 - motion[0] * t288 - motion[2] * t344);
+  real t413 = t412 * d_motion[2];
+  real t415 = t260 + t358;
+  real t425 = t406 * d_motion[1] + motion[1] * t415 - (t288 * d_motion[0] + motion[0] * t298) -
+    (t344 * d_motion[2] + motion[2] * t375);
+  real t429 = 0;
+  for (int k = 0; k < n; ++k) {
+    t429 += etad[k] * d_S_rf[4 * n + k] + S_rf[4 * n + k] * d_etad[k];
+  }
+  real t430 = t425 + t429;
+  real t433 = t403 - (t413 + motion[2] * t430);
+  real t435 = 0;
+  for (int k = 0; k < n; ++k) {
+    t435 += A[n + k] * etad[k];
+  }
+  real t436 = t435 * d_motion[1];
+  real t440 = 0;
+  for (int k = 0; k < n; ++k) {
+    t440 += etad[k] * d_A[n + k] + A[n + k] * d_etad[k];
+  }
+  real t443 = t433 - (t436 + motion[1] * t440);
+  real t445 = 0;
+  for (int k = 0; k < n; ++k) {
+    t445 += A[2 * n + k] * etad[k];
+  }
+  real t446 = t445 * d_motion[2];
+  real t450 = 0;
+  for (int k = 0; k < n; ++k) {
+    t450 += etad[k] * d_A[2 * n + k] + A[2 * n + k] * d_etad[k];
+  }
+  real t453 = t443 - (t446 + motion[2] * t450);
+  real t461 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t455 = 0;
+    for (int l = 0; l < n; ++l) {
+      t455 += Y_x[n * k + l] * d_etad[l];
+    }
+    real t456 = etad[k] * t455;
+    real t458 = 0;
+    for (int l = 0; l < n; ++l) {
+      t458 += etad[l] * Y_x[n * k + l];
+    }
+    t461 += t456 + t458 * d_etad[k];
+  }
+  d_e[3] = t322 + (t453 + t461);
+  real t482 = t406 * d_motion[4] + motion[4] * t415 + (t34 * d_motion[6] + motion[6] * t44 - (t78 *
+    d_motion[8] + motion[8] * t94) - (t288 * d_motion[3] + motion[3] * t298)) - (t344 * d_motion[5]
+    + motion[5] * t375);
+  real t484 = 0;
+  for (int k = 0; k < n; ++k) {
+    t484 += A[k] * etad[k];
+  }
+  real t486 = (t389 + t484) * d_motion[1];
+  real t490 = 0;
+  for (int k = 0; k < n; ++k) {
+    t490 += etad[k] * d_A[k] + A[k] * d_etad[k];
+  }
+  real t497 = t486 + motion[1] * (t395 + t490) - (t347 * d_motion[0] + motion[0] * t383);
+  real t499 = 0;
+  for (int k = 0; k < n; ++k) {
+    t499 += S_rf[3 * n + k] * etad[k];
+  }
+  real t505 = t499 + (motion[0] * t250 - motion[1] * t288 - motion[2] * t309);
+  real t506 = t505 * d_motion[2];
+  real t517 = t250 * d_motion[0] + motion[0] * t270 - (t288 * d_motion[1] + motion[1] * t298) -
+    (t309 * d_motion[2] + motion[2] * t319);
+  real t521 = 0;
+  for (int k = 0; k < n; ++k) {
+    t521 += etad[k] * d_S_rf[3 * n + k] + S_rf[3 * n + k] * d_etad[k];
+  }
+  real t522 = t517 + t521;
+  real t529 = t497 + (t506 + motion[2] * t522) - (t435 * d_motion[0] + motion[0] * t440);
+  real t531 = 0;
+  for (int k = 0; k < n; ++k) {
+    t531 += A[4 * n + k] * etad[k];
+  }
+  real t532 = t531 * d_motion[2];
+  real t536 = 0;
+  for (int k = 0; k < n; ++k) {
+    t536 += etad[k] * d_A[4 * n + k] + A[4 * n + k] * d_etad[k];
+  }
+  real t539 = t529 - (t532 + motion[2] * t536);
+  real t547 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t541 = 0;
+    for (int l = 0; l < n; ++l) {
+      t541 += Y_y[n * k + l] * d_etad[l];
+    }
+    real t542 = etad[k] * t541;
+    real t544 = 0;
+    for (int l = 0; l < n; ++l) {
+      t544 += etad[l] * Y_y[n * k + l];
+    }
+    t547 += t542 + t544 * d_etad[k];
+  }
+  d_e[4] = t482 + (t539 + t547);
+  real t568 = t333 * d_motion[5] + motion[5] * t359 + (t78 * d_motion[7] + motion[7] * t94 - (t56 *
+    d_motion[6] + motion[6] * t66) - (t309 * d_motion[3] + motion[3] * t319) - (t344 * d_motion[4] +
+    motion[4] * t375));
+  real t589 = t412 * d_motion[0] + motion[0] * t430 + ((t387 + t484) * d_motion[2] + motion[2] *
+    (t399 + t490)) - (t505 * d_motion[1] + motion[1] * t522) - (t445 * d_motion[0] + motion[0] *
+    t450) - (t531 * d_motion[1] + motion[1] * t536);
+  real t597 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t591 = 0;
+    for (int l = 0; l < n; ++l) {
+      t591 += Y_z[n * k + l] * d_etad[l];
+    }
+    real t592 = etad[k] * t591;
+    real t594 = 0;
+    for (int l = 0; l < n; ++l) {
+      t594 += etad[l] * Y_z[n * k + l];
+    }
+    t597 += t592 + t594 * d_etad[k];
+  }
+  d_e[5] = t568 + (t589 + t597);
+  real t607 = motion[2] * d_motion[1] + motion[1] * d_motion[2];
+  real t609 = motion[1] * motion[2];
+  real t614 = motion[2] * d_motion[0] + motion[0] * d_motion[2];
+  real t616 = motion[0] * motion[2];
+  real t621 = motion[1] * d_motion[0] + motion[0] * d_motion[1];
+  real t623 = motion[0] * motion[1];
+  real t626 = motion[1] * d_motion[1];
+  real t627 = t626 + t626;
+  real t628 = motion[2] * d_motion[2];
+  real t629 = t628 + t628;
+  real t631 = 0.5 * (t627 + t629);
+  real t633 = motion[1] * motion[1];
+  real t634 = motion[2] * motion[2];
+  real t636 = (t633 + t634) * 0.5;
+  real t641 = motion[0] * d_motion[0];
+  real t642 = t641 + t641;
+  real t644 = 0.5 * (t642 + t629);
+  real t646 = motion[0] * motion[0];
+  real t648 = 0.5 * (t634 + t646);
+  real t654 = 0.5 * (t642 + t627);
+  real t657 = 0.5 * (t633 + t646);
+  for (int k = 0; k < n; ++k) {
+    real t601 = 0;
+    for (int l = 0; l < n; ++l) {
+      t601 += K[n * k + l] * d_eta[l];
+    }
+    real t603 = 0;
+    for (int l = 0; l < n; ++l) {
+      t603 += D[n * k + l] * d_etad[l];
+    }
+    real t685 = t601 + t603 + (A[4 * n + k] * t607 + t609 * d_A[4 * n + k] + (A[2 * n + k] * t614 +
+      t616 * d_A[2 * n + k] + (A[n + k] * t621 + t623 * d_A[n + k] - (A[k] * t631 + t636 * d_A[k]))
+      - (A[3 * n + k] * t644 + t648 * d_A[3 * n + k])) - (A[5 * n + k] * t654 + t657 * d_A[5 * n +
+      k])) + (S_rf[5 * n + k] * d_motion[5] + motion[5] * d_S_rf[5 * n + k] + (S_rf[4 * n + k] *
+      d_motion[4] + motion[4] * d_S_rf[4 * n + k] + (S_rf[3 * n + k] * d_motion[3] + motion[3] *
+      d_S_rf[3 * n + k] + (S_rf[2 * n + k] * d_motion[8] + motion[8] * d_S_rf[2 * n + k] + (S_rf[n +
+      k] * d_motion[7] + motion[7] * d_S_rf[n + k] + (S_rf[k] * d_motion[6] + motion[6] *
+      d_S_rf[k]))))));
+    real t687 = 0;
+    for (int l = 0; l < n; ++l) {
+      t687 += etad[l] * Y_x[n * k + l];
+    }
+    real t688 = t687 * d_motion[0];
+    real t690 = 0;
+    for (int l = 0; l < n; ++l) {
+      t690 += Y_x[n * k + l] * d_etad[l];
+    }
+    real t693 = t685 - (t688 + motion[0] * t690);
+    real t695 = 0;
+    for (int l = 0; l < n; ++l) {
+      t695 += Y_x[n * l + k] * etad[l];
+    }
+    real t696 = t695 * d_motion[0];
+    real t698 = 0;
+    for (int l = 0; l < n; ++l) {
+      t698 += Y_x[n * l + k] * d_etad[l];
+    }
+    real t701 = t693 + (t696 + motion[0] * t698);
+    real t703 = 0;
+    for (int l = 0; l < n; ++l) {
+      t703 += etad[l] * Y_y[n * k + l];
+    }
+    real t704 = t703 * d_motion[1];
+    real t706 = 0;
+    for (int l = 0; l < n; ++l) {
+      t706 += Y_y[n * k + l] * d_etad[l];
+    }
+    real t709 = t701 - (t704 + motion[1] * t706);
+    real t711 = 0;
+    for (int l = 0; l < n; ++l) {
+      t711 += Y_y[n * l + k] * etad[l];
+    }
+    real t712 = t711 * d_motion[1];
+    real t714 = 0;
+    for (int l = 0; l < n; ++l) {
+      t714 += Y_y[n * l + k] * d_etad[l];
+    }
+    real t717 = t709 + (t712 + motion[1] * t714);
+    real t719 = 0;
+    for (int l = 0; l < n; ++l) {
+      t719 += etad[l] * Y_z[n * k + l];
+    }
+    real t720 = t719 * d_motion[2];
+    real t722 = 0;
+    for (int l = 0; l < n; ++l) {
+      t722 += Y_z[n * k + l] * d_etad[l];
+    }
+    real t725 = t717 - (t720 + motion[2] * t722);
+    real t727 = 0;
+    for (int l = 0; l < n; ++l) {
+      t727 += Y_z[n * l + k] * etad[l];
+    }
+    real t728 = t727 * d_motion[2];
+    real t730 = 0;
+    for (int l = 0; l < n; ++l) {
+      t730 += Y_z[n * l + k] * d_etad[l];
+    }
+    d_e_f[k] = t725 + (t728 + motion[2] * t730);
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_residual_slope(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict K, const real *restrict D, const real *restrict eta,
-    const real *restrict etad, const real *restrict motion, const real *restrict S_rf,
-    const real *restrict A, const real *restrict d_eta, const real *restrict d_etad,
-    const real *restrict d_motion, real *restrict d_S_rf, real *restrict d_A, real *restrict d_e,
-    real *restrict d_e_f)
+int mstmm_sweep_modal_residual_slope(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx, in_t Z_xy,
+    in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x, in_t G_y,
+    in_t G_z, in_t M, in_t K, in_t D, in_t eta, in_t etad, in_t motion, in_t S_rf, in_t A,
+    in_t d_eta, in_t d_etad, in_t d_motion, out_t d_S_rf, out_t d_A, out_t d_e, out_t d_e_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_residual_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
-    case 2: return mstmm_sweep_modal_residual_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
-    case 3: return mstmm_sweep_modal_residual_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
-    case 4: return mstmm_sweep_modal_residual_slope_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
-    default: return mstmm_sweep_modal_residual_slope_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_residual_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+  case 2: return mstmm_sweep_modal_residual_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+  case 3: return mstmm_sweep_modal_residual_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+  case 4: return mstmm_sweep_modal_residual_slope_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+  default: return mstmm_sweep_modal_residual_slope_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, K, D, eta, etad, motion, S_rf, A, d_eta, d_etad, d_motion, d_S_rf, d_A, d_e, d_e_f);
+  }
 }
 
-static int mstmm_sweep_modal_residual_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_residual_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_modal_residual_slope_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"C", 3, "", 0, 1},
-    {"P", 3, "", 0, 1},
-    {"B", 6, "", 0, 1},
-    {"Z_xx", 1, "", 0, 2},
-    {"Z_xy", 1, "", 0, 2},
-    {"Z_xz", 1, "", 0, 2},
-    {"Z_yy", 1, "", 0, 2},
-    {"Z_yz", 1, "", 0, 2},
-    {"Z_zz", 1, "", 0, 2},
-    {"Y_x", 1, "", 0, 2},
-    {"Y_y", 1, "", 0, 2},
-    {"Y_z", 1, "", 0, 2},
-    {"G_x", 1, "", 0, 2},
-    {"G_y", 1, "", 0, 2},
-    {"G_z", 1, "", 0, 2},
-    {"M", 1, "", 0, 2},
-    {"K", 1, "", 0, 2},
-    {"D", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-    {"motion", 9, "", 0, 0},
-    {"S_rf", 6, "", 0, 1},
-    {"A", 6, "", 0, 1},
-    {"d_eta", 1, "", 0, 1},
-    {"d_etad", 1, "", 0, 1},
-    {"d_motion", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_residual_slope_outputs[] = {
-    {"d_S_rf", 6, "", 0, 1},
-    {"d_A", 6, "", 0, 1},
-    {"d_e", 6, "N, N*m", 0, 0},
-    {"d_e_f", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_residual_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18],
+  in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], out[0], out[1], out[2], out[3]))
 
 /* momentum and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -5771,622 +3150,354 @@ static const mstmm_port mstmm_sweep_modal_residual_slope_outputs[] = {
  * out d_h_f[n] derivative of h_f
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_momentum_slope_sized(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict eta, const real *restrict etad, const real *restrict v,
-    const real *restrict w, const real *restrict S_rf, const real *restrict A,
-    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
-    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
-    real *restrict d_h, real *restrict d_h_f)
+int mstmm_sweep_modal_momentum_slope_sized(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx,
+    in_t Z_xy, in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x,
+    in_t G_y, in_t G_z, in_t M, in_t eta, in_t etad, in_t v, in_t w, in_t S_rf, in_t A, in_t h_f,
+    in_t d_eta, in_t d_etad, in_t d_v, in_t d_w, out_t d_S_rf, out_t d_A, out_t d_h, out_t d_h_f)
 {
-    (void)P;
-    (void)h_f;
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = G_x[n * l + k] * d_eta[l];
-            t1 += t0;
-        }
-        const real t2 = -t1;
-        d_S_rf[k] = t2;
+  (void)P;
+  (void)h_f;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += G_x[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t4 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t3 = G_y[n * l + k] * d_eta[l];
-            t4 += t3;
-        }
-        const real t5 = -t4;
-        d_S_rf[n + k] = t5;
+    d_S_rf[k] = -t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t4 = 0;
+    for (int l = 0; l < n; ++l) {
+      t4 += G_y[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = G_z[n * l + k] * d_eta[l];
-            t7 += t6;
-        }
-        const real t8 = -t7;
-        d_S_rf[2 * n + k] = t8;
+    d_S_rf[n + k] = -t4;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += G_z[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t10 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t9 = Y_x[n * l + k] * d_eta[l];
-            t10 += t9;
-        }
-        d_S_rf[3 * n + k] = t10;
+    d_S_rf[2 * n + k] = -t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t10 = 0;
+    for (int l = 0; l < n; ++l) {
+      t10 += Y_x[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t12 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t11 = Y_y[n * l + k] * d_eta[l];
-            t12 += t11;
-        }
-        d_S_rf[4 * n + k] = t12;
+    d_S_rf[3 * n + k] = t10;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t12 = 0;
+    for (int l = 0; l < n; ++l) {
+      t12 += Y_y[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t14 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t13 = Y_z[n * l + k] * d_eta[l];
-            t14 += t13;
-        }
-        d_S_rf[5 * n + k] = t14;
+    d_S_rf[4 * n + k] = t12;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t14 = 0;
+    for (int l = 0; l < n; ++l) {
+      t14 += Y_z[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t16 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t15 = Z_xx[n * l + k] * d_eta[l];
-            t16 += t15;
-        }
-        d_A[k] = t16;
+    d_S_rf[5 * n + k] = t14;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t16 = 0;
+    for (int l = 0; l < n; ++l) {
+      t16 += Z_xx[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t18 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t17 = Z_xy[n * l + k] * d_eta[l];
-            t18 += t17;
-        }
-        d_A[n + k] = t18;
+    d_A[k] = t16;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t18 = 0;
+    for (int l = 0; l < n; ++l) {
+      t18 += Z_xy[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t20 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t19 = Z_xz[n * l + k] * d_eta[l];
-            t20 += t19;
-        }
-        d_A[2 * n + k] = t20;
+    d_A[n + k] = t18;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t20 = 0;
+    for (int l = 0; l < n; ++l) {
+      t20 += Z_xz[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t22 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t21 = Z_yy[n * l + k] * d_eta[l];
-            t22 += t21;
-        }
-        d_A[3 * n + k] = t22;
+    d_A[2 * n + k] = t20;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t22 = 0;
+    for (int l = 0; l < n; ++l) {
+      t22 += Z_yy[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t24 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t23 = Z_yz[n * l + k] * d_eta[l];
-            t24 += t23;
-        }
-        d_A[4 * n + k] = t24;
+    d_A[3 * n + k] = t22;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t24 = 0;
+    for (int l = 0; l < n; ++l) {
+      t24 += Z_yz[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t26 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t25 = Z_zz[n * l + k] * d_eta[l];
-            t26 += t25;
-        }
-        d_A[5 * n + k] = t26;
+    d_A[4 * n + k] = t24;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t26 = 0;
+    for (int l = 0; l < n; ++l) {
+      t26 += Z_zz[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        const real t27 = S_rf[5 * n + k] * d_w[2];
-        const real t28 = w[2] * d_S_rf[5 * n + k];
-        const real t29 = t27 + t28;
-        const real t30 = S_rf[4 * n + k] * d_w[1];
-        const real t31 = w[1] * d_S_rf[4 * n + k];
-        const real t32 = t30 + t31;
-        const real t33 = S_rf[3 * n + k] * d_w[0];
-        const real t34 = w[0] * d_S_rf[3 * n + k];
-        const real t35 = t33 + t34;
-        const real t36 = S_rf[2 * n + k] * d_v[2];
-        const real t37 = v[2] * d_S_rf[2 * n + k];
-        const real t38 = t36 + t37;
-        const real t39 = S_rf[n + k] * d_v[1];
-        const real t40 = v[1] * d_S_rf[n + k];
-        const real t41 = t39 + t40;
-        const real t42 = S_rf[k] * d_v[0];
-        const real t43 = v[0] * d_S_rf[k];
-        const real t44 = t42 + t43;
-        const real t45 = t41 + t44;
-        const real t46 = t38 + t45;
-        const real t47 = t35 + t46;
-        const real t48 = t32 + t47;
-        const real t49 = t29 + t48;
-        real t51 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t50 = M[n * k + l] * d_etad[l];
-            t51 += t50;
-        }
-        const real t52 = t49 + t51;
-        d_h_f[k] = t52;
+    d_A[5 * n + k] = t26;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t49 = S_rf[5 * n + k] * d_w[2] + w[2] * d_S_rf[5 * n + k] + (S_rf[4 * n + k] * d_w[1] +
+      w[1] * d_S_rf[4 * n + k] + (S_rf[3 * n + k] * d_w[0] + w[0] * d_S_rf[3 * n + k] + (S_rf[2 * n
+      + k] * d_v[2] + v[2] * d_S_rf[2 * n + k] + (S_rf[n + k] * d_v[1] + v[1] * d_S_rf[n + k] +
+      (S_rf[k] * d_v[0] + v[0] * d_S_rf[k])))));
+    real t51 = 0;
+    for (int l = 0; l < n; ++l) {
+      t51 += M[n * k + l] * d_etad[l];
     }
-    real t56 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t53 = etad[k] * d_S_rf[k];
-        const real t54 = S_rf[k] * d_etad[k];
-        const real t55 = t53 + t54;
-        t56 += t55;
-    }
-    real t58 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t57 = S_rf[2 * n + k] * eta[k];
-        t58 += t57;
-    }
-    const real t59 = t58 * 0.5;
-    real t61 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t60 = C[2 * n + k] * eta[k];
-        t61 += t60;
-    }
-    const real t62 = 0.5 * t61;
-    const real t63 = t59 + t62;
-    const real t64 = t63 + p[3];
-    const real t65 = t64 * d_w[1];
-    real t67 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t66 = C[2 * n + k] * d_eta[k];
-        t67 += t66;
-    }
-    const real t68 = 0.5 * t67;
-    real t72 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t69 = eta[k] * d_S_rf[2 * n + k];
-        const real t70 = S_rf[2 * n + k] * d_eta[k];
-        const real t71 = t69 + t70;
-        t72 += t71;
-    }
-    const real t73 = 0.5 * t72;
-    const real t74 = t68 + t73;
-    const real t75 = w[1] * t74;
-    const real t76 = t65 + t75;
-    const real t77 = p[0] * d_v[0];
-    const real t78 = t76 + t77;
-    real t80 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t79 = S_rf[n + k] * eta[k];
-        t80 += t79;
-    }
-    const real t81 = 0.5 * t80;
-    real t83 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t82 = C[n + k] * eta[k];
-        t83 += t82;
-    }
-    const real t84 = 0.5 * t83;
-    const real t85 = t81 + t84;
-    const real t86 = t85 + p[2];
-    const real t87 = t86 * d_w[2];
-    real t89 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t88 = C[n + k] * d_eta[k];
-        t89 += t88;
-    }
-    const real t90 = 0.5 * t89;
-    real t94 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t91 = eta[k] * d_S_rf[n + k];
-        const real t92 = S_rf[n + k] * d_eta[k];
-        const real t93 = t91 + t92;
-        t94 += t93;
-    }
-    const real t95 = 0.5 * t94;
-    const real t96 = t90 + t95;
-    const real t97 = w[2] * t96;
-    const real t98 = t87 + t97;
-    const real t99 = t78 - t98;
-    const real t100 = t56 + t99;
-    d_h[0] = t100;
-    real t104 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t101 = etad[k] * d_S_rf[n + k];
-        const real t102 = S_rf[n + k] * d_etad[k];
-        const real t103 = t101 + t102;
-        t104 += t103;
-    }
-    real t106 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t105 = S_rf[k] * eta[k];
-        t106 += t105;
-    }
-    const real t107 = 0.5 * t106;
-    real t109 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t108 = C[k] * eta[k];
-        t109 += t108;
-    }
-    const real t110 = 0.5 * t109;
-    const real t111 = t107 + t110;
-    const real t112 = t111 + p[1];
-    const real t113 = t112 * d_w[2];
-    real t115 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t114 = C[k] * d_eta[k];
-        t115 += t114;
-    }
-    const real t116 = 0.5 * t115;
-    real t120 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t117 = eta[k] * d_S_rf[k];
-        const real t118 = S_rf[k] * d_eta[k];
-        const real t119 = t117 + t118;
-        t120 += t119;
-    }
-    const real t121 = 0.5 * t120;
-    const real t122 = t116 + t121;
-    const real t123 = w[2] * t122;
-    const real t124 = t113 + t123;
-    const real t125 = p[0] * d_v[1];
-    const real t126 = t64 * d_w[0];
-    const real t127 = w[0] * t74;
-    const real t128 = t126 + t127;
-    const real t129 = t125 - t128;
-    const real t130 = t124 + t129;
-    const real t131 = t104 + t130;
-    d_h[1] = t131;
-    real t135 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t132 = etad[k] * d_S_rf[2 * n + k];
-        const real t133 = S_rf[2 * n + k] * d_etad[k];
-        const real t134 = t132 + t133;
-        t135 += t134;
-    }
-    const real t136 = t86 * d_w[0];
-    const real t137 = w[0] * t96;
-    const real t138 = t136 + t137;
-    const real t139 = p[0] * d_v[2];
-    const real t140 = t138 + t139;
-    const real t141 = t112 * d_w[1];
-    const real t142 = w[1] * t122;
-    const real t143 = t141 + t142;
-    const real t144 = t140 - t143;
-    const real t145 = t135 + t144;
-    d_h[2] = t145;
-    real t149 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t146 = etad[k] * d_S_rf[3 * n + k];
-        const real t147 = S_rf[3 * n + k] * d_etad[k];
-        const real t148 = t146 + t147;
-        t149 += t148;
-    }
-    real t151 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t150 = eta[k] * A[3 * n + k];
-        t151 += t150;
-    }
-    const real t152 = 0.5 * t151;
-    real t154 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t153 = B[3 * n + k] * eta[k];
-        t154 += t153;
-    }
-    const real t155 = 0.5 * t154;
-    const real t156 = t152 + t155;
-    const real t157 = t156 + p[7];
-    real t159 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t158 = eta[k] * A[5 * n + k];
-        t159 += t158;
-    }
-    const real t160 = 0.5 * t159;
-    real t162 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t161 = B[5 * n + k] * eta[k];
-        t162 += t161;
-    }
-    const real t163 = 0.5 * t162;
-    const real t164 = t160 + t163;
-    const real t165 = t164 + p[9];
-    const real t166 = t157 + t165;
-    const real t167 = t166 * d_w[0];
-    real t169 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t168 = B[5 * n + k] * d_eta[k];
-        t169 += t168;
-    }
-    const real t170 = 0.5 * t169;
-    real t174 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t171 = A[5 * n + k] * d_eta[k];
-        const real t172 = eta[k] * d_A[5 * n + k];
-        const real t173 = t171 + t172;
-        t174 += t173;
-    }
-    const real t175 = 0.5 * t174;
-    const real t176 = t170 + t175;
-    real t178 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t177 = B[3 * n + k] * d_eta[k];
-        t178 += t177;
-    }
-    const real t179 = 0.5 * t178;
-    real t183 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t180 = A[3 * n + k] * d_eta[k];
-        const real t181 = eta[k] * d_A[3 * n + k];
-        const real t182 = t180 + t181;
-        t183 += t182;
-    }
-    const real t184 = 0.5 * t183;
-    const real t185 = t179 + t184;
-    const real t186 = t176 + t185;
-    const real t187 = w[0] * t186;
-    const real t188 = t167 + t187;
-    const real t189 = t86 * d_v[2];
-    const real t190 = v[2] * t96;
-    const real t191 = t189 + t190;
-    const real t192 = t64 * d_v[1];
-    const real t193 = v[1] * t74;
-    const real t194 = t192 + t193;
-    const real t195 = t191 - t194;
-    const real t196 = t188 + t195;
-    real t198 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t197 = eta[k] * A[n + k];
-        t198 += t197;
-    }
-    const real t199 = 0.5 * t198;
-    real t201 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t200 = B[n + k] * eta[k];
-        t201 += t200;
-    }
-    const real t202 = 0.5 * t201;
-    const real t203 = t199 + t202;
-    const real t204 = t203 + p[5];
-    const real t205 = t204 * d_w[1];
-    real t207 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t206 = B[n + k] * d_eta[k];
-        t207 += t206;
-    }
-    const real t208 = 0.5 * t207;
-    real t212 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t209 = A[n + k] * d_eta[k];
-        const real t210 = eta[k] * d_A[n + k];
-        const real t211 = t209 + t210;
-        t212 += t211;
-    }
-    const real t213 = 0.5 * t212;
-    const real t214 = t208 + t213;
-    const real t215 = w[1] * t214;
-    const real t216 = t205 + t215;
-    const real t217 = t196 - t216;
-    real t219 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t218 = eta[k] * A[2 * n + k];
-        t219 += t218;
-    }
-    const real t220 = 0.5 * t219;
-    real t222 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t221 = B[2 * n + k] * eta[k];
-        t222 += t221;
-    }
-    const real t223 = 0.5 * t222;
-    const real t224 = t220 + t223;
-    const real t225 = t224 + p[6];
-    const real t226 = t225 * d_w[2];
-    real t228 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t227 = B[2 * n + k] * d_eta[k];
-        t228 += t227;
-    }
-    const real t229 = 0.5 * t228;
-    real t233 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t230 = A[2 * n + k] * d_eta[k];
-        const real t231 = eta[k] * d_A[2 * n + k];
-        const real t232 = t230 + t231;
-        t233 += t232;
-    }
-    const real t234 = 0.5 * t233;
-    const real t235 = t229 + t234;
-    const real t236 = w[2] * t235;
-    const real t237 = t226 + t236;
-    const real t238 = t217 - t237;
-    const real t239 = t149 + t238;
-    d_h[3] = t239;
-    real t243 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t240 = etad[k] * d_S_rf[4 * n + k];
-        const real t241 = S_rf[4 * n + k] * d_etad[k];
-        const real t242 = t240 + t241;
-        t243 += t242;
-    }
-    real t245 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t244 = eta[k] * A[k];
-        t245 += t244;
-    }
-    const real t246 = 0.5 * t245;
-    real t248 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t247 = B[k] * eta[k];
-        t248 += t247;
-    }
-    const real t249 = 0.5 * t248;
-    const real t250 = t246 + t249;
-    const real t251 = t250 + p[4];
-    const real t252 = t165 + t251;
-    const real t253 = t252 * d_w[1];
-    real t255 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t254 = B[k] * d_eta[k];
-        t255 += t254;
-    }
-    const real t256 = 0.5 * t255;
-    real t260 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t257 = A[k] * d_eta[k];
-        const real t258 = eta[k] * d_A[k];
-        const real t259 = t257 + t258;
-        t260 += t259;
-    }
-    const real t261 = 0.5 * t260;
-    const real t262 = t256 + t261;
-    const real t263 = t176 + t262;
-    const real t264 = w[1] * t263;
-    const real t265 = t253 + t264;
-    const real t266 = t64 * d_v[0];
-    const real t267 = v[0] * t74;
-    const real t268 = t266 + t267;
-    const real t269 = t112 * d_v[2];
-    const real t270 = v[2] * t122;
-    const real t271 = t269 + t270;
-    const real t272 = t268 - t271;
-    const real t273 = t204 * d_w[0];
-    const real t274 = w[0] * t214;
-    const real t275 = t273 + t274;
-    const real t276 = t272 - t275;
-    const real t277 = t265 + t276;
-    real t279 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t278 = eta[k] * A[4 * n + k];
-        t279 += t278;
-    }
-    const real t280 = 0.5 * t279;
-    real t282 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t281 = B[4 * n + k] * eta[k];
-        t282 += t281;
-    }
-    const real t283 = 0.5 * t282;
-    const real t284 = t280 + t283;
-    const real t285 = t284 + p[8];
-    const real t286 = t285 * d_w[2];
-    real t288 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t287 = B[4 * n + k] * d_eta[k];
-        t288 += t287;
-    }
-    const real t289 = 0.5 * t288;
-    real t293 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t290 = A[4 * n + k] * d_eta[k];
-        const real t291 = eta[k] * d_A[4 * n + k];
-        const real t292 = t290 + t291;
-        t293 += t292;
-    }
-    const real t294 = 0.5 * t293;
-    const real t295 = t289 + t294;
-    const real t296 = w[2] * t295;
-    const real t297 = t286 + t296;
-    const real t298 = t277 - t297;
-    const real t299 = t243 + t298;
-    d_h[4] = t299;
-    real t303 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t300 = etad[k] * d_S_rf[5 * n + k];
-        const real t301 = S_rf[5 * n + k] * d_etad[k];
-        const real t302 = t300 + t301;
-        t303 += t302;
-    }
-    const real t304 = t157 + t251;
-    const real t305 = t304 * d_w[2];
-    const real t306 = t185 + t262;
-    const real t307 = w[2] * t306;
-    const real t308 = t305 + t307;
-    const real t309 = t112 * d_v[1];
-    const real t310 = v[1] * t122;
-    const real t311 = t309 + t310;
-    const real t312 = t86 * d_v[0];
-    const real t313 = v[0] * t96;
-    const real t314 = t312 + t313;
-    const real t315 = t311 - t314;
-    const real t316 = t225 * d_w[0];
-    const real t317 = w[0] * t235;
-    const real t318 = t316 + t317;
-    const real t319 = t315 - t318;
-    const real t320 = t285 * d_w[1];
-    const real t321 = w[1] * t295;
-    const real t322 = t320 + t321;
-    const real t323 = t319 - t322;
-    const real t324 = t308 + t323;
-    const real t325 = t303 + t324;
-    d_h[5] = t325;
-    return 0;
+    d_h_f[k] = t49 + t51;
+  }
+  real t56 = 0;
+  for (int k = 0; k < n; ++k) {
+    t56 += etad[k] * d_S_rf[k] + S_rf[k] * d_etad[k];
+  }
+  real t58 = 0;
+  for (int k = 0; k < n; ++k) {
+    t58 += S_rf[2 * n + k] * eta[k];
+  }
+  real t59 = t58 * 0.5;
+  real t61 = 0;
+  for (int k = 0; k < n; ++k) {
+    t61 += C[2 * n + k] * eta[k];
+  }
+  real t64 = t59 + 0.5 * t61 + p[3];
+  real t65 = t64 * d_w[1];
+  real t67 = 0;
+  for (int k = 0; k < n; ++k) {
+    t67 += C[2 * n + k] * d_eta[k];
+  }
+  real t68 = 0.5 * t67;
+  real t72 = 0;
+  for (int k = 0; k < n; ++k) {
+    t72 += eta[k] * d_S_rf[2 * n + k] + S_rf[2 * n + k] * d_eta[k];
+  }
+  real t74 = t68 + 0.5 * t72;
+  real t78 = t65 + w[1] * t74 + p[0] * d_v[0];
+  real t80 = 0;
+  for (int k = 0; k < n; ++k) {
+    t80 += S_rf[n + k] * eta[k];
+  }
+  real t81 = 0.5 * t80;
+  real t83 = 0;
+  for (int k = 0; k < n; ++k) {
+    t83 += C[n + k] * eta[k];
+  }
+  real t86 = t81 + 0.5 * t83 + p[2];
+  real t87 = t86 * d_w[2];
+  real t89 = 0;
+  for (int k = 0; k < n; ++k) {
+    t89 += C[n + k] * d_eta[k];
+  }
+  real t90 = 0.5 * t89;
+  real t94 = 0;
+  for (int k = 0; k < n; ++k) {
+    t94 += eta[k] * d_S_rf[n + k] + S_rf[n + k] * d_eta[k];
+  }
+  real t96 = t90 + 0.5 * t94;
+  d_h[0] = t56 + (t78 - (t87 + w[2] * t96));
+  real t104 = 0;
+  for (int k = 0; k < n; ++k) {
+    t104 += etad[k] * d_S_rf[n + k] + S_rf[n + k] * d_etad[k];
+  }
+  real t106 = 0;
+  for (int k = 0; k < n; ++k) {
+    t106 += S_rf[k] * eta[k];
+  }
+  real t107 = 0.5 * t106;
+  real t109 = 0;
+  for (int k = 0; k < n; ++k) {
+    t109 += C[k] * eta[k];
+  }
+  real t112 = t107 + 0.5 * t109 + p[1];
+  real t113 = t112 * d_w[2];
+  real t115 = 0;
+  for (int k = 0; k < n; ++k) {
+    t115 += C[k] * d_eta[k];
+  }
+  real t116 = 0.5 * t115;
+  real t120 = 0;
+  for (int k = 0; k < n; ++k) {
+    t120 += eta[k] * d_S_rf[k] + S_rf[k] * d_eta[k];
+  }
+  real t122 = t116 + 0.5 * t120;
+  d_h[1] = t104 + (t113 + w[2] * t122 + (p[0] * d_v[1] - (t64 * d_w[0] + w[0] * t74)));
+  real t135 = 0;
+  for (int k = 0; k < n; ++k) {
+    t135 += etad[k] * d_S_rf[2 * n + k] + S_rf[2 * n + k] * d_etad[k];
+  }
+  d_h[2] = t135 + (t86 * d_w[0] + w[0] * t96 + p[0] * d_v[2] - (t112 * d_w[1] + w[1] * t122));
+  real t149 = 0;
+  for (int k = 0; k < n; ++k) {
+    t149 += etad[k] * d_S_rf[3 * n + k] + S_rf[3 * n + k] * d_etad[k];
+  }
+  real t151 = 0;
+  for (int k = 0; k < n; ++k) {
+    t151 += eta[k] * A[3 * n + k];
+  }
+  real t152 = 0.5 * t151;
+  real t154 = 0;
+  for (int k = 0; k < n; ++k) {
+    t154 += B[3 * n + k] * eta[k];
+  }
+  real t157 = t152 + 0.5 * t154 + p[7];
+  real t159 = 0;
+  for (int k = 0; k < n; ++k) {
+    t159 += eta[k] * A[5 * n + k];
+  }
+  real t160 = 0.5 * t159;
+  real t162 = 0;
+  for (int k = 0; k < n; ++k) {
+    t162 += B[5 * n + k] * eta[k];
+  }
+  real t165 = t160 + 0.5 * t162 + p[9];
+  real t167 = (t157 + t165) * d_w[0];
+  real t169 = 0;
+  for (int k = 0; k < n; ++k) {
+    t169 += B[5 * n + k] * d_eta[k];
+  }
+  real t170 = 0.5 * t169;
+  real t174 = 0;
+  for (int k = 0; k < n; ++k) {
+    t174 += A[5 * n + k] * d_eta[k] + eta[k] * d_A[5 * n + k];
+  }
+  real t176 = t170 + 0.5 * t174;
+  real t178 = 0;
+  for (int k = 0; k < n; ++k) {
+    t178 += B[3 * n + k] * d_eta[k];
+  }
+  real t179 = 0.5 * t178;
+  real t183 = 0;
+  for (int k = 0; k < n; ++k) {
+    t183 += A[3 * n + k] * d_eta[k] + eta[k] * d_A[3 * n + k];
+  }
+  real t185 = t179 + 0.5 * t183;
+  real t196 = t167 + w[0] * (t176 + t185) + (t86 * d_v[2] + v[2] * t96 - (t64 * d_v[1] + v[1] *
+    t74));
+  real t198 = 0;
+  for (int k = 0; k < n; ++k) {
+    t198 += eta[k] * A[n + k];
+  }
+  real t199 = 0.5 * t198;
+  real t201 = 0;
+  for (int k = 0; k < n; ++k) {
+    t201 += B[n + k] * eta[k];
+  }
+  real t204 = t199 + 0.5 * t201 + p[5];
+  real t205 = t204 * d_w[1];
+  real t207 = 0;
+  for (int k = 0; k < n; ++k) {
+    t207 += B[n + k] * d_eta[k];
+  }
+  real t208 = 0.5 * t207;
+  real t212 = 0;
+  for (int k = 0; k < n; ++k) {
+    t212 += A[n + k] * d_eta[k] + eta[k] * d_A[n + k];
+  }
+  real t214 = t208 + 0.5 * t212;
+  real t217 = t196 - (t205 + w[1] * t214);
+  real t219 = 0;
+  for (int k = 0; k < n; ++k) {
+    t219 += eta[k] * A[2 * n + k];
+  }
+  real t220 = 0.5 * t219;
+  real t222 = 0;
+  for (int k = 0; k < n; ++k) {
+    t222 += B[2 * n + k] * eta[k];
+  }
+  real t225 = t220 + 0.5 * t222 + p[6];
+  real t226 = t225 * d_w[2];
+  real t228 = 0;
+  for (int k = 0; k < n; ++k) {
+    t228 += B[2 * n + k] * d_eta[k];
+  }
+  real t229 = 0.5 * t228;
+  real t233 = 0;
+  for (int k = 0; k < n; ++k) {
+    t233 += A[2 * n + k] * d_eta[k] + eta[k] * d_A[2 * n + k];
+  }
+  real t235 = t229 + 0.5 * t233;
+  d_h[3] = t149 + (t217 - (t226 + w[2] * t235));
+  real t243 = 0;
+  for (int k = 0; k < n; ++k) {
+    t243 += etad[k] * d_S_rf[4 * n + k] + S_rf[4 * n + k] * d_etad[k];
+  }
+  real t245 = 0;
+  for (int k = 0; k < n; ++k) {
+    t245 += eta[k] * A[k];
+  }
+  real t246 = 0.5 * t245;
+  real t248 = 0;
+  for (int k = 0; k < n; ++k) {
+    t248 += B[k] * eta[k];
+  }
+  real t251 = t246 + 0.5 * t248 + p[4];
+  real t253 = (t165 + t251) * d_w[1];
+  real t255 = 0;
+  for (int k = 0; k < n; ++k) {
+    t255 += B[k] * d_eta[k];
+  }
+  real t256 = 0.5 * t255;
+  real t260 = 0;
+  for (int k = 0; k < n; ++k) {
+    t260 += A[k] * d_eta[k] + eta[k] * d_A[k];
+  }
+  real t262 = t256 + 0.5 * t260;
+  real t277 = t253 + w[1] * (t176 + t262) + (t64 * d_v[0] + v[0] * t74 - (t112 * d_v[2] + v[2] *
+    t122) - (t204 * d_w[0] + w[0] * t214));
+  real t279 = 0;
+  for (int k = 0; k < n; ++k) {
+    t279 += eta[k] * A[4 * n + k];
+  }
+  real t280 = 0.5 * t279;
+  real t282 = 0;
+  for (int k = 0; k < n; ++k) {
+    t282 += B[4 * n + k] * eta[k];
+  }
+  real t285 = t280 + 0.5 * t282 + p[8];
+  real t286 = t285 * d_w[2];
+  real t288 = 0;
+  for (int k = 0; k < n; ++k) {
+    t288 += B[4 * n + k] * d_eta[k];
+  }
+  real t289 = 0.5 * t288;
+  real t293 = 0;
+  for (int k = 0; k < n; ++k) {
+    t293 += A[4 * n + k] * d_eta[k] + eta[k] * d_A[4 * n + k];
+  }
+  real t295 = t289 + 0.5 * t293;
+  d_h[4] = t243 + (t277 - (t286 + w[2] * t295));
+  real t303 = 0;
+  for (int k = 0; k < n; ++k) {
+    t303 += etad[k] * d_S_rf[5 * n + k] + S_rf[5 * n + k] * d_etad[k];
+  }
+  d_h[5] = t303 + ((t157 + t251) * d_w[2] + w[2] * (t185 + t262) + (t112 * d_v[1] + v[1] * t122 -
+    (t86 * d_v[0] + v[0] * t96) - (t225 * d_w[0] + w[0] * t235) - (t285 * d_w[1] + w[1] * t295)));
+  return 0;
 }
 
-int mstmm_sweep_modal_momentum_slope(int n, const real *restrict p, const real *restrict C,
-    const real *restrict P, const real *restrict B, const real *restrict Z_xx,
-    const real *restrict Z_xy, const real *restrict Z_xz, const real *restrict Z_yy,
-    const real *restrict Z_yz, const real *restrict Z_zz, const real *restrict Y_x,
-    const real *restrict Y_y, const real *restrict Y_z, const real *restrict G_x,
-    const real *restrict G_y, const real *restrict G_z, const real *restrict M,
-    const real *restrict eta, const real *restrict etad, const real *restrict v,
-    const real *restrict w, const real *restrict S_rf, const real *restrict A,
-    const real *restrict h_f, const real *restrict d_eta, const real *restrict d_etad,
-    const real *restrict d_v, const real *restrict d_w, real *restrict d_S_rf, real *restrict d_A,
-    real *restrict d_h, real *restrict d_h_f)
+int mstmm_sweep_modal_momentum_slope(int n, in_t p, in_t C, in_t P, in_t B, in_t Z_xx, in_t Z_xy,
+    in_t Z_xz, in_t Z_yy, in_t Z_yz, in_t Z_zz, in_t Y_x, in_t Y_y, in_t Y_z, in_t G_x, in_t G_y,
+    in_t G_z, in_t M, in_t eta, in_t etad, in_t v, in_t w, in_t S_rf, in_t A, in_t h_f, in_t d_eta,
+    in_t d_etad, in_t d_v, in_t d_w, out_t d_S_rf, out_t d_A, out_t d_h, out_t d_h_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_momentum_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
-    case 2: return mstmm_sweep_modal_momentum_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
-    case 3: return mstmm_sweep_modal_momentum_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
-    case 4: return mstmm_sweep_modal_momentum_slope_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
-    default: return mstmm_sweep_modal_momentum_slope_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_momentum_slope_sized(1, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+  case 2: return mstmm_sweep_modal_momentum_slope_sized(2, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+  case 3: return mstmm_sweep_modal_momentum_slope_sized(3, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+  case 4: return mstmm_sweep_modal_momentum_slope_sized(4, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+  default: return mstmm_sweep_modal_momentum_slope_sized(n, p, C, P, B, Z_xx, Z_xy, Z_xz, Z_yy, Z_yz, Z_zz, Y_x, Y_y, Y_z, G_x, G_y, G_z, M, eta, etad, v, w, S_rf, A, h_f, d_eta, d_etad, d_v, d_w, d_S_rf, d_A, d_h, d_h_f);
+  }
 }
 
-static int mstmm_sweep_modal_momentum_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_momentum_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18], in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], in[27], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_modal_momentum_slope_inputs[] = {
-    {"p", 10, "", 0, 0},
-    {"C", 3, "", 0, 1},
-    {"P", 3, "", 0, 1},
-    {"B", 6, "", 0, 1},
-    {"Z_xx", 1, "", 0, 2},
-    {"Z_xy", 1, "", 0, 2},
-    {"Z_xz", 1, "", 0, 2},
-    {"Z_yy", 1, "", 0, 2},
-    {"Z_yz", 1, "", 0, 2},
-    {"Z_zz", 1, "", 0, 2},
-    {"Y_x", 1, "", 0, 2},
-    {"Y_y", 1, "", 0, 2},
-    {"Y_z", 1, "", 0, 2},
-    {"G_x", 1, "", 0, 2},
-    {"G_y", 1, "", 0, 2},
-    {"G_z", 1, "", 0, 2},
-    {"M", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-    {"v", 3, "m/s", 0, 0},
-    {"w", 3, "rad/s", 0, 0},
-    {"S_rf", 6, "", 0, 1},
-    {"A", 6, "", 0, 1},
-    {"h_f", 1, "", 0, 1},
-    {"d_eta", 1, "", 0, 1},
-    {"d_etad", 1, "", 0, 1},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_momentum_slope_outputs[] = {
-    {"d_S_rf", 6, "", 0, 1},
-    {"d_A", 6, "", 0, 1},
-    {"d_h", 6, "N*s, N*m*s", 0, 0},
-    {"d_h_f", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_momentum_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], in[14], in[15], in[16], in[17], in[18],
+  in[19], in[20], in[21], in[22], in[23], in[24], in[25], in[26], in[27], out[0], out[1], out[2],
+  out[3]))
 
 /* section and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -6415,378 +3526,246 @@ static const mstmm_port mstmm_sweep_modal_momentum_slope_outputs[] = {
  * out d_Psidd[3] (rad/s2) derivative of Psidd
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_section_slope_sized(int n, const real *restrict r, const real *restrict phi,
-    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
-    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
-    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
-    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
-    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd)
+int mstmm_sweep_modal_section_slope_sized(int n, in_t r, in_t phi, in_t theta, in_t g_x, in_t g_y,
+    in_t g_z, in_t h_x, in_t h_y, in_t h_z, in_t eta, in_t etad, in_t Phi, in_t d_eta, in_t d_etad,
+    out_t d_Phi, out_t d_x, out_t d_Psi, out_t d_xd, out_t d_Psid, out_t d_xdd, out_t d_Psidd)
 {
-    (void)r;
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = g_x[n * l + k] * d_eta[l];
-            t1 += t0;
-        }
-        const real t2 = -t1;
-        d_Phi[k] = t2;
+  (void)r;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += g_x[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t4 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t3 = g_y[n * l + k] * d_eta[l];
-            t4 += t3;
-        }
-        const real t5 = -t4;
-        d_Phi[n + k] = t5;
+    d_Phi[k] = -t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t4 = 0;
+    for (int l = 0; l < n; ++l) {
+      t4 += g_y[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = g_z[n * l + k] * d_eta[l];
-            t7 += t6;
-        }
-        const real t8 = -t7;
-        d_Phi[2 * n + k] = t8;
+    d_Phi[n + k] = -t4;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += g_z[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t10 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t9 = h_x[n * l + k] * d_eta[l];
-            t10 += t9;
-        }
-        const real t11 = -t10;
-        d_Phi[3 * n + k] = t11;
+    d_Phi[2 * n + k] = -t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t10 = 0;
+    for (int l = 0; l < n; ++l) {
+      t10 += h_x[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t13 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t12 = h_y[n * l + k] * d_eta[l];
-            t13 += t12;
-        }
-        const real t14 = -t13;
-        d_Phi[4 * n + k] = t14;
+    d_Phi[3 * n + k] = -t10;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t13 = 0;
+    for (int l = 0; l < n; ++l) {
+      t13 += h_y[n * l + k] * d_eta[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t16 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t15 = h_z[n * l + k] * d_eta[l];
-            t16 += t15;
-        }
-        const real t17 = -t16;
-        d_Phi[5 * n + k] = t17;
+    d_Phi[4 * n + k] = -t13;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t16 = 0;
+    for (int l = 0; l < n; ++l) {
+      t16 += h_z[n * l + k] * d_eta[l];
     }
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = phi[k] * d_eta[k];
-        t19 += t18;
+    d_Phi[5 * n + k] = -t16;
+  }
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += phi[k] * d_eta[k];
+  }
+  real t20 = 0.5 * t19;
+  real t24 = 0;
+  for (int k = 0; k < n; ++k) {
+    t24 += eta[k] * d_Phi[k] + Phi[k] * d_eta[k];
+  }
+  d_x[0] = t20 + 0.5 * t24;
+  real t28 = 0;
+  for (int k = 0; k < n; ++k) {
+    t28 += phi[n + k] * d_eta[k];
+  }
+  real t29 = 0.5 * t28;
+  real t33 = 0;
+  for (int k = 0; k < n; ++k) {
+    t33 += Phi[n + k] * d_eta[k] + eta[k] * d_Phi[n + k];
+  }
+  d_x[1] = t29 + 0.5 * t33;
+  real t37 = 0;
+  for (int k = 0; k < n; ++k) {
+    t37 += phi[2 * n + k] * d_eta[k];
+  }
+  real t38 = 0.5 * t37;
+  real t42 = 0;
+  for (int k = 0; k < n; ++k) {
+    t42 += Phi[2 * n + k] * d_eta[k] + eta[k] * d_Phi[2 * n + k];
+  }
+  d_x[2] = t38 + 0.5 * t42;
+  real t46 = 0;
+  for (int k = 0; k < n; ++k) {
+    t46 += theta[k] * d_eta[k];
+  }
+  real t47 = 0.5 * t46;
+  real t51 = 0;
+  for (int k = 0; k < n; ++k) {
+    t51 += Phi[3 * n + k] * d_eta[k] + eta[k] * d_Phi[3 * n + k];
+  }
+  d_Psi[0] = t47 + 0.5 * t51;
+  real t55 = 0;
+  for (int k = 0; k < n; ++k) {
+    t55 += theta[n + k] * d_eta[k];
+  }
+  real t56 = 0.5 * t55;
+  real t60 = 0;
+  for (int k = 0; k < n; ++k) {
+    t60 += Phi[4 * n + k] * d_eta[k] + eta[k] * d_Phi[4 * n + k];
+  }
+  d_Psi[1] = t56 + 0.5 * t60;
+  real t64 = 0;
+  for (int k = 0; k < n; ++k) {
+    t64 += theta[2 * n + k] * d_eta[k];
+  }
+  real t65 = 0.5 * t64;
+  real t69 = 0;
+  for (int k = 0; k < n; ++k) {
+    t69 += Phi[5 * n + k] * d_eta[k] + eta[k] * d_Phi[5 * n + k];
+  }
+  d_Psi[2] = t65 + 0.5 * t69;
+  real t75 = 0;
+  for (int k = 0; k < n; ++k) {
+    t75 += etad[k] * d_Phi[k] + Phi[k] * d_etad[k];
+  }
+  d_xd[0] = t75;
+  real t79 = 0;
+  for (int k = 0; k < n; ++k) {
+    t79 += etad[k] * d_Phi[n + k] + Phi[n + k] * d_etad[k];
+  }
+  d_xd[1] = t79;
+  real t83 = 0;
+  for (int k = 0; k < n; ++k) {
+    t83 += etad[k] * d_Phi[2 * n + k] + Phi[2 * n + k] * d_etad[k];
+  }
+  d_xd[2] = t83;
+  real t87 = 0;
+  for (int k = 0; k < n; ++k) {
+    t87 += etad[k] * d_Phi[3 * n + k] + Phi[3 * n + k] * d_etad[k];
+  }
+  d_Psid[0] = t87;
+  real t91 = 0;
+  for (int k = 0; k < n; ++k) {
+    t91 += etad[k] * d_Phi[4 * n + k] + Phi[4 * n + k] * d_etad[k];
+  }
+  d_Psid[1] = t91;
+  real t95 = 0;
+  for (int k = 0; k < n; ++k) {
+    t95 += etad[k] * d_Phi[5 * n + k] + Phi[5 * n + k] * d_etad[k];
+  }
+  d_Psid[2] = t95;
+  real t103 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t97 = 0;
+    for (int l = 0; l < n; ++l) {
+      t97 += g_x[n * k + l] * etad[l];
     }
-    const real t20 = 0.5 * t19;
-    real t24 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t21 = eta[k] * d_Phi[k];
-        const real t22 = Phi[k] * d_eta[k];
-        const real t23 = t21 + t22;
-        t24 += t23;
+    real t98 = t97 * d_etad[k];
+    real t100 = 0;
+    for (int l = 0; l < n; ++l) {
+      t100 += g_x[n * k + l] * d_etad[l];
     }
-    const real t25 = 0.5 * t24;
-    const real t26 = t20 + t25;
-    d_x[0] = t26;
-    real t28 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t27 = phi[n + k] * d_eta[k];
-        t28 += t27;
+    t103 += t98 + etad[k] * t100;
+  }
+  d_xdd[0] = -t103;
+  real t112 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t106 = 0;
+    for (int l = 0; l < n; ++l) {
+      t106 += etad[l] * g_y[n * k + l];
     }
-    const real t29 = 0.5 * t28;
-    real t33 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t30 = Phi[n + k] * d_eta[k];
-        const real t31 = eta[k] * d_Phi[n + k];
-        const real t32 = t30 + t31;
-        t33 += t32;
+    real t107 = t106 * d_etad[k];
+    real t109 = 0;
+    for (int l = 0; l < n; ++l) {
+      t109 += g_y[n * k + l] * d_etad[l];
     }
-    const real t34 = 0.5 * t33;
-    const real t35 = t29 + t34;
-    d_x[1] = t35;
-    real t37 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t36 = phi[2 * n + k] * d_eta[k];
-        t37 += t36;
+    t112 += t107 + etad[k] * t109;
+  }
+  d_xdd[1] = -t112;
+  real t121 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t115 = 0;
+    for (int l = 0; l < n; ++l) {
+      t115 += etad[l] * g_z[n * k + l];
     }
-    const real t38 = 0.5 * t37;
-    real t42 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t39 = Phi[2 * n + k] * d_eta[k];
-        const real t40 = eta[k] * d_Phi[2 * n + k];
-        const real t41 = t39 + t40;
-        t42 += t41;
+    real t116 = t115 * d_etad[k];
+    real t118 = 0;
+    for (int l = 0; l < n; ++l) {
+      t118 += g_z[n * k + l] * d_etad[l];
     }
-    const real t43 = 0.5 * t42;
-    const real t44 = t38 + t43;
-    d_x[2] = t44;
-    real t46 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t45 = theta[k] * d_eta[k];
-        t46 += t45;
+    t121 += t116 + etad[k] * t118;
+  }
+  d_xdd[2] = -t121;
+  real t130 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t124 = 0;
+    for (int l = 0; l < n; ++l) {
+      t124 += etad[l] * h_x[n * k + l];
     }
-    const real t47 = 0.5 * t46;
-    real t51 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t48 = Phi[3 * n + k] * d_eta[k];
-        const real t49 = eta[k] * d_Phi[3 * n + k];
-        const real t50 = t48 + t49;
-        t51 += t50;
+    real t125 = t124 * d_etad[k];
+    real t127 = 0;
+    for (int l = 0; l < n; ++l) {
+      t127 += h_x[n * k + l] * d_etad[l];
     }
-    const real t52 = 0.5 * t51;
-    const real t53 = t47 + t52;
-    d_Psi[0] = t53;
-    real t55 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t54 = theta[n + k] * d_eta[k];
-        t55 += t54;
+    t130 += t125 + etad[k] * t127;
+  }
+  d_Psidd[0] = -t130;
+  real t139 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t133 = 0;
+    for (int l = 0; l < n; ++l) {
+      t133 += etad[l] * h_y[n * k + l];
     }
-    const real t56 = 0.5 * t55;
-    real t60 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t57 = Phi[4 * n + k] * d_eta[k];
-        const real t58 = eta[k] * d_Phi[4 * n + k];
-        const real t59 = t57 + t58;
-        t60 += t59;
+    real t134 = t133 * d_etad[k];
+    real t136 = 0;
+    for (int l = 0; l < n; ++l) {
+      t136 += h_y[n * k + l] * d_etad[l];
     }
-    const real t61 = 0.5 * t60;
-    const real t62 = t56 + t61;
-    d_Psi[1] = t62;
-    real t64 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t63 = theta[2 * n + k] * d_eta[k];
-        t64 += t63;
+    t139 += t134 + etad[k] * t136;
+  }
+  d_Psidd[1] = -t139;
+  real t148 = 0;
+  for (int k = 0; k < n; ++k) {
+    real t142 = 0;
+    for (int l = 0; l < n; ++l) {
+      t142 += etad[l] * h_z[n * k + l];
     }
-    const real t65 = 0.5 * t64;
-    real t69 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t66 = Phi[5 * n + k] * d_eta[k];
-        const real t67 = eta[k] * d_Phi[5 * n + k];
-        const real t68 = t66 + t67;
-        t69 += t68;
+    real t143 = t142 * d_etad[k];
+    real t145 = 0;
+    for (int l = 0; l < n; ++l) {
+      t145 += h_z[n * k + l] * d_etad[l];
     }
-    const real t70 = 0.5 * t69;
-    const real t71 = t65 + t70;
-    d_Psi[2] = t71;
-    real t75 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t72 = etad[k] * d_Phi[k];
-        const real t73 = Phi[k] * d_etad[k];
-        const real t74 = t72 + t73;
-        t75 += t74;
-    }
-    d_xd[0] = t75;
-    real t79 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t76 = etad[k] * d_Phi[n + k];
-        const real t77 = Phi[n + k] * d_etad[k];
-        const real t78 = t76 + t77;
-        t79 += t78;
-    }
-    d_xd[1] = t79;
-    real t83 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t80 = etad[k] * d_Phi[2 * n + k];
-        const real t81 = Phi[2 * n + k] * d_etad[k];
-        const real t82 = t80 + t81;
-        t83 += t82;
-    }
-    d_xd[2] = t83;
-    real t87 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t84 = etad[k] * d_Phi[3 * n + k];
-        const real t85 = Phi[3 * n + k] * d_etad[k];
-        const real t86 = t84 + t85;
-        t87 += t86;
-    }
-    d_Psid[0] = t87;
-    real t91 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t88 = etad[k] * d_Phi[4 * n + k];
-        const real t89 = Phi[4 * n + k] * d_etad[k];
-        const real t90 = t88 + t89;
-        t91 += t90;
-    }
-    d_Psid[1] = t91;
-    real t95 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t92 = etad[k] * d_Phi[5 * n + k];
-        const real t93 = Phi[5 * n + k] * d_etad[k];
-        const real t94 = t92 + t93;
-        t95 += t94;
-    }
-    d_Psid[2] = t95;
-    real t103 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t97 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t96 = g_x[n * k + l] * etad[l];
-            t97 += t96;
-        }
-        const real t98 = t97 * d_etad[k];
-        real t100 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t99 = g_x[n * k + l] * d_etad[l];
-            t100 += t99;
-        }
-        const real t101 = etad[k] * t100;
-        const real t102 = t98 + t101;
-        t103 += t102;
-    }
-    const real t104 = -t103;
-    d_xdd[0] = t104;
-    real t112 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t106 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t105 = etad[l] * g_y[n * k + l];
-            t106 += t105;
-        }
-        const real t107 = t106 * d_etad[k];
-        real t109 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t108 = g_y[n * k + l] * d_etad[l];
-            t109 += t108;
-        }
-        const real t110 = etad[k] * t109;
-        const real t111 = t107 + t110;
-        t112 += t111;
-    }
-    const real t113 = -t112;
-    d_xdd[1] = t113;
-    real t121 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t115 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t114 = etad[l] * g_z[n * k + l];
-            t115 += t114;
-        }
-        const real t116 = t115 * d_etad[k];
-        real t118 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t117 = g_z[n * k + l] * d_etad[l];
-            t118 += t117;
-        }
-        const real t119 = etad[k] * t118;
-        const real t120 = t116 + t119;
-        t121 += t120;
-    }
-    const real t122 = -t121;
-    d_xdd[2] = t122;
-    real t130 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t124 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t123 = etad[l] * h_x[n * k + l];
-            t124 += t123;
-        }
-        const real t125 = t124 * d_etad[k];
-        real t127 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t126 = h_x[n * k + l] * d_etad[l];
-            t127 += t126;
-        }
-        const real t128 = etad[k] * t127;
-        const real t129 = t125 + t128;
-        t130 += t129;
-    }
-    const real t131 = -t130;
-    d_Psidd[0] = t131;
-    real t139 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t133 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t132 = etad[l] * h_y[n * k + l];
-            t133 += t132;
-        }
-        const real t134 = t133 * d_etad[k];
-        real t136 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t135 = h_y[n * k + l] * d_etad[l];
-            t136 += t135;
-        }
-        const real t137 = etad[k] * t136;
-        const real t138 = t134 + t137;
-        t139 += t138;
-    }
-    const real t140 = -t139;
-    d_Psidd[1] = t140;
-    real t148 = 0;
-    for (int k = 0; k < n; ++k) {
-        real t142 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t141 = etad[l] * h_z[n * k + l];
-            t142 += t141;
-        }
-        const real t143 = t142 * d_etad[k];
-        real t145 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t144 = h_z[n * k + l] * d_etad[l];
-            t145 += t144;
-        }
-        const real t146 = etad[k] * t145;
-        const real t147 = t143 + t146;
-        t148 += t147;
-    }
-    const real t149 = -t148;
-    d_Psidd[2] = t149;
-    return 0;
+    t148 += t143 + etad[k] * t145;
+  }
+  d_Psidd[2] = -t148;
+  return 0;
 }
 
-int mstmm_sweep_modal_section_slope(int n, const real *restrict r, const real *restrict phi,
-    const real *restrict theta, const real *restrict g_x, const real *restrict g_y,
-    const real *restrict g_z, const real *restrict h_x, const real *restrict h_y,
-    const real *restrict h_z, const real *restrict eta, const real *restrict etad,
-    const real *restrict Phi, const real *restrict d_eta, const real *restrict d_etad,
-    real *restrict d_Phi, real *restrict d_x, real *restrict d_Psi, real *restrict d_xd,
-    real *restrict d_Psid, real *restrict d_xdd, real *restrict d_Psidd)
+int mstmm_sweep_modal_section_slope(int n, in_t r, in_t phi, in_t theta, in_t g_x, in_t g_y,
+    in_t g_z, in_t h_x, in_t h_y, in_t h_z, in_t eta, in_t etad, in_t Phi, in_t d_eta, in_t d_etad,
+    out_t d_Phi, out_t d_x, out_t d_Psi, out_t d_xd, out_t d_Psid, out_t d_xdd, out_t d_Psidd)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_section_slope_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
-    case 2: return mstmm_sweep_modal_section_slope_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
-    case 3: return mstmm_sweep_modal_section_slope_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
-    case 4: return mstmm_sweep_modal_section_slope_sized(4, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
-    default: return mstmm_sweep_modal_section_slope_sized(n, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_section_slope_sized(1, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+  case 2: return mstmm_sweep_modal_section_slope_sized(2, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+  case 3: return mstmm_sweep_modal_section_slope_sized(3, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+  case 4: return mstmm_sweep_modal_section_slope_sized(4, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+  default: return mstmm_sweep_modal_section_slope_sized(n, r, phi, theta, g_x, g_y, g_z, h_x, h_y, h_z, eta, etad, Phi, d_eta, d_etad, d_Phi, d_x, d_Psi, d_xd, d_Psid, d_xdd, d_Psidd);
+  }
 }
 
-static int mstmm_sweep_modal_section_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_section_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0], out[1], out[2], out[3], out[4], out[5], out[6]);
-}
-
-static const mstmm_port mstmm_sweep_modal_section_slope_inputs[] = {
-    {"r", 3, "m", 0, 0},
-    {"phi", 3, "", 0, 1},
-    {"theta", 3, "", 0, 1},
-    {"g_x", 1, "", 0, 2},
-    {"g_y", 1, "", 0, 2},
-    {"g_z", 1, "", 0, 2},
-    {"h_x", 1, "", 0, 2},
-    {"h_y", 1, "", 0, 2},
-    {"h_z", 1, "", 0, 2},
-    {"eta", 1, "", 0, 1},
-    {"etad", 1, "", 0, 1},
-    {"Phi", 6, "", 0, 1},
-    {"d_eta", 1, "", 0, 1},
-    {"d_etad", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_section_slope_outputs[] = {
-    {"d_Phi", 6, "", 0, 1},
-    {"d_x", 3, "m", 0, 0},
-    {"d_Psi", 3, "rad", 0, 0},
-    {"d_xd", 3, "m/s", 0, 0},
-    {"d_Psid", 3, "rad/s", 0, 0},
-    {"d_xdd", 3, "m/s2", 0, 0},
-    {"d_Psidd", 3, "rad/s2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_section_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], in[13], out[0], out[1], out[2], out[3], out[4],
+  out[5], out[6]))
 
 /* end_motion and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -6812,948 +3791,274 @@ static const mstmm_port mstmm_sweep_modal_section_slope_outputs[] = {
  * out d_w[3] (rad/s) derivative of w
  * out d_c[6] (m/s2, rad/s2) derivative of c
  */
-int mstmm_sweep_modal_end_motion_slope(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
-    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
-    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c)
+int mstmm_sweep_modal_end_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
+    in_t Psidd, in_t d_x, in_t d_Psi, in_t d_xd, in_t d_Psid, in_t d_xdd, in_t d_Psidd, out_t d_R,
+    out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c)
 {
-    (void)x;
-    const real t0 = Psi[2] * Psi[0];
-    const real t1 = Psi[2] * Psi[2];
-    const real t2 = Psi[0] * Psi[0];
-    const real t3 = Psi[1] * Psi[1];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t5 * 8.896791392450574e-22;
-    const real t7 = t6 + (-4.110317623312165e-19);
-    const real t8 = t5 * t7;
-    const real t9 = t8 + ((real)1 / (real)6402373705728000);
-    const real t10 = t5 * t9;
-    const real t11 = t10 + (-((real)1 / (real)20922789888000));
-    const real t12 = t5 * t11;
-    const real t13 = t12 + ((real)1 / (real)87178291200);
-    const real t14 = t5 * t13;
-    const real t15 = t14 + (-((real)1 / (real)479001600));
-    const real t16 = t5 * t15;
-    const real t17 = t16 + ((real)1 / (real)3628800);
-    const real t18 = t5 * t17;
-    const real t19 = t18 + (-((real)1 / (real)40320));
-    const real t20 = t5 * t19;
-    const real t21 = t20 + ((real)1 / (real)720);
-    const real t22 = t5 * t21;
-    const real t23 = t22 + (-((real)1 / (real)24));
-    const real t24 = Psi[1] * d_Psi[1];
-    const real t25 = t24 + t24;
-    const real t26 = Psi[0] * d_Psi[0];
-    const real t27 = t26 + t26;
-    const real t28 = t25 + t27;
-    const real t29 = Psi[2] * d_Psi[2];
-    const real t30 = t29 + t29;
-    const real t31 = t28 + t30;
-    const real t32 = t23 * t31;
-    const real t33 = t21 * t31;
-    const real t34 = t19 * t31;
-    const real t35 = t17 * t31;
-    const real t36 = t15 * t31;
-    const real t37 = t13 * t31;
-    const real t38 = t11 * t31;
-    const real t39 = t9 * t31;
-    const real t40 = t7 * t31;
-    const real t41 = 8.896791392450574e-22 * t31;
-    const real t42 = t5 * t41;
-    const real t43 = t40 + t42;
-    const real t44 = t5 * t43;
-    const real t45 = t39 + t44;
-    const real t46 = t5 * t45;
-    const real t47 = t38 + t46;
-    const real t48 = t5 * t47;
-    const real t49 = t37 + t48;
-    const real t50 = t5 * t49;
-    const real t51 = t36 + t50;
-    const real t52 = t5 * t51;
-    const real t53 = t35 + t52;
-    const real t54 = t5 * t53;
-    const real t55 = t34 + t54;
-    const real t56 = t5 * t55;
-    const real t57 = t33 + t56;
-    const real t58 = t5 * t57;
-    const real t59 = t32 + t58;
-    const real t60 = t0 * t59;
-    const real t61 = t5 * t23;
-    const real t62 = t61 + 0.5;
-    const real t63 = Psi[0] * d_Psi[2];
-    const real t64 = Psi[2] * d_Psi[0];
-    const real t65 = t63 + t64;
-    const real t66 = t62 * t65;
-    const real t67 = t60 + t66;
-    const real t68 = t5 * 1.9572941063391263e-20;
-    const real t69 = t68 + (-8.22063524662433e-18);
-    const real t70 = t5 * t69;
-    const real t71 = t70 + ((real)1 / (real)355687428096000);
-    const real t72 = t5 * t71;
-    const real t73 = t72 + (-((real)1 / (real)1307674368000));
-    const real t74 = t5 * t73;
-    const real t75 = t74 + ((real)1 / (real)6227020800);
-    const real t76 = t5 * t75;
-    const real t77 = t76 + (-((real)1 / (real)39916800));
-    const real t78 = t5 * t77;
-    const real t79 = t78 + ((real)1 / (real)362880);
-    const real t80 = t5 * t79;
-    const real t81 = t80 + (-((real)1 / (real)5040));
-    const real t82 = t5 * t81;
-    const real t83 = t82 + ((real)1 / (real)120);
-    const real t84 = t5 * t83;
-    const real t85 = t84 + (-((real)1 / (real)6));
-    const real t86 = t5 * t85;
-    const real t87 = 1.0 + t86;
-    const real t88 = t87 * d_Psi[1];
-    const real t89 = t85 * t31;
-    const real t90 = t83 * t31;
-    const real t91 = t81 * t31;
-    const real t92 = t79 * t31;
-    const real t93 = t77 * t31;
-    const real t94 = t75 * t31;
-    const real t95 = t73 * t31;
-    const real t96 = t71 * t31;
-    const real t97 = t69 * t31;
-    const real t98 = 1.9572941063391263e-20 * t31;
-    const real t99 = t5 * t98;
-    const real t100 = t97 + t99;
-    const real t101 = t5 * t100;
-    const real t102 = t96 + t101;
-    const real t103 = t5 * t102;
-    const real t104 = t95 + t103;
-    const real t105 = t5 * t104;
-    const real t106 = t94 + t105;
-    const real t107 = t5 * t106;
-    const real t108 = t93 + t107;
-    const real t109 = t5 * t108;
-    const real t110 = t92 + t109;
-    const real t111 = t5 * t110;
-    const real t112 = t91 + t111;
-    const real t113 = t5 * t112;
-    const real t114 = t90 + t113;
-    const real t115 = t5 * t114;
-    const real t116 = t89 + t115;
-    const real t117 = Psi[1] * t116;
-    const real t118 = t88 + t117;
-    const real t119 = t67 + t118;
-    const real t120 = R_end[6] * t119;
-    const real t121 = Psi[0] * Psi[1];
-    const real t122 = t121 * t59;
-    const real t123 = Psi[1] * d_Psi[0];
-    const real t124 = Psi[0] * d_Psi[1];
-    const real t125 = t123 + t124;
-    const real t126 = t62 * t125;
-    const real t127 = t122 + t126;
-    const real t128 = t87 * d_Psi[2];
-    const real t129 = Psi[2] * t116;
-    const real t130 = t128 + t129;
-    const real t131 = t127 - t130;
-    const real t132 = R_end[3] * t131;
-    const real t133 = t1 + t3;
-    const real t134 = t133 * t59;
-    const real t135 = t25 + t30;
-    const real t136 = t62 * t135;
-    const real t137 = t134 + t136;
-    const real t138 = R_end[0] * t137;
-    const real t139 = t132 - t138;
-    const real t140 = t120 + t139;
-    d_R[0] = t140;
-    const real t141 = R_end[7] * t119;
-    const real t142 = R_end[4] * t131;
-    const real t143 = R_end[1] * t137;
-    const real t144 = t142 - t143;
-    const real t145 = t141 + t144;
-    d_R[1] = t145;
-    const real t146 = R_end[8] * t119;
-    const real t147 = R_end[5] * t131;
-    const real t148 = R_end[2] * t137;
-    const real t149 = t147 - t148;
-    const real t150 = t146 + t149;
-    d_R[2] = t150;
-    const real t151 = Psi[2] * Psi[1];
-    const real t152 = t151 * t59;
-    const real t153 = Psi[1] * d_Psi[2];
-    const real t154 = Psi[2] * d_Psi[1];
-    const real t155 = t153 + t154;
-    const real t156 = t62 * t155;
-    const real t157 = t152 + t156;
-    const real t158 = t87 * d_Psi[0];
-    const real t159 = Psi[0] * t116;
-    const real t160 = t158 + t159;
-    const real t161 = t157 - t160;
-    const real t162 = R_end[6] * t161;
-    const real t163 = t130 + t127;
-    const real t164 = R_end[0] * t163;
-    const real t165 = t1 + t2;
-    const real t166 = t165 * t59;
-    const real t167 = t27 + t30;
-    const real t168 = t62 * t167;
-    const real t169 = t166 + t168;
-    const real t170 = R_end[3] * t169;
-    const real t171 = t164 - t170;
-    const real t172 = t162 + t171;
-    d_R[3] = t172;
-    const real t173 = R_end[7] * t161;
-    const real t174 = R_end[1] * t163;
-    const real t175 = R_end[4] * t169;
-    const real t176 = t174 - t175;
-    const real t177 = t173 + t176;
-    d_R[4] = t177;
-    const real t178 = R_end[8] * t161;
-    const real t179 = R_end[2] * t163;
-    const real t180 = R_end[5] * t169;
-    const real t181 = t179 - t180;
-    const real t182 = t178 + t181;
-    d_R[5] = t182;
-    const real t183 = t160 + t157;
-    const real t184 = R_end[3] * t183;
-    const real t185 = t67 - t118;
-    const real t186 = R_end[0] * t185;
-    const real t187 = t184 + t186;
-    const real t188 = t62 * t28;
-    const real t189 = t4 * t59;
-    const real t190 = t188 + t189;
-    const real t191 = R_end[6] * t190;
-    const real t192 = t187 - t191;
-    d_R[6] = t192;
-    const real t193 = R_end[4] * t183;
-    const real t194 = R_end[1] * t185;
-    const real t195 = t193 + t194;
-    const real t196 = R_end[7] * t190;
-    const real t197 = t195 - t196;
-    d_R[7] = t197;
-    const real t198 = R_end[5] * t183;
-    const real t199 = R_end[2] * t185;
-    const real t200 = t198 + t199;
-    const real t201 = R_end[8] * t190;
-    const real t202 = t200 - t201;
-    d_R[8] = t202;
-    d_d[0] = d_x[0];
-    d_d[1] = d_x[1];
-    d_d[2] = d_x[2];
-    d_H6[0] = t140;
-    d_H6[1] = t172;
-    d_H6[2] = t192;
-    d_H6[3] = 0.0;
-    d_H6[4] = 0.0;
-    d_H6[5] = 0.0;
-    d_H6[6] = t145;
-    d_H6[7] = t177;
-    d_H6[8] = t197;
-    d_H6[9] = 0.0;
-    d_H6[10] = 0.0;
-    d_H6[11] = 0.0;
-    d_H6[12] = t150;
-    d_H6[13] = t182;
-    d_H6[14] = t202;
-    d_H6[15] = 0.0;
-    d_H6[16] = 0.0;
-    d_H6[17] = 0.0;
-    d_H6[18] = 0.0;
-    d_H6[19] = 0.0;
-    d_H6[20] = 0.0;
-    const real t203 = t5 * 3.868170170630684e-23;
-    const real t204 = t203 + (-1.9572941063391263e-20);
-    const real t205 = t5 * t204;
-    const real t206 = t205 + 8.22063524662433e-18;
-    const real t207 = t5 * t206;
-    const real t208 = t207 + (-((real)1 / (real)355687428096000));
-    const real t209 = t5 * t208;
-    const real t210 = t209 + ((real)1 / (real)1307674368000);
-    const real t211 = t5 * t210;
-    const real t212 = t211 + (-((real)1 / (real)6227020800));
-    const real t213 = t5 * t212;
-    const real t214 = t213 + ((real)1 / (real)39916800);
-    const real t215 = t5 * t214;
-    const real t216 = t215 + (-((real)1 / (real)362880));
-    const real t217 = t5 * t216;
-    const real t218 = t217 + ((real)1 / (real)5040);
-    const real t219 = t5 * t218;
-    const real t220 = t219 + (-((real)1 / (real)120));
-    const real t221 = t5 * t220;
-    const real t222 = t221 + ((real)1 / (real)6);
-    const real t223 = t222 * t65;
-    const real t224 = t220 * t31;
-    const real t225 = t218 * t31;
-    const real t226 = t216 * t31;
-    const real t227 = t214 * t31;
-    const real t228 = t212 * t31;
-    const real t229 = t210 * t31;
-    const real t230 = t208 * t31;
-    const real t231 = t206 * t31;
-    const real t232 = t204 * t31;
-    const real t233 = 3.868170170630684e-23 * t31;
-    const real t234 = t5 * t233;
-    const real t235 = t232 + t234;
-    const real t236 = t5 * t235;
-    const real t237 = t231 + t236;
-    const real t238 = t5 * t237;
-    const real t239 = t230 + t238;
-    const real t240 = t5 * t239;
-    const real t241 = t229 + t240;
-    const real t242 = t5 * t241;
-    const real t243 = t228 + t242;
-    const real t244 = t5 * t243;
-    const real t245 = t227 + t244;
-    const real t246 = t5 * t245;
-    const real t247 = t226 + t246;
-    const real t248 = t5 * t247;
-    const real t249 = t225 + t248;
-    const real t250 = t5 * t249;
-    const real t251 = t224 + t250;
-    const real t252 = t0 * t251;
-    const real t253 = t223 + t252;
-    const real t254 = t62 * d_Psi[1];
-    const real t255 = Psi[1] * t59;
-    const real t256 = t254 + t255;
-    const real t257 = t253 + t256;
-    const real t258 = R_end[6] * t257;
-    const real t259 = t222 * t125;
-    const real t260 = t121 * t251;
-    const real t261 = t259 + t260;
-    const real t262 = t62 * d_Psi[2];
-    const real t263 = Psi[2] * t59;
-    const real t264 = t262 + t263;
-    const real t265 = t261 - t264;
-    const real t266 = R_end[3] * t265;
-    const real t267 = t222 * t135;
-    const real t268 = t133 * t251;
-    const real t269 = t267 + t268;
-    const real t270 = R_end[0] * t269;
-    const real t271 = t266 - t270;
-    const real t272 = t258 + t271;
-    d_H6[21] = t272;
-    const real t273 = t222 * t155;
-    const real t274 = t151 * t251;
-    const real t275 = t273 + t274;
-    const real t276 = t62 * d_Psi[0];
-    const real t277 = Psi[0] * t59;
-    const real t278 = t276 + t277;
-    const real t279 = t275 - t278;
-    const real t280 = R_end[6] * t279;
-    const real t281 = t264 + t261;
-    const real t282 = R_end[0] * t281;
-    const real t283 = t222 * t167;
-    const real t284 = t165 * t251;
-    const real t285 = t283 + t284;
-    const real t286 = R_end[3] * t285;
-    const real t287 = t282 - t286;
-    const real t288 = t280 + t287;
-    d_H6[22] = t288;
-    const real t289 = t278 + t275;
-    const real t290 = R_end[3] * t289;
-    const real t291 = t253 - t256;
-    const real t292 = R_end[0] * t291;
-    const real t293 = t290 + t292;
-    const real t294 = t222 * t28;
-    const real t295 = t4 * t251;
-    const real t296 = t294 + t295;
-    const real t297 = R_end[6] * t296;
-    const real t298 = t293 - t297;
-    d_H6[23] = t298;
-    d_H6[24] = 0.0;
-    d_H6[25] = 0.0;
-    d_H6[26] = 0.0;
-    const real t299 = R_end[7] * t257;
-    const real t300 = R_end[4] * t265;
-    const real t301 = R_end[1] * t269;
-    const real t302 = t300 - t301;
-    const real t303 = t299 + t302;
-    d_H6[27] = t303;
-    const real t304 = R_end[7] * t279;
-    const real t305 = R_end[1] * t281;
-    const real t306 = R_end[4] * t285;
-    const real t307 = t305 - t306;
-    const real t308 = t304 + t307;
-    d_H6[28] = t308;
-    const real t309 = R_end[4] * t289;
-    const real t310 = R_end[1] * t291;
-    const real t311 = t309 + t310;
-    const real t312 = R_end[7] * t296;
-    const real t313 = t311 - t312;
-    d_H6[29] = t313;
-    d_H6[30] = 0.0;
-    d_H6[31] = 0.0;
-    d_H6[32] = 0.0;
-    const real t314 = R_end[8] * t257;
-    const real t315 = R_end[5] * t265;
-    const real t316 = R_end[2] * t269;
-    const real t317 = t315 - t316;
-    const real t318 = t314 + t317;
-    d_H6[33] = t318;
-    const real t319 = R_end[8] * t279;
-    const real t320 = R_end[2] * t281;
-    const real t321 = R_end[5] * t285;
-    const real t322 = t320 - t321;
-    const real t323 = t319 + t322;
-    d_H6[34] = t323;
-    const real t324 = R_end[5] * t289;
-    const real t325 = R_end[2] * t291;
-    const real t326 = t324 + t325;
-    const real t327 = R_end[8] * t296;
-    const real t328 = t326 - t327;
-    d_H6[35] = t328;
-    const real t329 = xd[2] * t192;
-    const real t330 = t62 * t0;
-    const real t331 = Psi[1] * t87;
-    const real t332 = t330 - t331;
-    const real t333 = R_end[0] * t332;
-    const real t334 = t62 * t151;
-    const real t335 = Psi[0] * t87;
-    const real t336 = t334 + t335;
-    const real t337 = R_end[3] * t336;
-    const real t338 = t333 + t337;
-    const real t339 = t4 * t62;
-    const real t340 = 1.0 - t339;
-    const real t341 = R_end[6] * t340;
-    const real t342 = t338 + t341;
-    const real t343 = t342 * d_xd[2];
-    const real t344 = t329 + t343;
-    const real t345 = xd[1] * t172;
-    const real t346 = t62 * t121;
-    const real t347 = Psi[2] * t87;
-    const real t348 = t346 + t347;
-    const real t349 = R_end[0] * t348;
-    const real t350 = t62 * t165;
-    const real t351 = 1.0 - t350;
-    const real t352 = R_end[3] * t351;
-    const real t353 = t349 + t352;
-    const real t354 = t334 - t335;
-    const real t355 = R_end[6] * t354;
-    const real t356 = t353 + t355;
-    const real t357 = t356 * d_xd[1];
-    const real t358 = t345 + t357;
-    const real t359 = xd[0] * t140;
-    const real t360 = t62 * t133;
-    const real t361 = 1.0 - t360;
-    const real t362 = t361 * R_end[0];
-    const real t363 = t346 - t347;
-    const real t364 = t363 * R_end[3];
-    const real t365 = t362 + t364;
-    const real t366 = t331 + t330;
-    const real t367 = t366 * R_end[6];
-    const real t368 = t365 + t367;
-    const real t369 = t368 * d_xd[0];
-    const real t370 = t359 + t369;
-    const real t371 = t358 + t370;
-    const real t372 = t344 + t371;
-    d_v[0] = t372;
-    const real t373 = xd[2] * t197;
-    const real t374 = R_end[1] * t332;
-    const real t375 = R_end[4] * t336;
-    const real t376 = t374 + t375;
-    const real t377 = R_end[7] * t340;
-    const real t378 = t376 + t377;
-    const real t379 = t378 * d_xd[2];
-    const real t380 = t373 + t379;
-    const real t381 = xd[1] * t177;
-    const real t382 = R_end[1] * t348;
-    const real t383 = R_end[4] * t351;
-    const real t384 = t382 + t383;
-    const real t385 = R_end[7] * t354;
-    const real t386 = t384 + t385;
-    const real t387 = t386 * d_xd[1];
-    const real t388 = t381 + t387;
-    const real t389 = xd[0] * t145;
-    const real t390 = t361 * R_end[1];
-    const real t391 = t363 * R_end[4];
-    const real t392 = t390 + t391;
-    const real t393 = t366 * R_end[7];
-    const real t394 = t392 + t393;
-    const real t395 = t394 * d_xd[0];
-    const real t396 = t389 + t395;
-    const real t397 = t388 + t396;
-    const real t398 = t380 + t397;
-    d_v[1] = t398;
-    const real t399 = xd[2] * t202;
-    const real t400 = R_end[2] * t332;
-    const real t401 = R_end[5] * t336;
-    const real t402 = t400 + t401;
-    const real t403 = R_end[8] * t340;
-    const real t404 = t402 + t403;
-    const real t405 = t404 * d_xd[2];
-    const real t406 = t399 + t405;
-    const real t407 = xd[1] * t182;
-    const real t408 = R_end[2] * t348;
-    const real t409 = R_end[5] * t351;
-    const real t410 = t408 + t409;
-    const real t411 = R_end[8] * t354;
-    const real t412 = t410 + t411;
-    const real t413 = t412 * d_xd[1];
-    const real t414 = t407 + t413;
-    const real t415 = xd[0] * t150;
-    const real t416 = t361 * R_end[2];
-    const real t417 = t363 * R_end[5];
-    const real t418 = t416 + t417;
-    const real t419 = t366 * R_end[8];
-    const real t420 = t418 + t419;
-    const real t421 = t420 * d_xd[0];
-    const real t422 = t415 + t421;
-    const real t423 = t414 + t422;
-    const real t424 = t406 + t423;
-    d_v[2] = t424;
-    const real t425 = Psid[2] * t298;
-    const real t426 = t0 * t222;
-    const real t427 = Psi[1] * t62;
-    const real t428 = t426 - t427;
-    const real t429 = R_end[0] * t428;
-    const real t430 = t151 * t222;
-    const real t431 = Psi[0] * t62;
-    const real t432 = t430 + t431;
-    const real t433 = R_end[3] * t432;
-    const real t434 = t429 + t433;
-    const real t435 = t4 * t222;
-    const real t436 = 1.0 - t435;
-    const real t437 = R_end[6] * t436;
-    const real t438 = t434 + t437;
-    const real t439 = t438 * d_Psid[2];
-    const real t440 = t425 + t439;
-    const real t441 = Psid[1] * t288;
-    const real t442 = t121 * t222;
-    const real t443 = Psi[2] * t62;
-    const real t444 = t442 + t443;
-    const real t445 = R_end[0] * t444;
-    const real t446 = t165 * t222;
-    const real t447 = 1.0 - t446;
-    const real t448 = R_end[3] * t447;
-    const real t449 = t445 + t448;
-    const real t450 = t430 - t431;
-    const real t451 = R_end[6] * t450;
-    const real t452 = t449 + t451;
-    const real t453 = t452 * d_Psid[1];
-    const real t454 = t441 + t453;
-    const real t455 = Psid[0] * t272;
-    const real t456 = t133 * t222;
-    const real t457 = 1.0 - t456;
-    const real t458 = R_end[0] * t457;
-    const real t459 = t442 - t443;
-    const real t460 = R_end[3] * t459;
-    const real t461 = t458 + t460;
-    const real t462 = t427 + t426;
-    const real t463 = R_end[6] * t462;
-    const real t464 = t461 + t463;
-    const real t465 = t464 * d_Psid[0];
-    const real t466 = t455 + t465;
-    const real t467 = t454 + t466;
-    const real t468 = t440 + t467;
-    d_w[0] = t468;
-    const real t469 = Psid[2] * t313;
-    const real t470 = R_end[1] * t428;
-    const real t471 = R_end[4] * t432;
-    const real t472 = t470 + t471;
-    const real t473 = R_end[7] * t436;
-    const real t474 = t472 + t473;
-    const real t475 = t474 * d_Psid[2];
-    const real t476 = t469 + t475;
-    const real t477 = Psid[1] * t308;
-    const real t478 = R_end[1] * t444;
-    const real t479 = R_end[4] * t447;
-    const real t480 = t478 + t479;
-    const real t481 = R_end[7] * t450;
-    const real t482 = t480 + t481;
-    const real t483 = t482 * d_Psid[1];
-    const real t484 = t477 + t483;
-    const real t485 = Psid[0] * t303;
-    const real t486 = R_end[1] * t457;
-    const real t487 = R_end[4] * t459;
-    const real t488 = t486 + t487;
-    const real t489 = R_end[7] * t462;
-    const real t490 = t488 + t489;
-    const real t491 = t490 * d_Psid[0];
-    const real t492 = t485 + t491;
-    const real t493 = t484 + t492;
-    const real t494 = t476 + t493;
-    d_w[1] = t494;
-    const real t495 = Psid[2] * t328;
-    const real t496 = R_end[2] * t428;
-    const real t497 = R_end[5] * t432;
-    const real t498 = t496 + t497;
-    const real t499 = R_end[8] * t436;
-    const real t500 = t498 + t499;
-    const real t501 = t500 * d_Psid[2];
-    const real t502 = t495 + t501;
-    const real t503 = Psid[1] * t323;
-    const real t504 = R_end[2] * t444;
-    const real t505 = R_end[5] * t447;
-    const real t506 = t504 + t505;
-    const real t507 = R_end[8] * t450;
-    const real t508 = t506 + t507;
-    const real t509 = t508 * d_Psid[1];
-    const real t510 = t503 + t509;
-    const real t511 = Psid[0] * t318;
-    const real t512 = R_end[2] * t457;
-    const real t513 = R_end[5] * t459;
-    const real t514 = t512 + t513;
-    const real t515 = R_end[8] * t462;
-    const real t516 = t514 + t515;
-    const real t517 = t516 * d_Psid[0];
-    const real t518 = t511 + t517;
-    const real t519 = t510 + t518;
-    const real t520 = t502 + t519;
-    d_w[2] = t520;
-    const real t521 = xdd[2] * t192;
-    const real t522 = t342 * d_xdd[2];
-    const real t523 = t521 + t522;
-    const real t524 = xdd[1] * t172;
-    const real t525 = t356 * d_xdd[1];
-    const real t526 = t524 + t525;
-    const real t527 = xdd[0] * t140;
-    const real t528 = t368 * d_xdd[0];
-    const real t529 = t527 + t528;
-    const real t530 = t526 + t529;
-    const real t531 = t523 + t530;
-    d_c[0] = t531;
-    const real t532 = xdd[2] * t197;
-    const real t533 = t378 * d_xdd[2];
-    const real t534 = t532 + t533;
-    const real t535 = xdd[1] * t177;
-    const real t536 = t386 * d_xdd[1];
-    const real t537 = t535 + t536;
-    const real t538 = xdd[0] * t145;
-    const real t539 = t394 * d_xdd[0];
-    const real t540 = t538 + t539;
-    const real t541 = t537 + t540;
-    const real t542 = t534 + t541;
-    d_c[1] = t542;
-    const real t543 = xdd[2] * t202;
-    const real t544 = t404 * d_xdd[2];
-    const real t545 = t543 + t544;
-    const real t546 = xdd[1] * t182;
-    const real t547 = t412 * d_xdd[1];
-    const real t548 = t546 + t547;
-    const real t549 = xdd[0] * t150;
-    const real t550 = t420 * d_xdd[0];
-    const real t551 = t549 + t550;
-    const real t552 = t548 + t551;
-    const real t553 = t545 + t552;
-    d_c[2] = t553;
-    const real t554 = Psi[2] * Psid[0];
-    const real t555 = Psi[0] * Psid[2];
-    const real t556 = t554 - t555;
-    const real t557 = Psid[0] * t556;
-    const real t558 = Psi[1] * Psid[2];
-    const real t559 = Psi[2] * Psid[1];
-    const real t560 = t558 - t559;
-    const real t561 = Psid[1] * t560;
-    const real t562 = t557 - t561;
-    const real t563 = t562 * t251;
-    const real t564 = t556 * d_Psid[0];
-    const real t565 = Psid[0] * d_Psi[2];
-    const real t566 = Psi[2] * d_Psid[0];
-    const real t567 = t565 + t566;
-    const real t568 = Psid[2] * d_Psi[0];
-    const real t569 = Psi[0] * d_Psid[2];
-    const real t570 = t568 + t569;
-    const real t571 = t567 - t570;
-    const real t572 = Psid[0] * t571;
-    const real t573 = t564 + t572;
-    const real t574 = t560 * d_Psid[1];
-    const real t575 = Psid[2] * d_Psi[1];
-    const real t576 = Psi[1] * d_Psid[2];
-    const real t577 = t575 + t576;
-    const real t578 = Psid[1] * d_Psi[2];
-    const real t579 = Psi[2] * d_Psid[1];
-    const real t580 = t578 + t579;
-    const real t581 = t577 - t580;
-    const real t582 = Psid[1] * t581;
-    const real t583 = t574 + t582;
-    const real t584 = t573 - t583;
-    const real t585 = t222 * t584;
-    const real t586 = t563 + t585;
-    const real t587 = Psi[0] * t556;
-    const real t588 = Psi[1] * t560;
-    const real t589 = t587 - t588;
-    const real t590 = t5 * 3.868170170630684e-22;
-    const real t591 = t590 + (-1.7615646957052136e-19);
-    const real t592 = t5 * t591;
-    const real t593 = t592 + 6.576508197299464e-17;
-    const real t594 = t5 * t593;
-    const real t595 = t594 + (-((real)1 / (real)50812489728000));
-    const real t596 = t5 * t595;
-    const real t597 = t596 + ((real)1 / (real)217945728000);
-    const real t598 = t5 * t597;
-    const real t599 = t598 + (-((real)1 / (real)1245404160));
-    const real t600 = t5 * t599;
-    const real t601 = t600 + ((real)1 / (real)9979200);
-    const real t602 = t5 * t601;
-    const real t603 = t602 + (-((real)1 / (real)120960));
-    const real t604 = t5 * t603;
-    const real t605 = t604 + ((real)1 / (real)2520);
-    const real t606 = t5 * t605;
-    const real t607 = (-((real)1 / (real)120)) + t606;
-    const real t608 = Psid[1] * d_Psi[1];
-    const real t609 = Psi[1] * d_Psid[1];
-    const real t610 = t608 + t609;
-    const real t611 = Psid[0] * d_Psi[0];
-    const real t612 = Psi[0] * d_Psid[0];
-    const real t613 = t611 + t612;
-    const real t614 = t610 + t613;
-    const real t615 = Psid[2] * d_Psi[2];
-    const real t616 = Psi[2] * d_Psid[2];
-    const real t617 = t615 + t616;
-    const real t618 = t614 + t617;
-    const real t619 = 2.0 * t618;
-    const real t620 = t607 * t619;
-    const real t621 = Psi[2] * Psid[2];
-    const real t622 = Psi[0] * Psid[0];
-    const real t623 = Psi[1] * Psid[1];
-    const real t624 = t622 + t623;
-    const real t625 = t621 + t624;
-    const real t626 = t625 * 2.0;
-    const real t627 = t605 * t31;
-    const real t628 = t603 * t31;
-    const real t629 = t601 * t31;
-    const real t630 = t599 * t31;
-    const real t631 = t597 * t31;
-    const real t632 = t595 * t31;
-    const real t633 = t593 * t31;
-    const real t634 = t591 * t31;
-    const real t635 = 3.868170170630684e-22 * t31;
-    const real t636 = t5 * t635;
-    const real t637 = t634 + t636;
-    const real t638 = t5 * t637;
-    const real t639 = t633 + t638;
-    const real t640 = t5 * t639;
-    const real t641 = t632 + t640;
-    const real t642 = t5 * t641;
-    const real t643 = t631 + t642;
-    const real t644 = t5 * t643;
-    const real t645 = t630 + t644;
-    const real t646 = t5 * t645;
-    const real t647 = t629 + t646;
-    const real t648 = t5 * t647;
-    const real t649 = t628 + t648;
-    const real t650 = t5 * t649;
-    const real t651 = t627 + t650;
-    const real t652 = t626 * t651;
-    const real t653 = t620 + t652;
-    const real t654 = t589 * t653;
-    const real t655 = t626 * t607;
-    const real t656 = t556 * d_Psi[0];
-    const real t657 = Psi[0] * t571;
-    const real t658 = t656 + t657;
-    const real t659 = t560 * d_Psi[1];
-    const real t660 = Psi[1] * t581;
-    const real t661 = t659 + t660;
-    const real t662 = t658 - t661;
-    const real t663 = t655 * t662;
-    const real t664 = t654 + t663;
-    const real t665 = t586 + t664;
-    const real t666 = t436 * d_Psidd[2];
-    const real t667 = Psidd[2] * t296;
-    const real t668 = t666 - t667;
-    const real t669 = t665 + t668;
-    const real t670 = t5 * 8.896791392450573e-21;
-    const real t671 = t670 + (-3.6992858609809485e-18);
-    const real t672 = t5 * t671;
-    const real t673 = t672 + ((real)1 / (real)800296713216000);
-    const real t674 = t5 * t673;
-    const real t675 = t674 + (-((real)1 / (real)2988969984000));
-    const real t676 = t5 * t675;
-    const real t677 = t676 + ((real)1 / (real)14529715200);
-    const real t678 = t5 * t677;
-    const real t679 = t678 + (-((real)1 / (real)95800320));
-    const real t680 = t5 * t679;
-    const real t681 = t680 + ((real)1 / (real)907200);
-    const real t682 = t5 * t681;
-    const real t683 = t682 + (-((real)1 / (real)13440));
-    const real t684 = t5 * t683;
-    const real t685 = t684 + ((real)1 / (real)360);
-    const real t686 = t5 * t685;
-    const real t687 = (-((real)1 / (real)24)) + t686;
-    const real t688 = t626 * t687;
-    const real t689 = Psid[1] * d_Psi[0];
-    const real t690 = Psi[0] * d_Psid[1];
-    const real t691 = t689 + t690;
-    const real t692 = Psid[0] * d_Psi[1];
-    const real t693 = Psi[1] * d_Psid[0];
-    const real t694 = t692 + t693;
-    const real t695 = t691 - t694;
-    const real t696 = t688 * t695;
-    const real t697 = Psi[0] * Psid[1];
-    const real t698 = Psi[1] * Psid[0];
-    const real t699 = t697 - t698;
-    const real t700 = t687 * t619;
-    const real t701 = t685 * t31;
-    const real t702 = t683 * t31;
-    const real t703 = t681 * t31;
-    const real t704 = t679 * t31;
-    const real t705 = t677 * t31;
-    const real t706 = t675 * t31;
-    const real t707 = t673 * t31;
-    const real t708 = t671 * t31;
-    const real t709 = 8.896791392450573e-21 * t31;
-    const real t710 = t5 * t709;
-    const real t711 = t708 + t710;
-    const real t712 = t5 * t711;
-    const real t713 = t707 + t712;
-    const real t714 = t5 * t713;
-    const real t715 = t706 + t714;
-    const real t716 = t5 * t715;
-    const real t717 = t705 + t716;
-    const real t718 = t5 * t717;
-    const real t719 = t704 + t718;
-    const real t720 = t5 * t719;
-    const real t721 = t703 + t720;
-    const real t722 = t5 * t721;
-    const real t723 = t702 + t722;
-    const real t724 = t5 * t723;
-    const real t725 = t701 + t724;
-    const real t726 = t626 * t725;
-    const real t727 = t700 + t726;
-    const real t728 = t699 * t727;
-    const real t729 = t696 + t728;
-    const real t730 = t669 - t729;
-    const real t731 = Psidd[1] * t279;
-    const real t732 = t450 * d_Psidd[1];
-    const real t733 = t731 + t732;
-    const real t734 = t730 + t733;
-    const real t735 = Psidd[0] * t257;
-    const real t736 = t462 * d_Psidd[0];
-    const real t737 = t735 + t736;
-    const real t738 = t734 + t737;
-    const real t739 = R_end[6] * t738;
-    const real t740 = Psid[2] * t560;
-    const real t741 = Psid[0] * t699;
-    const real t742 = t740 - t741;
-    const real t743 = t742 * t251;
-    const real t744 = t560 * d_Psid[2];
-    const real t745 = Psid[2] * t581;
-    const real t746 = t744 + t745;
-    const real t747 = t699 * d_Psid[0];
-    const real t748 = Psid[0] * t695;
-    const real t749 = t747 + t748;
-    const real t750 = t746 - t749;
-    const real t751 = t222 * t750;
-    const real t752 = t743 + t751;
-    const real t753 = Psi[2] * t560;
-    const real t754 = Psi[0] * t699;
-    const real t755 = t753 - t754;
-    const real t756 = t755 * t653;
-    const real t757 = t560 * d_Psi[2];
-    const real t758 = Psi[2] * t581;
-    const real t759 = t757 + t758;
-    const real t760 = t699 * d_Psi[0];
-    const real t761 = Psi[0] * t695;
-    const real t762 = t760 + t761;
-    const real t763 = t759 - t762;
-    const real t764 = t655 * t763;
-    const real t765 = t756 + t764;
-    const real t766 = t752 + t765;
-    const real t767 = t447 * d_Psidd[1];
-    const real t768 = Psidd[1] * t285;
-    const real t769 = t767 - t768;
-    const real t770 = t766 + t769;
-    const real t771 = t688 * t571;
-    const real t772 = t556 * t727;
-    const real t773 = t771 + t772;
-    const real t774 = t770 - t773;
-    const real t775 = Psidd[2] * t289;
-    const real t776 = t432 * d_Psidd[2];
-    const real t777 = t775 + t776;
-    const real t778 = t774 + t777;
-    const real t779 = Psidd[0] * t265;
-    const real t780 = t459 * d_Psidd[0];
-    const real t781 = t779 + t780;
-    const real t782 = t778 + t781;
-    const real t783 = R_end[3] * t782;
-    const real t784 = Psid[1] * t699;
-    const real t785 = Psid[2] * t556;
-    const real t786 = t784 - t785;
-    const real t787 = t786 * t251;
-    const real t788 = t699 * d_Psid[1];
-    const real t789 = Psid[1] * t695;
-    const real t790 = t788 + t789;
-    const real t791 = t556 * d_Psid[2];
-    const real t792 = Psid[2] * t571;
-    const real t793 = t791 + t792;
-    const real t794 = t790 - t793;
-    const real t795 = t222 * t794;
-    const real t796 = t787 + t795;
-    const real t797 = Psi[1] * t699;
-    const real t798 = Psi[2] * t556;
-    const real t799 = t797 - t798;
-    const real t800 = t799 * t653;
-    const real t801 = t699 * d_Psi[1];
-    const real t802 = Psi[1] * t695;
-    const real t803 = t801 + t802;
-    const real t804 = t556 * d_Psi[2];
-    const real t805 = Psi[2] * t571;
-    const real t806 = t804 + t805;
-    const real t807 = t803 - t806;
-    const real t808 = t655 * t807;
-    const real t809 = t800 + t808;
-    const real t810 = t796 + t809;
-    const real t811 = t457 * d_Psidd[0];
-    const real t812 = Psidd[0] * t269;
-    const real t813 = t811 - t812;
-    const real t814 = t810 + t813;
-    const real t815 = t560 * t727;
-    const real t816 = t688 * t581;
-    const real t817 = t815 + t816;
-    const real t818 = t814 - t817;
-    const real t819 = Psidd[1] * t281;
-    const real t820 = t444 * d_Psidd[1];
-    const real t821 = t819 + t820;
-    const real t822 = t818 + t821;
-    const real t823 = Psidd[2] * t291;
-    const real t824 = t428 * d_Psidd[2];
-    const real t825 = t823 + t824;
-    const real t826 = t822 + t825;
-    const real t827 = R_end[0] * t826;
-    const real t828 = t783 + t827;
-    const real t829 = t739 + t828;
-    d_c[3] = t829;
-    const real t830 = R_end[7] * t738;
-    const real t831 = R_end[4] * t782;
-    const real t832 = R_end[1] * t826;
-    const real t833 = t831 + t832;
-    const real t834 = t830 + t833;
-    d_c[4] = t834;
-    const real t835 = R_end[8] * t738;
-    const real t836 = R_end[5] * t782;
-    const real t837 = R_end[2] * t826;
-    const real t838 = t836 + t837;
-    const real t839 = t835 + t838;
-    d_c[5] = t839;
-    return 0;
+  (void)x;
+  real t0 = Psi[2] * Psi[0];
+  real t1 = Psi[2] * Psi[2];
+  real t2 = Psi[0] * Psi[0];
+  real t3 = Psi[1] * Psi[1];
+  real t4 = t2 + t3;
+  real t5 = t1 + t4;
+  real t7 = t5 * 8.896791392450574e-22 + (-4.110317623312165e-19);
+  real t9 = t5 * t7 + ((real)1 / (real)6402373705728000);
+  real t11 = t5 * t9 + (-((real)1 / (real)20922789888000));
+  real t13 = t5 * t11 + ((real)1 / (real)87178291200);
+  real t15 = t5 * t13 + (-((real)1 / (real)479001600));
+  real t17 = t5 * t15 + ((real)1 / (real)3628800);
+  real t19 = t5 * t17 + (-((real)1 / (real)40320));
+  real t21 = t5 * t19 + ((real)1 / (real)720);
+  real t23 = t5 * t21 + (-((real)1 / (real)24));
+  real t24 = Psi[1] * d_Psi[1];
+  real t25 = t24 + t24;
+  real t26 = Psi[0] * d_Psi[0];
+  real t27 = t26 + t26;
+  real t28 = t25 + t27;
+  real t29 = Psi[2] * d_Psi[2];
+  real t30 = t29 + t29;
+  real t31 = t28 + t30;
+  real t59 = t23 * t31 + t5 * (t21 * t31 + t5 * (t19 * t31 + t5 * (t17 * t31 + t5 * (t15 * t31 + t5
+    * (t13 * t31 + t5 * (t11 * t31 + t5 * (t9 * t31 + t5 * (t7 * t31 + t5 * (8.896791392450574e-22 *
+    t31)))))))));
+  real t62 = t5 * t23 + 0.5;
+  real t65 = Psi[0] * d_Psi[2] + Psi[2] * d_Psi[0];
+  real t67 = t0 * t59 + t62 * t65;
+  real t69 = t5 * 1.9572941063391263e-20 + (-8.22063524662433e-18);
+  real t71 = t5 * t69 + ((real)1 / (real)355687428096000);
+  real t73 = t5 * t71 + (-((real)1 / (real)1307674368000));
+  real t75 = t5 * t73 + ((real)1 / (real)6227020800);
+  real t77 = t5 * t75 + (-((real)1 / (real)39916800));
+  real t79 = t5 * t77 + ((real)1 / (real)362880);
+  real t81 = t5 * t79 + (-((real)1 / (real)5040));
+  real t83 = t5 * t81 + ((real)1 / (real)120);
+  real t85 = t5 * t83 + (-((real)1 / (real)6));
+  real t87 = 1.0 + t5 * t85;
+  real t116 = t85 * t31 + t5 * (t83 * t31 + t5 * (t81 * t31 + t5 * (t79 * t31 + t5 * (t77 * t31 + t5
+    * (t75 * t31 + t5 * (t73 * t31 + t5 * (t71 * t31 + t5 * (t69 * t31 + t5 *
+    (1.9572941063391263e-20 * t31)))))))));
+  real t118 = t87 * d_Psi[1] + Psi[1] * t116;
+  real t119 = t67 + t118;
+  real t121 = Psi[0] * Psi[1];
+  real t125 = Psi[1] * d_Psi[0] + Psi[0] * d_Psi[1];
+  real t127 = t121 * t59 + t62 * t125;
+  real t130 = t87 * d_Psi[2] + Psi[2] * t116;
+  real t131 = t127 - t130;
+  real t133 = t1 + t3;
+  real t135 = t25 + t30;
+  real t137 = t133 * t59 + t62 * t135;
+  real t140 = R_end[6] * t119 + (R_end[3] * t131 - R_end[0] * t137);
+  d_R[0] = t140;
+  real t145 = R_end[7] * t119 + (R_end[4] * t131 - R_end[1] * t137);
+  d_R[1] = t145;
+  real t150 = R_end[8] * t119 + (R_end[5] * t131 - R_end[2] * t137);
+  d_R[2] = t150;
+  real t151 = Psi[2] * Psi[1];
+  real t155 = Psi[1] * d_Psi[2] + Psi[2] * d_Psi[1];
+  real t157 = t151 * t59 + t62 * t155;
+  real t160 = t87 * d_Psi[0] + Psi[0] * t116;
+  real t161 = t157 - t160;
+  real t163 = t130 + t127;
+  real t165 = t1 + t2;
+  real t167 = t27 + t30;
+  real t169 = t165 * t59 + t62 * t167;
+  real t172 = R_end[6] * t161 + (R_end[0] * t163 - R_end[3] * t169);
+  d_R[3] = t172;
+  real t177 = R_end[7] * t161 + (R_end[1] * t163 - R_end[4] * t169);
+  d_R[4] = t177;
+  real t182 = R_end[8] * t161 + (R_end[2] * t163 - R_end[5] * t169);
+  d_R[5] = t182;
+  real t183 = t160 + t157;
+  real t185 = t67 - t118;
+  real t190 = t62 * t28 + t4 * t59;
+  real t192 = R_end[3] * t183 + R_end[0] * t185 - R_end[6] * t190;
+  d_R[6] = t192;
+  real t197 = R_end[4] * t183 + R_end[1] * t185 - R_end[7] * t190;
+  d_R[7] = t197;
+  real t202 = R_end[5] * t183 + R_end[2] * t185 - R_end[8] * t190;
+  d_R[8] = t202;
+  d_d[0] = d_x[0];
+  d_d[1] = d_x[1];
+  d_d[2] = d_x[2];
+  d_H6[0] = t140;
+  d_H6[1] = t172;
+  d_H6[2] = t192;
+  d_H6[3] = d_H6[4] = d_H6[5] = 0.0;
+  d_H6[6] = t145;
+  d_H6[7] = t177;
+  d_H6[8] = t197;
+  d_H6[9] = d_H6[10] = d_H6[11] = 0.0;
+  d_H6[12] = t150;
+  d_H6[13] = t182;
+  d_H6[14] = t202;
+  d_H6[15] = d_H6[16] = d_H6[17] = d_H6[18] = d_H6[19] = d_H6[20] = 0.0;
+  real t204 = t5 * 3.868170170630684e-23 + (-1.9572941063391263e-20);
+  real t206 = t5 * t204 + 8.22063524662433e-18;
+  real t208 = t5 * t206 + (-((real)1 / (real)355687428096000));
+  real t210 = t5 * t208 + ((real)1 / (real)1307674368000);
+  real t212 = t5 * t210 + (-((real)1 / (real)6227020800));
+  real t214 = t5 * t212 + ((real)1 / (real)39916800);
+  real t216 = t5 * t214 + (-((real)1 / (real)362880));
+  real t218 = t5 * t216 + ((real)1 / (real)5040);
+  real t220 = t5 * t218 + (-((real)1 / (real)120));
+  real t222 = t5 * t220 + ((real)1 / (real)6);
+  real t251 = t220 * t31 + t5 * (t218 * t31 + t5 * (t216 * t31 + t5 * (t214 * t31 + t5 * (t212 * t31
+    + t5 * (t210 * t31 + t5 * (t208 * t31 + t5 * (t206 * t31 + t5 * (t204 * t31 + t5 *
+    (3.868170170630684e-23 * t31)))))))));
+  real t253 = t222 * t65 + t0 * t251;
+  real t256 = t62 * d_Psi[1] + Psi[1] * t59;
+  real t257 = t253 + t256;
+  real t261 = t222 * t125 + t121 * t251;
+  real t264 = t62 * d_Psi[2] + Psi[2] * t59;
+  real t265 = t261 - t264;
+  real t269 = t222 * t135 + t133 * t251;
+  real t272 = R_end[6] * t257 + (R_end[3] * t265 - R_end[0] * t269);
+  d_H6[21] = t272;
+  real t275 = t222 * t155 + t151 * t251;
+  real t278 = t62 * d_Psi[0] + Psi[0] * t59;
+  real t279 = t275 - t278;
+  real t281 = t264 + t261;
+  real t285 = t222 * t167 + t165 * t251;
+  real t288 = R_end[6] * t279 + (R_end[0] * t281 - R_end[3] * t285);
+  d_H6[22] = t288;
+  real t289 = t278 + t275;
+  real t291 = t253 - t256;
+  real t296 = t222 * t28 + t4 * t251;
+  real t298 = R_end[3] * t289 + R_end[0] * t291 - R_end[6] * t296;
+  d_H6[23] = t298;
+  d_H6[24] = d_H6[25] = d_H6[26] = 0.0;
+  real t303 = R_end[7] * t257 + (R_end[4] * t265 - R_end[1] * t269);
+  d_H6[27] = t303;
+  real t308 = R_end[7] * t279 + (R_end[1] * t281 - R_end[4] * t285);
+  d_H6[28] = t308;
+  real t313 = R_end[4] * t289 + R_end[1] * t291 - R_end[7] * t296;
+  d_H6[29] = t313;
+  d_H6[30] = d_H6[31] = d_H6[32] = 0.0;
+  real t318 = R_end[8] * t257 + (R_end[5] * t265 - R_end[2] * t269);
+  d_H6[33] = t318;
+  real t323 = R_end[8] * t279 + (R_end[2] * t281 - R_end[5] * t285);
+  d_H6[34] = t323;
+  real t328 = R_end[5] * t289 + R_end[2] * t291 - R_end[8] * t296;
+  d_H6[35] = t328;
+  real t330 = t62 * t0;
+  real t331 = Psi[1] * t87;
+  real t332 = t330 - t331;
+  real t334 = t62 * t151;
+  real t335 = Psi[0] * t87;
+  real t336 = t334 + t335;
+  real t340 = 1.0 - t4 * t62;
+  real t342 = R_end[0] * t332 + R_end[3] * t336 + R_end[6] * t340;
+  real t346 = t62 * t121;
+  real t347 = Psi[2] * t87;
+  real t348 = t346 + t347;
+  real t351 = 1.0 - t62 * t165;
+  real t354 = t334 - t335;
+  real t356 = R_end[0] * t348 + R_end[3] * t351 + R_end[6] * t354;
+  real t361 = 1.0 - t62 * t133;
+  real t363 = t346 - t347;
+  real t366 = t331 + t330;
+  real t368 = t361 * R_end[0] + t363 * R_end[3] + t366 * R_end[6];
+  d_v[0] = xd[2] * t192 + t342 * d_xd[2] + (xd[1] * t172 + t356 * d_xd[1] + (xd[0] * t140 + t368 *
+    d_xd[0]));
+  real t378 = R_end[1] * t332 + R_end[4] * t336 + R_end[7] * t340;
+  real t386 = R_end[1] * t348 + R_end[4] * t351 + R_end[7] * t354;
+  real t394 = t361 * R_end[1] + t363 * R_end[4] + t366 * R_end[7];
+  d_v[1] = xd[2] * t197 + t378 * d_xd[2] + (xd[1] * t177 + t386 * d_xd[1] + (xd[0] * t145 + t394 *
+    d_xd[0]));
+  real t404 = R_end[2] * t332 + R_end[5] * t336 + R_end[8] * t340;
+  real t412 = R_end[2] * t348 + R_end[5] * t351 + R_end[8] * t354;
+  real t420 = t361 * R_end[2] + t363 * R_end[5] + t366 * R_end[8];
+  d_v[2] = xd[2] * t202 + t404 * d_xd[2] + (xd[1] * t182 + t412 * d_xd[1] + (xd[0] * t150 + t420 *
+    d_xd[0]));
+  real t426 = t0 * t222;
+  real t427 = Psi[1] * t62;
+  real t428 = t426 - t427;
+  real t430 = t151 * t222;
+  real t431 = Psi[0] * t62;
+  real t432 = t430 + t431;
+  real t436 = 1.0 - t4 * t222;
+  real t442 = t121 * t222;
+  real t443 = Psi[2] * t62;
+  real t444 = t442 + t443;
+  real t447 = 1.0 - t165 * t222;
+  real t450 = t430 - t431;
+  real t457 = 1.0 - t133 * t222;
+  real t459 = t442 - t443;
+  real t462 = t427 + t426;
+  d_w[0] = Psid[2] * t298 + (R_end[0] * t428 + R_end[3] * t432 + R_end[6] * t436) * d_Psid[2] +
+    (Psid[1] * t288 + (R_end[0] * t444 + R_end[3] * t447 + R_end[6] * t450) * d_Psid[1] + (Psid[0] *
+    t272 + (R_end[0] * t457 + R_end[3] * t459 + R_end[6] * t462) * d_Psid[0]));
+  d_w[1] = Psid[2] * t313 + (R_end[1] * t428 + R_end[4] * t432 + R_end[7] * t436) * d_Psid[2] +
+    (Psid[1] * t308 + (R_end[1] * t444 + R_end[4] * t447 + R_end[7] * t450) * d_Psid[1] + (Psid[0] *
+    t303 + (R_end[1] * t457 + R_end[4] * t459 + R_end[7] * t462) * d_Psid[0]));
+  d_w[2] = Psid[2] * t328 + (R_end[2] * t428 + R_end[5] * t432 + R_end[8] * t436) * d_Psid[2] +
+    (Psid[1] * t323 + (R_end[2] * t444 + R_end[5] * t447 + R_end[8] * t450) * d_Psid[1] + (Psid[0] *
+    t318 + (R_end[2] * t457 + R_end[5] * t459 + R_end[8] * t462) * d_Psid[0]));
+  d_c[0] = xdd[2] * t192 + t342 * d_xdd[2] + (xdd[1] * t172 + t356 * d_xdd[1] + (xdd[0] * t140 +
+    t368 * d_xdd[0]));
+  d_c[1] = xdd[2] * t197 + t378 * d_xdd[2] + (xdd[1] * t177 + t386 * d_xdd[1] + (xdd[0] * t145 +
+    t394 * d_xdd[0]));
+  d_c[2] = xdd[2] * t202 + t404 * d_xdd[2] + (xdd[1] * t182 + t412 * d_xdd[1] + (xdd[0] * t150 +
+    t420 * d_xdd[0]));
+  real t556 = Psi[2] * Psid[0] - Psi[0] * Psid[2];
+  real t560 = Psi[1] * Psid[2] - Psi[2] * Psid[1];
+  real t571 = Psid[0] * d_Psi[2] + Psi[2] * d_Psid[0] - (Psid[2] * d_Psi[0] + Psi[0] * d_Psid[2]);
+  real t581 = Psid[2] * d_Psi[1] + Psi[1] * d_Psid[2] - (Psid[1] * d_Psi[2] + Psi[2] * d_Psid[1]);
+  real t591 = t5 * 3.868170170630684e-22 + (-1.7615646957052136e-19);
+  real t593 = t5 * t591 + 6.576508197299464e-17;
+  real t595 = t5 * t593 + (-((real)1 / (real)50812489728000));
+  real t597 = t5 * t595 + ((real)1 / (real)217945728000);
+  real t599 = t5 * t597 + (-((real)1 / (real)1245404160));
+  real t601 = t5 * t599 + ((real)1 / (real)9979200);
+  real t603 = t5 * t601 + (-((real)1 / (real)120960));
+  real t605 = t5 * t603 + ((real)1 / (real)2520);
+  real t607 = (-((real)1 / (real)120)) + t5 * t605;
+  real t619 = 2.0 * (Psid[1] * d_Psi[1] + Psi[1] * d_Psid[1] + (Psid[0] * d_Psi[0] + Psi[0] *
+    d_Psid[0]) + (Psid[2] * d_Psi[2] + Psi[2] * d_Psid[2]));
+  real t626 = (Psi[2] * Psid[2] + (Psi[0] * Psid[0] + Psi[1] * Psid[1])) * 2.0;
+  real t653 = t607 * t619 + t626 * (t605 * t31 + t5 * (t603 * t31 + t5 * (t601 * t31 + t5 * (t599 *
+    t31 + t5 * (t597 * t31 + t5 * (t595 * t31 + t5 * (t593 * t31 + t5 * (t591 * t31 + t5 *
+    (3.868170170630684e-22 * t31)))))))));
+  real t655 = t626 * t607;
+  real t671 = t5 * 8.896791392450573e-21 + (-3.6992858609809485e-18);
+  real t673 = t5 * t671 + ((real)1 / (real)800296713216000);
+  real t675 = t5 * t673 + (-((real)1 / (real)2988969984000));
+  real t677 = t5 * t675 + ((real)1 / (real)14529715200);
+  real t679 = t5 * t677 + (-((real)1 / (real)95800320));
+  real t681 = t5 * t679 + ((real)1 / (real)907200);
+  real t683 = t5 * t681 + (-((real)1 / (real)13440));
+  real t685 = t5 * t683 + ((real)1 / (real)360);
+  real t687 = (-((real)1 / (real)24)) + t5 * t685;
+  real t688 = t626 * t687;
+  real t695 = Psid[1] * d_Psi[0] + Psi[0] * d_Psid[1] - (Psid[0] * d_Psi[1] + Psi[1] * d_Psid[0]);
+  real t699 = Psi[0] * Psid[1] - Psi[1] * Psid[0];
+  real t727 = t687 * t619 + t626 * (t685 * t31 + t5 * (t683 * t31 + t5 * (t681 * t31 + t5 * (t679 *
+    t31 + t5 * (t677 * t31 + t5 * (t675 * t31 + t5 * (t673 * t31 + t5 * (t671 * t31 + t5 *
+    (8.896791392450573e-21 * t31)))))))));
+  real t738 = (Psid[0] * t556 - Psid[1] * t560) * t251 + t222 * (t556 * d_Psid[0] + Psid[0] * t571 -
+    (t560 * d_Psid[1] + Psid[1] * t581)) + ((Psi[0] * t556 - Psi[1] * t560) * t653 + t655 * (t556 *
+    d_Psi[0] + Psi[0] * t571 - (t560 * d_Psi[1] + Psi[1] * t581))) + (t436 * d_Psidd[2] - Psidd[2] *
+    t296) - (t688 * t695 + t699 * t727) + (Psidd[1] * t279 + t450 * d_Psidd[1]) + (Psidd[0] * t257 +
+    t462 * d_Psidd[0]);
+  real t782 = (Psid[2] * t560 - Psid[0] * t699) * t251 + t222 * (t560 * d_Psid[2] + Psid[2] * t581 -
+    (t699 * d_Psid[0] + Psid[0] * t695)) + ((Psi[2] * t560 - Psi[0] * t699) * t653 + t655 * (t560 *
+    d_Psi[2] + Psi[2] * t581 - (t699 * d_Psi[0] + Psi[0] * t695))) + (t447 * d_Psidd[1] - Psidd[1] *
+    t285) - (t688 * t571 + t556 * t727) + (Psidd[2] * t289 + t432 * d_Psidd[2]) + (Psidd[0] * t265 +
+    t459 * d_Psidd[0]);
+  real t826 = (Psid[1] * t699 - Psid[2] * t556) * t251 + t222 * (t699 * d_Psid[1] + Psid[1] * t695 -
+    (t556 * d_Psid[2] + Psid[2] * t571)) + ((Psi[1] * t699 - Psi[2] * t556) * t653 + t655 * (t699 *
+    d_Psi[1] + Psi[1] * t695 - (t556 * d_Psi[2] + Psi[2] * t571))) + (t457 * d_Psidd[0] - Psidd[0] *
+    t269) - (t560 * t727 + t688 * t581) + (Psidd[1] * t281 + t444 * d_Psidd[1]) + (Psidd[2] * t291 +
+    t428 * d_Psidd[2]);
+  d_c[3] = R_end[6] * t738 + (R_end[3] * t782 + R_end[0] * t826);
+  d_c[4] = R_end[7] * t738 + (R_end[4] * t782 + R_end[1] * t826);
+  d_c[5] = R_end[8] * t738 + (R_end[5] * t782 + R_end[2] * t826);
+  return 0;
 }
 
-static int mstmm_sweep_modal_end_motion_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_modal_end_motion_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_modal_end_motion_slope_inputs[] = {
-    {"R_end", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"Psi", 3, "rad", 0, 0},
-    {"xd", 3, "m/s", 0, 0},
-    {"Psid", 3, "rad/s", 0, 0},
-    {"xdd", 3, "m/s2", 0, 0},
-    {"Psidd", 3, "rad/s2", 0, 0},
-    {"d_x", 3, "m", 0, 0},
-    {"d_Psi", 3, "rad", 0, 0},
-    {"d_xd", 3, "m/s", 0, 0},
-    {"d_Psid", 3, "rad/s", 0, 0},
-    {"d_xdd", 3, "m/s2", 0, 0},
-    {"d_Psidd", 3, "rad/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_end_motion_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H6", 36, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_end_motion_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]))
 
 /* frame_motion and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -7779,1107 +4084,302 @@ static const mstmm_port mstmm_sweep_modal_end_motion_slope_outputs[] = {
  * out d_w[3] (rad/s) derivative of w
  * out d_c[6] (m/s2, rad/s2) derivative of c
  */
-int mstmm_sweep_modal_frame_motion_slope(const real *restrict R_end, const real *restrict x,
-    const real *restrict Psi, const real *restrict xd, const real *restrict Psid,
-    const real *restrict xdd, const real *restrict Psidd, const real *restrict d_x,
-    const real *restrict d_Psi, const real *restrict d_xd, const real *restrict d_Psid,
-    const real *restrict d_xdd, const real *restrict d_Psidd, real *restrict d_R,
-    real *restrict d_d, real *restrict d_H6, real *restrict d_v, real *restrict d_w,
-    real *restrict d_c)
+int mstmm_sweep_modal_frame_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
+    in_t Psidd, in_t d_x, in_t d_Psi, in_t d_xd, in_t d_Psid, in_t d_xdd, in_t d_Psidd, out_t d_R,
+    out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c)
 {
-    (void)xdd;
-    const real t0 = Psi[2] * Psi[0];
-    const real t1 = Psi[2] * Psi[2];
-    const real t2 = Psi[0] * Psi[0];
-    const real t3 = Psi[1] * Psi[1];
-    const real t4 = t2 + t3;
-    const real t5 = t1 + t4;
-    const real t6 = t5 * 8.896791392450574e-22;
-    const real t7 = t6 + (-4.110317623312165e-19);
-    const real t8 = t5 * t7;
-    const real t9 = t8 + ((real)1 / (real)6402373705728000);
-    const real t10 = t5 * t9;
-    const real t11 = t10 + (-((real)1 / (real)20922789888000));
-    const real t12 = t5 * t11;
-    const real t13 = t12 + ((real)1 / (real)87178291200);
-    const real t14 = t5 * t13;
-    const real t15 = t14 + (-((real)1 / (real)479001600));
-    const real t16 = t5 * t15;
-    const real t17 = t16 + ((real)1 / (real)3628800);
-    const real t18 = t5 * t17;
-    const real t19 = t18 + (-((real)1 / (real)40320));
-    const real t20 = t5 * t19;
-    const real t21 = t20 + ((real)1 / (real)720);
-    const real t22 = t5 * t21;
-    const real t23 = t22 + (-((real)1 / (real)24));
-    const real t24 = Psi[1] * d_Psi[1];
-    const real t25 = t24 + t24;
-    const real t26 = Psi[0] * d_Psi[0];
-    const real t27 = t26 + t26;
-    const real t28 = t25 + t27;
-    const real t29 = Psi[2] * d_Psi[2];
-    const real t30 = t29 + t29;
-    const real t31 = t28 + t30;
-    const real t32 = t23 * t31;
-    const real t33 = t21 * t31;
-    const real t34 = t19 * t31;
-    const real t35 = t17 * t31;
-    const real t36 = t15 * t31;
-    const real t37 = t13 * t31;
-    const real t38 = t11 * t31;
-    const real t39 = t9 * t31;
-    const real t40 = t7 * t31;
-    const real t41 = 8.896791392450574e-22 * t31;
-    const real t42 = t5 * t41;
-    const real t43 = t40 + t42;
-    const real t44 = t5 * t43;
-    const real t45 = t39 + t44;
-    const real t46 = t5 * t45;
-    const real t47 = t38 + t46;
-    const real t48 = t5 * t47;
-    const real t49 = t37 + t48;
-    const real t50 = t5 * t49;
-    const real t51 = t36 + t50;
-    const real t52 = t5 * t51;
-    const real t53 = t35 + t52;
-    const real t54 = t5 * t53;
-    const real t55 = t34 + t54;
-    const real t56 = t5 * t55;
-    const real t57 = t33 + t56;
-    const real t58 = t5 * t57;
-    const real t59 = t32 + t58;
-    const real t60 = t0 * t59;
-    const real t61 = t5 * t23;
-    const real t62 = t61 + 0.5;
-    const real t63 = Psi[0] * d_Psi[2];
-    const real t64 = Psi[2] * d_Psi[0];
-    const real t65 = t63 + t64;
-    const real t66 = t62 * t65;
-    const real t67 = t60 + t66;
-    const real t68 = t5 * 1.9572941063391263e-20;
-    const real t69 = t68 + (-8.22063524662433e-18);
-    const real t70 = t5 * t69;
-    const real t71 = t70 + ((real)1 / (real)355687428096000);
-    const real t72 = t5 * t71;
-    const real t73 = t72 + (-((real)1 / (real)1307674368000));
-    const real t74 = t5 * t73;
-    const real t75 = t74 + ((real)1 / (real)6227020800);
-    const real t76 = t5 * t75;
-    const real t77 = t76 + (-((real)1 / (real)39916800));
-    const real t78 = t5 * t77;
-    const real t79 = t78 + ((real)1 / (real)362880);
-    const real t80 = t5 * t79;
-    const real t81 = t80 + (-((real)1 / (real)5040));
-    const real t82 = t5 * t81;
-    const real t83 = t82 + ((real)1 / (real)120);
-    const real t84 = t5 * t83;
-    const real t85 = t84 + (-((real)1 / (real)6));
-    const real t86 = t5 * t85;
-    const real t87 = 1.0 + t86;
-    const real t88 = t87 * d_Psi[1];
-    const real t89 = t85 * t31;
-    const real t90 = t83 * t31;
-    const real t91 = t81 * t31;
-    const real t92 = t79 * t31;
-    const real t93 = t77 * t31;
-    const real t94 = t75 * t31;
-    const real t95 = t73 * t31;
-    const real t96 = t71 * t31;
-    const real t97 = t69 * t31;
-    const real t98 = 1.9572941063391263e-20 * t31;
-    const real t99 = t5 * t98;
-    const real t100 = t97 + t99;
-    const real t101 = t5 * t100;
-    const real t102 = t96 + t101;
-    const real t103 = t5 * t102;
-    const real t104 = t95 + t103;
-    const real t105 = t5 * t104;
-    const real t106 = t94 + t105;
-    const real t107 = t5 * t106;
-    const real t108 = t93 + t107;
-    const real t109 = t5 * t108;
-    const real t110 = t92 + t109;
-    const real t111 = t5 * t110;
-    const real t112 = t91 + t111;
-    const real t113 = t5 * t112;
-    const real t114 = t90 + t113;
-    const real t115 = t5 * t114;
-    const real t116 = t89 + t115;
-    const real t117 = Psi[1] * t116;
-    const real t118 = t88 + t117;
-    const real t119 = t67 + t118;
-    const real t120 = R_end[6] * t119;
-    const real t121 = Psi[0] * Psi[1];
-    const real t122 = t121 * t59;
-    const real t123 = Psi[1] * d_Psi[0];
-    const real t124 = Psi[0] * d_Psi[1];
-    const real t125 = t123 + t124;
-    const real t126 = t62 * t125;
-    const real t127 = t122 + t126;
-    const real t128 = t87 * d_Psi[2];
-    const real t129 = Psi[2] * t116;
-    const real t130 = t128 + t129;
-    const real t131 = t127 - t130;
-    const real t132 = R_end[3] * t131;
-    const real t133 = t1 + t3;
-    const real t134 = t133 * t59;
-    const real t135 = t25 + t30;
-    const real t136 = t62 * t135;
-    const real t137 = t134 + t136;
-    const real t138 = R_end[0] * t137;
-    const real t139 = t132 - t138;
-    const real t140 = t120 + t139;
-    d_R[0] = t140;
-    const real t141 = Psi[2] * Psi[1];
-    const real t142 = t141 * t59;
-    const real t143 = Psi[1] * d_Psi[2];
-    const real t144 = Psi[2] * d_Psi[1];
-    const real t145 = t143 + t144;
-    const real t146 = t62 * t145;
-    const real t147 = t142 + t146;
-    const real t148 = t87 * d_Psi[0];
-    const real t149 = Psi[0] * t116;
-    const real t150 = t148 + t149;
-    const real t151 = t147 - t150;
-    const real t152 = R_end[6] * t151;
-    const real t153 = t130 + t127;
-    const real t154 = R_end[0] * t153;
-    const real t155 = t1 + t2;
-    const real t156 = t155 * t59;
-    const real t157 = t27 + t30;
-    const real t158 = t62 * t157;
-    const real t159 = t156 + t158;
-    const real t160 = R_end[3] * t159;
-    const real t161 = t154 - t160;
-    const real t162 = t152 + t161;
-    d_R[1] = t162;
-    const real t163 = t150 + t147;
-    const real t164 = R_end[3] * t163;
-    const real t165 = t67 - t118;
-    const real t166 = R_end[0] * t165;
-    const real t167 = t164 + t166;
-    const real t168 = t62 * t28;
-    const real t169 = t4 * t59;
-    const real t170 = t168 + t169;
-    const real t171 = R_end[6] * t170;
-    const real t172 = t167 - t171;
-    d_R[2] = t172;
-    const real t173 = R_end[7] * t119;
-    const real t174 = R_end[4] * t131;
-    const real t175 = R_end[1] * t137;
-    const real t176 = t174 - t175;
-    const real t177 = t173 + t176;
-    d_R[3] = t177;
-    const real t178 = R_end[7] * t151;
-    const real t179 = R_end[1] * t153;
-    const real t180 = R_end[4] * t159;
-    const real t181 = t179 - t180;
-    const real t182 = t178 + t181;
-    d_R[4] = t182;
-    const real t183 = R_end[4] * t163;
-    const real t184 = R_end[1] * t165;
-    const real t185 = t183 + t184;
-    const real t186 = R_end[7] * t170;
-    const real t187 = t185 - t186;
-    d_R[5] = t187;
-    const real t188 = R_end[8] * t119;
-    const real t189 = R_end[5] * t131;
-    const real t190 = R_end[2] * t137;
-    const real t191 = t189 - t190;
-    const real t192 = t188 + t191;
-    d_R[6] = t192;
-    const real t193 = R_end[8] * t151;
-    const real t194 = R_end[2] * t153;
-    const real t195 = R_end[5] * t159;
-    const real t196 = t194 - t195;
-    const real t197 = t193 + t196;
-    d_R[7] = t197;
-    const real t198 = R_end[5] * t163;
-    const real t199 = R_end[2] * t165;
-    const real t200 = t198 + t199;
-    const real t201 = R_end[8] * t170;
-    const real t202 = t200 - t201;
-    d_R[8] = t202;
-    const real t203 = x[2] * t172;
-    const real t204 = t62 * t0;
-    const real t205 = Psi[1] * t87;
-    const real t206 = t204 - t205;
-    const real t207 = R_end[0] * t206;
-    const real t208 = t62 * t141;
-    const real t209 = Psi[0] * t87;
-    const real t210 = t208 + t209;
-    const real t211 = R_end[3] * t210;
-    const real t212 = t207 + t211;
-    const real t213 = t4 * t62;
-    const real t214 = 1.0 - t213;
-    const real t215 = R_end[6] * t214;
-    const real t216 = t212 + t215;
-    const real t217 = t216 * d_x[2];
-    const real t218 = t203 + t217;
-    const real t219 = x[1] * t162;
-    const real t220 = t62 * t121;
-    const real t221 = Psi[2] * t87;
-    const real t222 = t220 + t221;
-    const real t223 = R_end[0] * t222;
-    const real t224 = t62 * t155;
-    const real t225 = 1.0 - t224;
-    const real t226 = R_end[3] * t225;
-    const real t227 = t223 + t226;
-    const real t228 = t208 - t209;
-    const real t229 = R_end[6] * t228;
-    const real t230 = t227 + t229;
-    const real t231 = t230 * d_x[1];
-    const real t232 = t219 + t231;
-    const real t233 = x[0] * t140;
-    const real t234 = t62 * t133;
-    const real t235 = 1.0 - t234;
-    const real t236 = t235 * R_end[0];
-    const real t237 = t220 - t221;
-    const real t238 = t237 * R_end[3];
-    const real t239 = t236 + t238;
-    const real t240 = t205 + t204;
-    const real t241 = t240 * R_end[6];
-    const real t242 = t239 + t241;
-    const real t243 = t242 * d_x[0];
-    const real t244 = t233 + t243;
-    const real t245 = t232 + t244;
-    const real t246 = t218 + t245;
-    const real t247 = -t246;
-    d_d[0] = t247;
-    const real t248 = x[2] * t187;
-    const real t249 = t206 * R_end[1];
-    const real t250 = t210 * R_end[4];
-    const real t251 = t249 + t250;
-    const real t252 = t214 * R_end[7];
-    const real t253 = t251 + t252;
-    const real t254 = t253 * d_x[2];
-    const real t255 = t248 + t254;
-    const real t256 = x[1] * t182;
-    const real t257 = t222 * R_end[1];
-    const real t258 = t225 * R_end[4];
-    const real t259 = t257 + t258;
-    const real t260 = t228 * R_end[7];
-    const real t261 = t259 + t260;
-    const real t262 = t261 * d_x[1];
-    const real t263 = t256 + t262;
-    const real t264 = x[0] * t177;
-    const real t265 = t235 * R_end[1];
-    const real t266 = t237 * R_end[4];
-    const real t267 = t265 + t266;
-    const real t268 = t240 * R_end[7];
-    const real t269 = t267 + t268;
-    const real t270 = t269 * d_x[0];
-    const real t271 = t264 + t270;
-    const real t272 = t263 + t271;
-    const real t273 = t255 + t272;
-    const real t274 = -t273;
-    d_d[1] = t274;
-    const real t275 = x[2] * t202;
-    const real t276 = t206 * R_end[2];
-    const real t277 = t210 * R_end[5];
-    const real t278 = t276 + t277;
-    const real t279 = t214 * R_end[8];
-    const real t280 = t278 + t279;
-    const real t281 = t280 * d_x[2];
-    const real t282 = t275 + t281;
-    const real t283 = x[1] * t197;
-    const real t284 = t222 * R_end[2];
-    const real t285 = t225 * R_end[5];
-    const real t286 = t284 + t285;
-    const real t287 = t228 * R_end[8];
-    const real t288 = t286 + t287;
-    const real t289 = t288 * d_x[1];
-    const real t290 = t283 + t289;
-    const real t291 = x[0] * t192;
-    const real t292 = t235 * R_end[2];
-    const real t293 = t237 * R_end[5];
-    const real t294 = t292 + t293;
-    const real t295 = t240 * R_end[8];
-    const real t296 = t294 + t295;
-    const real t297 = t296 * d_x[0];
-    const real t298 = t291 + t297;
-    const real t299 = t290 + t298;
-    const real t300 = t282 + t299;
-    const real t301 = -t300;
-    d_d[2] = t301;
-    d_H6[0] = 0.0;
-    d_H6[1] = 0.0;
-    d_H6[2] = 0.0;
-    const real t302 = Psi[2] * t62;
-    const real t303 = t5 * 3.868170170630684e-23;
-    const real t304 = t303 + (-1.9572941063391263e-20);
-    const real t305 = t5 * t304;
-    const real t306 = t305 + 8.22063524662433e-18;
-    const real t307 = t5 * t306;
-    const real t308 = t307 + (-((real)1 / (real)355687428096000));
-    const real t309 = t5 * t308;
-    const real t310 = t309 + ((real)1 / (real)1307674368000);
-    const real t311 = t5 * t310;
-    const real t312 = t311 + (-((real)1 / (real)6227020800));
-    const real t313 = t5 * t312;
-    const real t314 = t313 + ((real)1 / (real)39916800);
-    const real t315 = t5 * t314;
-    const real t316 = t315 + (-((real)1 / (real)362880));
-    const real t317 = t5 * t316;
-    const real t318 = t317 + ((real)1 / (real)5040);
-    const real t319 = t5 * t318;
-    const real t320 = t319 + (-((real)1 / (real)120));
-    const real t321 = t5 * t320;
-    const real t322 = t321 + ((real)1 / (real)6);
-    const real t323 = t121 * t322;
-    const real t324 = t302 + t323;
-    const real t325 = t324 * d_x[2];
-    const real t326 = t322 * t125;
-    const real t327 = t320 * t31;
-    const real t328 = t318 * t31;
-    const real t329 = t316 * t31;
-    const real t330 = t314 * t31;
-    const real t331 = t312 * t31;
-    const real t332 = t310 * t31;
-    const real t333 = t308 * t31;
-    const real t334 = t306 * t31;
-    const real t335 = t304 * t31;
-    const real t336 = 3.868170170630684e-23 * t31;
-    const real t337 = t5 * t336;
-    const real t338 = t335 + t337;
-    const real t339 = t5 * t338;
-    const real t340 = t334 + t339;
-    const real t341 = t5 * t340;
-    const real t342 = t333 + t341;
-    const real t343 = t5 * t342;
-    const real t344 = t332 + t343;
-    const real t345 = t5 * t344;
-    const real t346 = t331 + t345;
-    const real t347 = t5 * t346;
-    const real t348 = t330 + t347;
-    const real t349 = t5 * t348;
-    const real t350 = t329 + t349;
-    const real t351 = t5 * t350;
-    const real t352 = t328 + t351;
-    const real t353 = t5 * t352;
-    const real t354 = t327 + t353;
-    const real t355 = t121 * t354;
-    const real t356 = t326 + t355;
-    const real t357 = t62 * d_Psi[2];
-    const real t358 = Psi[2] * t59;
-    const real t359 = t357 + t358;
-    const real t360 = t356 + t359;
-    const real t361 = x[2] * t360;
-    const real t362 = t325 + t361;
-    const real t363 = t0 * t322;
-    const real t364 = Psi[1] * t62;
-    const real t365 = t363 - t364;
-    const real t366 = t365 * d_x[1];
-    const real t367 = t322 * t65;
-    const real t368 = t0 * t354;
-    const real t369 = t367 + t368;
-    const real t370 = t62 * d_Psi[1];
-    const real t371 = Psi[1] * t59;
-    const real t372 = t370 + t371;
-    const real t373 = t369 - t372;
-    const real t374 = x[1] * t373;
-    const real t375 = t366 + t374;
-    const real t376 = t362 - t375;
-    d_H6[3] = t376;
-    const real t377 = t155 * t322;
-    const real t378 = 1.0 - t377;
-    const real t379 = t378 * d_x[2];
-    const real t380 = t322 * t157;
-    const real t381 = t155 * t354;
-    const real t382 = t380 + t381;
-    const real t383 = x[2] * t382;
-    const real t384 = t379 - t383;
-    const real t385 = Psi[0] * t62;
-    const real t386 = t141 * t322;
-    const real t387 = t385 + t386;
-    const real t388 = t387 * d_x[1];
-    const real t389 = t322 * t145;
-    const real t390 = t141 * t354;
-    const real t391 = t389 + t390;
-    const real t392 = t62 * d_Psi[0];
-    const real t393 = Psi[0] * t59;
-    const real t394 = t392 + t393;
-    const real t395 = t391 + t394;
-    const real t396 = x[1] * t395;
-    const real t397 = t388 + t396;
-    const real t398 = t384 - t397;
-    d_H6[4] = t398;
-    const real t399 = t386 - t385;
-    const real t400 = t399 * d_x[2];
-    const real t401 = t391 - t394;
-    const real t402 = x[2] * t401;
-    const real t403 = t400 + t402;
-    const real t404 = t4 * t322;
-    const real t405 = 1.0 - t404;
-    const real t406 = t405 * d_x[1];
-    const real t407 = t322 * t28;
-    const real t408 = t4 * t354;
-    const real t409 = t407 + t408;
-    const real t410 = x[1] * t409;
-    const real t411 = t406 - t410;
-    const real t412 = t403 - t411;
-    d_H6[5] = t412;
-    d_H6[6] = 0.0;
-    d_H6[7] = 0.0;
-    d_H6[8] = 0.0;
-    const real t413 = t365 * d_x[0];
-    const real t414 = x[0] * t373;
-    const real t415 = t413 + t414;
-    const real t416 = t133 * t322;
-    const real t417 = 1.0 - t416;
-    const real t418 = t417 * d_x[2];
-    const real t419 = t322 * t135;
-    const real t420 = t133 * t354;
-    const real t421 = t419 + t420;
-    const real t422 = x[2] * t421;
-    const real t423 = t418 - t422;
-    const real t424 = t415 - t423;
-    d_H6[9] = t424;
-    const real t425 = t387 * d_x[0];
-    const real t426 = x[0] * t395;
-    const real t427 = t425 + t426;
-    const real t428 = t323 - t302;
-    const real t429 = t428 * d_x[2];
-    const real t430 = t356 - t359;
-    const real t431 = x[2] * t430;
-    const real t432 = t429 + t431;
-    const real t433 = t427 - t432;
-    d_H6[10] = t433;
-    const real t434 = t405 * d_x[0];
-    const real t435 = x[0] * t409;
-    const real t436 = t434 - t435;
-    const real t437 = t363 + t364;
-    const real t438 = t437 * d_x[2];
-    const real t439 = t372 + t369;
-    const real t440 = x[2] * t439;
-    const real t441 = t438 + t440;
-    const real t442 = t436 - t441;
-    d_H6[11] = t442;
-    d_H6[12] = 0.0;
-    d_H6[13] = 0.0;
-    d_H6[14] = 0.0;
-    const real t443 = t417 * d_x[1];
-    const real t444 = x[1] * t421;
-    const real t445 = t443 - t444;
-    const real t446 = t324 * d_x[0];
-    const real t447 = x[0] * t360;
-    const real t448 = t446 + t447;
-    const real t449 = t445 - t448;
-    d_H6[15] = t449;
-    const real t450 = t428 * d_x[1];
-    const real t451 = x[1] * t430;
-    const real t452 = t450 + t451;
-    const real t453 = t378 * d_x[0];
-    const real t454 = x[0] * t382;
-    const real t455 = t453 - t454;
-    const real t456 = t452 - t455;
-    d_H6[16] = t456;
-    const real t457 = t437 * d_x[1];
-    const real t458 = x[1] * t439;
-    const real t459 = t457 + t458;
-    const real t460 = t399 * d_x[0];
-    const real t461 = x[0] * t401;
-    const real t462 = t460 + t461;
-    const real t463 = t459 - t462;
-    d_H6[17] = t463;
-    d_H6[18] = 0.0;
-    d_H6[19] = 0.0;
-    d_H6[20] = 0.0;
-    d_H6[21] = t421;
-    const real t464 = -t430;
-    d_H6[22] = t464;
-    const real t465 = -t439;
-    d_H6[23] = t465;
-    d_H6[24] = 0.0;
-    d_H6[25] = 0.0;
-    d_H6[26] = 0.0;
-    const real t466 = -t360;
-    d_H6[27] = t466;
-    d_H6[28] = t382;
-    const real t467 = -t401;
-    d_H6[29] = t467;
-    d_H6[30] = 0.0;
-    d_H6[31] = 0.0;
-    d_H6[32] = 0.0;
-    const real t468 = -t373;
-    d_H6[33] = t468;
-    const real t469 = -t395;
-    d_H6[34] = t469;
-    d_H6[35] = t409;
-    const real t470 = Psid[2] * t412;
-    const real t471 = x[2] * t399;
-    const real t472 = x[1] * t405;
-    const real t473 = t471 - t472;
-    const real t474 = t473 * d_Psid[2];
-    const real t475 = t470 + t474;
-    const real t476 = Psid[1] * t398;
-    const real t477 = x[2] * t378;
-    const real t478 = x[1] * t387;
-    const real t479 = t477 - t478;
-    const real t480 = t479 * d_Psid[1];
-    const real t481 = t476 + t480;
-    const real t482 = Psid[0] * t376;
-    const real t483 = x[2] * t324;
-    const real t484 = x[1] * t365;
-    const real t485 = t483 - t484;
-    const real t486 = t485 * d_Psid[0];
-    const real t487 = t482 + t486;
-    const real t488 = t487 - d_xd[0];
-    const real t489 = t481 + t488;
-    const real t490 = t475 + t489;
-    d_v[0] = t490;
-    const real t491 = Psid[2] * t442;
-    const real t492 = x[0] * t405;
-    const real t493 = x[2] * t437;
-    const real t494 = t492 - t493;
-    const real t495 = t494 * d_Psid[2];
-    const real t496 = t491 + t495;
-    const real t497 = Psid[1] * t433;
-    const real t498 = x[0] * t387;
-    const real t499 = x[2] * t428;
-    const real t500 = t498 - t499;
-    const real t501 = t500 * d_Psid[1];
-    const real t502 = t497 + t501;
-    const real t503 = Psid[0] * t424;
-    const real t504 = x[0] * t365;
-    const real t505 = x[2] * t417;
-    const real t506 = t504 - t505;
-    const real t507 = t506 * d_Psid[0];
-    const real t508 = t503 + t507;
-    const real t509 = t508 - d_xd[1];
-    const real t510 = t502 + t509;
-    const real t511 = t496 + t510;
-    d_v[1] = t511;
-    const real t512 = Psid[2] * t463;
-    const real t513 = x[1] * t437;
-    const real t514 = x[0] * t399;
-    const real t515 = t513 - t514;
-    const real t516 = t515 * d_Psid[2];
-    const real t517 = t512 + t516;
-    const real t518 = Psid[1] * t456;
-    const real t519 = x[1] * t428;
-    const real t520 = x[0] * t378;
-    const real t521 = t519 - t520;
-    const real t522 = t521 * d_Psid[1];
-    const real t523 = t518 + t522;
-    const real t524 = Psid[0] * t449;
-    const real t525 = x[1] * t417;
-    const real t526 = x[0] * t324;
-    const real t527 = t525 - t526;
-    const real t528 = t527 * d_Psid[0];
-    const real t529 = t524 + t528;
-    const real t530 = t529 - d_xd[2];
-    const real t531 = t523 + t530;
-    const real t532 = t517 + t531;
-    d_v[2] = t532;
-    const real t533 = Psid[0] * t421;
-    const real t534 = (-1.0) + t416;
-    const real t535 = t534 * d_Psid[0];
-    const real t536 = t533 + t535;
-    const real t537 = Psid[1] * t430;
-    const real t538 = t428 * d_Psid[1];
-    const real t539 = t537 + t538;
-    const real t540 = t536 - t539;
-    const real t541 = Psid[2] * t439;
-    const real t542 = t437 * d_Psid[2];
-    const real t543 = t541 + t542;
-    const real t544 = t540 - t543;
-    d_w[0] = t544;
-    const real t545 = Psid[1] * t382;
-    const real t546 = (-1.0) + t377;
-    const real t547 = t546 * d_Psid[1];
-    const real t548 = t545 + t547;
-    const real t549 = Psid[0] * t360;
-    const real t550 = t324 * d_Psid[0];
-    const real t551 = t549 + t550;
-    const real t552 = t548 - t551;
-    const real t553 = Psid[2] * t401;
-    const real t554 = t399 * d_Psid[2];
-    const real t555 = t553 + t554;
-    const real t556 = t552 - t555;
-    d_w[1] = t556;
-    const real t557 = Psid[2] * t409;
-    const real t558 = (-1.0) + t404;
-    const real t559 = t558 * d_Psid[2];
-    const real t560 = t557 + t559;
-    const real t561 = Psid[1] * t395;
-    const real t562 = t387 * d_Psid[1];
-    const real t563 = t561 + t562;
-    const real t564 = Psid[0] * t373;
-    const real t565 = t365 * d_Psid[0];
-    const real t566 = t564 + t565;
-    const real t567 = t563 + t566;
-    const real t568 = t560 - t567;
-    d_w[2] = t568;
-    const real t569 = t558 * Psid[2];
-    const real t570 = t365 * Psid[0];
-    const real t571 = t387 * Psid[1];
-    const real t572 = t570 + t571;
-    const real t573 = t569 - t572;
-    const real t574 = t573 * d_xd[1];
-    const real t575 = xd[1] * t568;
-    const real t576 = t574 + t575;
-    const real t577 = 2.0 * t576;
-    const real t578 = t546 * Psid[1];
-    const real t579 = t324 * Psid[0];
-    const real t580 = t578 - t579;
-    const real t581 = t399 * Psid[2];
-    const real t582 = t580 - t581;
-    const real t583 = x[0] * t582;
-    const real t584 = t534 * Psid[0];
-    const real t585 = t428 * Psid[1];
-    const real t586 = t584 - t585;
-    const real t587 = t437 * Psid[2];
-    const real t588 = t586 - t587;
-    const real t589 = x[1] * t588;
-    const real t590 = t583 - t589;
-    const real t591 = t590 * t556;
-    const real t592 = t582 * d_x[0];
-    const real t593 = x[0] * t556;
-    const real t594 = t592 + t593;
-    const real t595 = t588 * d_x[1];
-    const real t596 = x[1] * t544;
-    const real t597 = t595 + t596;
-    const real t598 = t594 - t597;
-    const real t599 = t582 * t598;
-    const real t600 = t591 + t599;
-    const real t601 = x[2] * t588;
-    const real t602 = x[0] * t573;
-    const real t603 = t601 - t602;
-    const real t604 = t603 * t568;
-    const real t605 = t588 * d_x[2];
-    const real t606 = x[2] * t544;
-    const real t607 = t605 + t606;
-    const real t608 = t573 * d_x[0];
-    const real t609 = x[0] * t568;
-    const real t610 = t608 + t609;
-    const real t611 = t607 - t610;
-    const real t612 = t573 * t611;
-    const real t613 = t604 + t612;
-    const real t614 = t600 - t613;
-    const real t615 = t582 * d_xd[2];
-    const real t616 = xd[2] * t556;
-    const real t617 = t615 + t616;
-    const real t618 = 2.0 * t617;
-    const real t619 = t614 - t618;
-    const real t620 = t577 + t619;
-    const real t621 = t324 * Psidd[0];
-    const real t622 = t399 * Psidd[2];
-    const real t623 = t5 * 8.896791392450573e-21;
-    const real t624 = t623 + (-3.6992858609809485e-18);
-    const real t625 = t5 * t624;
-    const real t626 = t625 + ((real)1 / (real)800296713216000);
-    const real t627 = t5 * t626;
-    const real t628 = t627 + (-((real)1 / (real)2988969984000));
-    const real t629 = t5 * t628;
-    const real t630 = t629 + ((real)1 / (real)14529715200);
-    const real t631 = t5 * t630;
-    const real t632 = t631 + (-((real)1 / (real)95800320));
-    const real t633 = t5 * t632;
-    const real t634 = t633 + ((real)1 / (real)907200);
-    const real t635 = t5 * t634;
-    const real t636 = t635 + (-((real)1 / (real)13440));
-    const real t637 = t5 * t636;
-    const real t638 = t637 + ((real)1 / (real)360);
-    const real t639 = t5 * t638;
-    const real t640 = (-((real)1 / (real)24)) + t639;
-    const real t641 = Psi[2] * Psid[2];
-    const real t642 = Psi[0] * Psid[0];
-    const real t643 = Psi[1] * Psid[1];
-    const real t644 = t642 + t643;
-    const real t645 = t641 + t644;
-    const real t646 = t645 * 2.0;
-    const real t647 = t640 * t646;
-    const real t648 = Psi[2] * Psid[0];
-    const real t649 = Psi[0] * Psid[2];
-    const real t650 = t648 - t649;
-    const real t651 = t647 * t650;
-    const real t652 = t378 * Psidd[1];
-    const real t653 = t5 * 3.868170170630684e-22;
-    const real t654 = t653 + (-1.7615646957052136e-19);
-    const real t655 = t5 * t654;
-    const real t656 = t655 + 6.576508197299464e-17;
-    const real t657 = t5 * t656;
-    const real t658 = t657 + (-((real)1 / (real)50812489728000));
-    const real t659 = t5 * t658;
-    const real t660 = t659 + ((real)1 / (real)217945728000);
-    const real t661 = t5 * t660;
-    const real t662 = t661 + (-((real)1 / (real)1245404160));
-    const real t663 = t5 * t662;
-    const real t664 = t663 + ((real)1 / (real)9979200);
-    const real t665 = t5 * t664;
-    const real t666 = t665 + (-((real)1 / (real)120960));
-    const real t667 = t5 * t666;
-    const real t668 = t667 + ((real)1 / (real)2520);
-    const real t669 = t5 * t668;
-    const real t670 = (-((real)1 / (real)120)) + t669;
-    const real t671 = t646 * t670;
-    const real t672 = Psi[1] * Psid[2];
-    const real t673 = Psi[2] * Psid[1];
-    const real t674 = t672 - t673;
-    const real t675 = Psi[2] * t674;
-    const real t676 = Psi[0] * Psid[1];
-    const real t677 = Psi[1] * Psid[0];
-    const real t678 = t676 - t677;
-    const real t679 = Psi[0] * t678;
-    const real t680 = t675 - t679;
-    const real t681 = t671 * t680;
-    const real t682 = Psid[2] * t674;
-    const real t683 = Psid[0] * t678;
-    const real t684 = t682 - t683;
-    const real t685 = t322 * t684;
-    const real t686 = t681 + t685;
-    const real t687 = t652 + t686;
-    const real t688 = t651 + t687;
-    const real t689 = t622 + t688;
-    const real t690 = t621 + t689;
-    const real t691 = t690 * d_x[2];
-    const real t692 = t684 * t354;
-    const real t693 = t674 * d_Psid[2];
-    const real t694 = Psid[2] * d_Psi[1];
-    const real t695 = Psi[1] * d_Psid[2];
-    const real t696 = t694 + t695;
-    const real t697 = Psid[1] * d_Psi[2];
-    const real t698 = Psi[2] * d_Psid[1];
-    const real t699 = t697 + t698;
-    const real t700 = t696 - t699;
-    const real t701 = Psid[2] * t700;
-    const real t702 = t693 + t701;
-    const real t703 = t678 * d_Psid[0];
-    const real t704 = Psid[1] * d_Psi[0];
-    const real t705 = Psi[0] * d_Psid[1];
-    const real t706 = t704 + t705;
-    const real t707 = Psid[0] * d_Psi[1];
-    const real t708 = Psi[1] * d_Psid[0];
-    const real t709 = t707 + t708;
-    const real t710 = t706 - t709;
-    const real t711 = Psid[0] * t710;
-    const real t712 = t703 + t711;
-    const real t713 = t702 - t712;
-    const real t714 = t322 * t713;
-    const real t715 = t692 + t714;
-    const real t716 = Psid[1] * d_Psi[1];
-    const real t717 = Psi[1] * d_Psid[1];
-    const real t718 = t716 + t717;
-    const real t719 = Psid[0] * d_Psi[0];
-    const real t720 = Psi[0] * d_Psid[0];
-    const real t721 = t719 + t720;
-    const real t722 = t718 + t721;
-    const real t723 = Psid[2] * d_Psi[2];
-    const real t724 = Psi[2] * d_Psid[2];
-    const real t725 = t723 + t724;
-    const real t726 = t722 + t725;
-    const real t727 = 2.0 * t726;
-    const real t728 = t670 * t727;
-    const real t729 = t668 * t31;
-    const real t730 = t666 * t31;
-    const real t731 = t664 * t31;
-    const real t732 = t662 * t31;
-    const real t733 = t660 * t31;
-    const real t734 = t658 * t31;
-    const real t735 = t656 * t31;
-    const real t736 = t654 * t31;
-    const real t737 = 3.868170170630684e-22 * t31;
-    const real t738 = t5 * t737;
-    const real t739 = t736 + t738;
-    const real t740 = t5 * t739;
-    const real t741 = t735 + t740;
-    const real t742 = t5 * t741;
-    const real t743 = t734 + t742;
-    const real t744 = t5 * t743;
-    const real t745 = t733 + t744;
-    const real t746 = t5 * t745;
-    const real t747 = t732 + t746;
-    const real t748 = t5 * t747;
-    const real t749 = t731 + t748;
-    const real t750 = t5 * t749;
-    const real t751 = t730 + t750;
-    const real t752 = t5 * t751;
-    const real t753 = t729 + t752;
-    const real t754 = t646 * t753;
-    const real t755 = t728 + t754;
-    const real t756 = t680 * t755;
-    const real t757 = t674 * d_Psi[2];
-    const real t758 = Psi[2] * t700;
-    const real t759 = t757 + t758;
-    const real t760 = t678 * d_Psi[0];
-    const real t761 = Psi[0] * t710;
-    const real t762 = t760 + t761;
-    const real t763 = t759 - t762;
-    const real t764 = t671 * t763;
-    const real t765 = t756 + t764;
-    const real t766 = t715 + t765;
-    const real t767 = t378 * d_Psidd[1];
-    const real t768 = Psidd[1] * t382;
-    const real t769 = t767 - t768;
-    const real t770 = t766 + t769;
-    const real t771 = t638 * t31;
-    const real t772 = t636 * t31;
-    const real t773 = t634 * t31;
-    const real t774 = t632 * t31;
-    const real t775 = t630 * t31;
-    const real t776 = t628 * t31;
-    const real t777 = t626 * t31;
-    const real t778 = t624 * t31;
-    const real t779 = 8.896791392450573e-21 * t31;
-    const real t780 = t5 * t779;
-    const real t781 = t778 + t780;
-    const real t782 = t5 * t781;
-    const real t783 = t777 + t782;
-    const real t784 = t5 * t783;
-    const real t785 = t776 + t784;
-    const real t786 = t5 * t785;
-    const real t787 = t775 + t786;
-    const real t788 = t5 * t787;
-    const real t789 = t774 + t788;
-    const real t790 = t5 * t789;
-    const real t791 = t773 + t790;
-    const real t792 = t5 * t791;
-    const real t793 = t772 + t792;
-    const real t794 = t5 * t793;
-    const real t795 = t771 + t794;
-    const real t796 = t646 * t795;
-    const real t797 = t640 * t727;
-    const real t798 = t796 + t797;
-    const real t799 = t650 * t798;
-    const real t800 = Psid[0] * d_Psi[2];
-    const real t801 = Psi[2] * d_Psid[0];
-    const real t802 = t800 + t801;
-    const real t803 = Psid[2] * d_Psi[0];
-    const real t804 = Psi[0] * d_Psid[2];
-    const real t805 = t803 + t804;
-    const real t806 = t802 - t805;
-    const real t807 = t647 * t806;
-    const real t808 = t799 + t807;
-    const real t809 = t770 + t808;
-    const real t810 = Psidd[2] * t401;
-    const real t811 = t399 * d_Psidd[2];
-    const real t812 = t810 + t811;
-    const real t813 = t809 + t812;
-    const real t814 = Psidd[0] * t360;
-    const real t815 = t324 * d_Psidd[0];
-    const real t816 = t814 + t815;
-    const real t817 = t813 + t816;
-    const real t818 = x[2] * t817;
-    const real t819 = t691 + t818;
-    const real t820 = t620 + t819;
-    const real t821 = t365 * Psidd[0];
-    const real t822 = t387 * Psidd[1];
-    const real t823 = t647 * t678;
-    const real t824 = t405 * Psidd[2];
-    const real t825 = Psi[0] * t650;
-    const real t826 = Psi[1] * t674;
-    const real t827 = t825 - t826;
-    const real t828 = t671 * t827;
-    const real t829 = Psid[0] * t650;
-    const real t830 = Psid[1] * t674;
-    const real t831 = t829 - t830;
-    const real t832 = t322 * t831;
-    const real t833 = t828 + t832;
-    const real t834 = t824 + t833;
-    const real t835 = t823 + t834;
-    const real t836 = t822 + t835;
-    const real t837 = t821 + t836;
-    const real t838 = t837 * d_x[1];
-    const real t839 = t831 * t354;
-    const real t840 = t650 * d_Psid[0];
-    const real t841 = Psid[0] * t806;
-    const real t842 = t840 + t841;
-    const real t843 = t674 * d_Psid[1];
-    const real t844 = Psid[1] * t700;
-    const real t845 = t843 + t844;
-    const real t846 = t842 - t845;
-    const real t847 = t322 * t846;
-    const real t848 = t839 + t847;
-    const real t849 = t827 * t755;
-    const real t850 = t650 * d_Psi[0];
-    const real t851 = Psi[0] * t806;
-    const real t852 = t850 + t851;
-    const real t853 = t674 * d_Psi[1];
-    const real t854 = Psi[1] * t700;
-    const real t855 = t853 + t854;
-    const real t856 = t852 - t855;
-    const real t857 = t671 * t856;
-    const real t858 = t849 + t857;
-    const real t859 = t848 + t858;
-    const real t860 = t405 * d_Psidd[2];
-    const real t861 = Psidd[2] * t409;
-    const real t862 = t860 - t861;
-    const real t863 = t859 + t862;
-    const real t864 = t678 * t798;
-    const real t865 = t647 * t710;
-    const real t866 = t864 + t865;
-    const real t867 = t863 + t866;
-    const real t868 = Psidd[1] * t395;
-    const real t869 = t387 * d_Psidd[1];
-    const real t870 = t868 + t869;
-    const real t871 = t867 + t870;
-    const real t872 = Psidd[0] * t373;
-    const real t873 = t365 * d_Psidd[0];
-    const real t874 = t872 + t873;
-    const real t875 = t871 + t874;
-    const real t876 = x[1] * t875;
-    const real t877 = t838 + t876;
-    const real t878 = t820 - t877;
-    const real t879 = t878 - d_xdd[0];
-    d_c[0] = t879;
-    const real t880 = t588 * d_xd[2];
-    const real t881 = xd[2] * t544;
-    const real t882 = t880 + t881;
-    const real t883 = 2.0 * t882;
-    const real t884 = x[1] * t573;
-    const real t885 = x[2] * t582;
-    const real t886 = t884 - t885;
-    const real t887 = t886 * t568;
-    const real t888 = t573 * d_x[1];
-    const real t889 = x[1] * t568;
-    const real t890 = t888 + t889;
-    const real t891 = t582 * d_x[2];
-    const real t892 = x[2] * t556;
-    const real t893 = t891 + t892;
-    const real t894 = t890 - t893;
-    const real t895 = t573 * t894;
-    const real t896 = t887 + t895;
-    const real t897 = t590 * t544;
-    const real t898 = t588 * t598;
-    const real t899 = t897 + t898;
-    const real t900 = t896 - t899;
-    const real t901 = t883 + t900;
-    const real t902 = t573 * d_xd[0];
-    const real t903 = xd[0] * t568;
-    const real t904 = t902 + t903;
-    const real t905 = 2.0 * t904;
-    const real t906 = t901 - t905;
-    const real t907 = t437 * Psidd[2];
-    const real t908 = t428 * Psidd[1];
-    const real t909 = t647 * t674;
-    const real t910 = t417 * Psidd[0];
-    const real t911 = Psi[1] * t678;
-    const real t912 = Psi[2] * t650;
-    const real t913 = t911 - t912;
-    const real t914 = t671 * t913;
-    const real t915 = Psid[1] * t678;
-    const real t916 = Psid[2] * t650;
-    const real t917 = t915 - t916;
-    const real t918 = t322 * t917;
-    const real t919 = t914 + t918;
-    const real t920 = t910 + t919;
-    const real t921 = t909 + t920;
-    const real t922 = t908 + t921;
-    const real t923 = t907 + t922;
-    const real t924 = t923 * d_x[2];
-    const real t925 = t917 * t354;
-    const real t926 = t678 * d_Psid[1];
-    const real t927 = Psid[1] * t710;
-    const real t928 = t926 + t927;
-    const real t929 = t650 * d_Psid[2];
-    const real t930 = Psid[2] * t806;
-    const real t931 = t929 + t930;
-    const real t932 = t928 - t931;
-    const real t933 = t322 * t932;
-    const real t934 = t925 + t933;
-    const real t935 = t913 * t755;
-    const real t936 = t678 * d_Psi[1];
-    const real t937 = Psi[1] * t710;
-    const real t938 = t936 + t937;
-    const real t939 = t650 * d_Psi[2];
-    const real t940 = Psi[2] * t806;
-    const real t941 = t939 + t940;
-    const real t942 = t938 - t941;
-    const real t943 = t671 * t942;
-    const real t944 = t935 + t943;
-    const real t945 = t934 + t944;
-    const real t946 = t417 * d_Psidd[0];
-    const real t947 = Psidd[0] * t421;
-    const real t948 = t946 - t947;
-    const real t949 = t945 + t948;
-    const real t950 = t674 * t798;
-    const real t951 = t647 * t700;
-    const real t952 = t950 + t951;
-    const real t953 = t949 + t952;
-    const real t954 = Psidd[1] * t430;
-    const real t955 = t428 * d_Psidd[1];
-    const real t956 = t954 + t955;
-    const real t957 = t953 + t956;
-    const real t958 = Psidd[2] * t439;
-    const real t959 = t437 * d_Psidd[2];
-    const real t960 = t958 + t959;
-    const real t961 = t957 + t960;
-    const real t962 = x[2] * t961;
-    const real t963 = t924 + t962;
-    const real t964 = t906 - t963;
-    const real t965 = t837 * d_x[0];
-    const real t966 = x[0] * t875;
-    const real t967 = t965 + t966;
-    const real t968 = t964 + t967;
-    const real t969 = t968 - d_xdd[1];
-    d_c[1] = t969;
-    const real t970 = t582 * d_xd[0];
-    const real t971 = xd[0] * t556;
-    const real t972 = t970 + t971;
-    const real t973 = 2.0 * t972;
-    const real t974 = t603 * t544;
-    const real t975 = t588 * t611;
-    const real t976 = t974 + t975;
-    const real t977 = t886 * t556;
-    const real t978 = t582 * t894;
-    const real t979 = t977 + t978;
-    const real t980 = t976 - t979;
-    const real t981 = t588 * d_xd[1];
-    const real t982 = xd[1] * t544;
-    const real t983 = t981 + t982;
-    const real t984 = 2.0 * t983;
-    const real t985 = t980 - t984;
-    const real t986 = t973 + t985;
-    const real t987 = t923 * d_x[1];
-    const real t988 = x[1] * t961;
-    const real t989 = t987 + t988;
-    const real t990 = t986 + t989;
-    const real t991 = t690 * d_x[0];
-    const real t992 = x[0] * t817;
-    const real t993 = t991 + t992;
-    const real t994 = t990 - t993;
-    const real t995 = t994 - d_xdd[2];
-    d_c[2] = t995;
-    const real t996 = -t961;
-    d_c[3] = t996;
-    const real t997 = -t817;
-    d_c[4] = t997;
-    const real t998 = -t875;
-    d_c[5] = t998;
-    return 0;
+  (void)xdd;
+  real t0 = Psi[2] * Psi[0];
+  real t1 = Psi[2] * Psi[2];
+  real t2 = Psi[0] * Psi[0];
+  real t3 = Psi[1] * Psi[1];
+  real t4 = t2 + t3;
+  real t5 = t1 + t4;
+  real t7 = t5 * 8.896791392450574e-22 + (-4.110317623312165e-19);
+  real t9 = t5 * t7 + ((real)1 / (real)6402373705728000);
+  real t11 = t5 * t9 + (-((real)1 / (real)20922789888000));
+  real t13 = t5 * t11 + ((real)1 / (real)87178291200);
+  real t15 = t5 * t13 + (-((real)1 / (real)479001600));
+  real t17 = t5 * t15 + ((real)1 / (real)3628800);
+  real t19 = t5 * t17 + (-((real)1 / (real)40320));
+  real t21 = t5 * t19 + ((real)1 / (real)720);
+  real t23 = t5 * t21 + (-((real)1 / (real)24));
+  real t24 = Psi[1] * d_Psi[1];
+  real t25 = t24 + t24;
+  real t26 = Psi[0] * d_Psi[0];
+  real t27 = t26 + t26;
+  real t28 = t25 + t27;
+  real t29 = Psi[2] * d_Psi[2];
+  real t30 = t29 + t29;
+  real t31 = t28 + t30;
+  real t59 = t23 * t31 + t5 * (t21 * t31 + t5 * (t19 * t31 + t5 * (t17 * t31 + t5 * (t15 * t31 + t5
+    * (t13 * t31 + t5 * (t11 * t31 + t5 * (t9 * t31 + t5 * (t7 * t31 + t5 * (8.896791392450574e-22 *
+    t31)))))))));
+  real t62 = t5 * t23 + 0.5;
+  real t65 = Psi[0] * d_Psi[2] + Psi[2] * d_Psi[0];
+  real t67 = t0 * t59 + t62 * t65;
+  real t69 = t5 * 1.9572941063391263e-20 + (-8.22063524662433e-18);
+  real t71 = t5 * t69 + ((real)1 / (real)355687428096000);
+  real t73 = t5 * t71 + (-((real)1 / (real)1307674368000));
+  real t75 = t5 * t73 + ((real)1 / (real)6227020800);
+  real t77 = t5 * t75 + (-((real)1 / (real)39916800));
+  real t79 = t5 * t77 + ((real)1 / (real)362880);
+  real t81 = t5 * t79 + (-((real)1 / (real)5040));
+  real t83 = t5 * t81 + ((real)1 / (real)120);
+  real t85 = t5 * t83 + (-((real)1 / (real)6));
+  real t87 = 1.0 + t5 * t85;
+  real t116 = t85 * t31 + t5 * (t83 * t31 + t5 * (t81 * t31 + t5 * (t79 * t31 + t5 * (t77 * t31 + t5
+    * (t75 * t31 + t5 * (t73 * t31 + t5 * (t71 * t31 + t5 * (t69 * t31 + t5 *
+    (1.9572941063391263e-20 * t31)))))))));
+  real t118 = t87 * d_Psi[1] + Psi[1] * t116;
+  real t119 = t67 + t118;
+  real t121 = Psi[0] * Psi[1];
+  real t125 = Psi[1] * d_Psi[0] + Psi[0] * d_Psi[1];
+  real t127 = t121 * t59 + t62 * t125;
+  real t130 = t87 * d_Psi[2] + Psi[2] * t116;
+  real t131 = t127 - t130;
+  real t133 = t1 + t3;
+  real t135 = t25 + t30;
+  real t137 = t133 * t59 + t62 * t135;
+  real t140 = R_end[6] * t119 + (R_end[3] * t131 - R_end[0] * t137);
+  d_R[0] = t140;
+  real t141 = Psi[2] * Psi[1];
+  real t145 = Psi[1] * d_Psi[2] + Psi[2] * d_Psi[1];
+  real t147 = t141 * t59 + t62 * t145;
+  real t150 = t87 * d_Psi[0] + Psi[0] * t116;
+  real t151 = t147 - t150;
+  real t153 = t130 + t127;
+  real t155 = t1 + t2;
+  real t157 = t27 + t30;
+  real t159 = t155 * t59 + t62 * t157;
+  real t162 = R_end[6] * t151 + (R_end[0] * t153 - R_end[3] * t159);
+  d_R[1] = t162;
+  real t163 = t150 + t147;
+  real t165 = t67 - t118;
+  real t170 = t62 * t28 + t4 * t59;
+  real t172 = R_end[3] * t163 + R_end[0] * t165 - R_end[6] * t170;
+  d_R[2] = t172;
+  real t177 = R_end[7] * t119 + (R_end[4] * t131 - R_end[1] * t137);
+  d_R[3] = t177;
+  real t182 = R_end[7] * t151 + (R_end[1] * t153 - R_end[4] * t159);
+  d_R[4] = t182;
+  real t187 = R_end[4] * t163 + R_end[1] * t165 - R_end[7] * t170;
+  d_R[5] = t187;
+  real t192 = R_end[8] * t119 + (R_end[5] * t131 - R_end[2] * t137);
+  d_R[6] = t192;
+  real t197 = R_end[8] * t151 + (R_end[2] * t153 - R_end[5] * t159);
+  d_R[7] = t197;
+  real t202 = R_end[5] * t163 + R_end[2] * t165 - R_end[8] * t170;
+  d_R[8] = t202;
+  real t204 = t62 * t0;
+  real t205 = Psi[1] * t87;
+  real t206 = t204 - t205;
+  real t208 = t62 * t141;
+  real t209 = Psi[0] * t87;
+  real t210 = t208 + t209;
+  real t214 = 1.0 - t4 * t62;
+  real t220 = t62 * t121;
+  real t221 = Psi[2] * t87;
+  real t222 = t220 + t221;
+  real t225 = 1.0 - t62 * t155;
+  real t228 = t208 - t209;
+  real t235 = 1.0 - t62 * t133;
+  real t237 = t220 - t221;
+  real t240 = t205 + t204;
+  d_d[0] = -(x[2] * t172 + (R_end[0] * t206 + R_end[3] * t210 + R_end[6] * t214) * d_x[2] + (x[1] *
+    t162 + (R_end[0] * t222 + R_end[3] * t225 + R_end[6] * t228) * d_x[1] + (x[0] * t140 + (t235 *
+    R_end[0] + t237 * R_end[3] + t240 * R_end[6]) * d_x[0])));
+  d_d[1] = -(x[2] * t187 + (t206 * R_end[1] + t210 * R_end[4] + t214 * R_end[7]) * d_x[2] + (x[1] *
+    t182 + (t222 * R_end[1] + t225 * R_end[4] + t228 * R_end[7]) * d_x[1] + (x[0] * t177 + (t235 *
+    R_end[1] + t237 * R_end[4] + t240 * R_end[7]) * d_x[0])));
+  d_d[2] = -(x[2] * t202 + (t206 * R_end[2] + t210 * R_end[5] + t214 * R_end[8]) * d_x[2] + (x[1] *
+    t197 + (t222 * R_end[2] + t225 * R_end[5] + t228 * R_end[8]) * d_x[1] + (x[0] * t192 + (t235 *
+    R_end[2] + t237 * R_end[5] + t240 * R_end[8]) * d_x[0])));
+  d_H6[0] = d_H6[1] = d_H6[2] = 0.0;
+  real t302 = Psi[2] * t62;
+  real t304 = t5 * 3.868170170630684e-23 + (-1.9572941063391263e-20);
+  real t306 = t5 * t304 + 8.22063524662433e-18;
+  real t308 = t5 * t306 + (-((real)1 / (real)355687428096000));
+  real t310 = t5 * t308 + ((real)1 / (real)1307674368000);
+  real t312 = t5 * t310 + (-((real)1 / (real)6227020800));
+  real t314 = t5 * t312 + ((real)1 / (real)39916800);
+  real t316 = t5 * t314 + (-((real)1 / (real)362880));
+  real t318 = t5 * t316 + ((real)1 / (real)5040);
+  real t320 = t5 * t318 + (-((real)1 / (real)120));
+  real t322 = t5 * t320 + ((real)1 / (real)6);
+  real t323 = t121 * t322;
+  real t324 = t302 + t323;
+  real t354 = t320 * t31 + t5 * (t318 * t31 + t5 * (t316 * t31 + t5 * (t314 * t31 + t5 * (t312 * t31
+    + t5 * (t310 * t31 + t5 * (t308 * t31 + t5 * (t306 * t31 + t5 * (t304 * t31 + t5 *
+    (3.868170170630684e-23 * t31)))))))));
+  real t356 = t322 * t125 + t121 * t354;
+  real t359 = t62 * d_Psi[2] + Psi[2] * t59;
+  real t360 = t356 + t359;
+  real t363 = t0 * t322;
+  real t364 = Psi[1] * t62;
+  real t365 = t363 - t364;
+  real t369 = t322 * t65 + t0 * t354;
+  real t372 = t62 * d_Psi[1] + Psi[1] * t59;
+  real t373 = t369 - t372;
+  real t376 = t324 * d_x[2] + x[2] * t360 - (t365 * d_x[1] + x[1] * t373);
+  d_H6[3] = t376;
+  real t377 = t155 * t322;
+  real t378 = 1.0 - t377;
+  real t382 = t322 * t157 + t155 * t354;
+  real t385 = Psi[0] * t62;
+  real t386 = t141 * t322;
+  real t387 = t385 + t386;
+  real t391 = t322 * t145 + t141 * t354;
+  real t394 = t62 * d_Psi[0] + Psi[0] * t59;
+  real t395 = t391 + t394;
+  real t398 = t378 * d_x[2] - x[2] * t382 - (t387 * d_x[1] + x[1] * t395);
+  d_H6[4] = t398;
+  real t399 = t386 - t385;
+  real t401 = t391 - t394;
+  real t404 = t4 * t322;
+  real t405 = 1.0 - t404;
+  real t409 = t322 * t28 + t4 * t354;
+  real t412 = t399 * d_x[2] + x[2] * t401 - (t405 * d_x[1] - x[1] * t409);
+  d_H6[5] = t412;
+  d_H6[6] = d_H6[7] = d_H6[8] = 0.0;
+  real t416 = t133 * t322;
+  real t417 = 1.0 - t416;
+  real t421 = t322 * t135 + t133 * t354;
+  real t424 = t365 * d_x[0] + x[0] * t373 - (t417 * d_x[2] - x[2] * t421);
+  d_H6[9] = t424;
+  real t428 = t323 - t302;
+  real t430 = t356 - t359;
+  real t433 = t387 * d_x[0] + x[0] * t395 - (t428 * d_x[2] + x[2] * t430);
+  d_H6[10] = t433;
+  real t437 = t363 + t364;
+  real t439 = t372 + t369;
+  real t442 = t405 * d_x[0] - x[0] * t409 - (t437 * d_x[2] + x[2] * t439);
+  d_H6[11] = t442;
+  d_H6[12] = d_H6[13] = d_H6[14] = 0.0;
+  real t449 = t417 * d_x[1] - x[1] * t421 - (t324 * d_x[0] + x[0] * t360);
+  d_H6[15] = t449;
+  real t456 = t428 * d_x[1] + x[1] * t430 - (t378 * d_x[0] - x[0] * t382);
+  d_H6[16] = t456;
+  real t463 = t437 * d_x[1] + x[1] * t439 - (t399 * d_x[0] + x[0] * t401);
+  d_H6[17] = t463;
+  d_H6[18] = d_H6[19] = d_H6[20] = 0.0;
+  d_H6[21] = t421;
+  d_H6[22] = -t430;
+  d_H6[23] = -t439;
+  d_H6[24] = d_H6[25] = d_H6[26] = 0.0;
+  d_H6[27] = -t360;
+  d_H6[28] = t382;
+  d_H6[29] = -t401;
+  d_H6[30] = d_H6[31] = d_H6[32] = 0.0;
+  d_H6[33] = -t373;
+  d_H6[34] = -t395;
+  d_H6[35] = t409;
+  d_v[0] = Psid[2] * t412 + (x[2] * t399 - x[1] * t405) * d_Psid[2] + (Psid[1] * t398 + (x[2] * t378
+    - x[1] * t387) * d_Psid[1] + (Psid[0] * t376 + (x[2] * t324 - x[1] * t365) * d_Psid[0] -
+    d_xd[0]));
+  d_v[1] = Psid[2] * t442 + (x[0] * t405 - x[2] * t437) * d_Psid[2] + (Psid[1] * t433 + (x[0] * t387
+    - x[2] * t428) * d_Psid[1] + (Psid[0] * t424 + (x[0] * t365 - x[2] * t417) * d_Psid[0] -
+    d_xd[1]));
+  d_v[2] = Psid[2] * t463 + (x[1] * t437 - x[0] * t399) * d_Psid[2] + (Psid[1] * t456 + (x[1] * t428
+    - x[0] * t378) * d_Psid[1] + (Psid[0] * t449 + (x[1] * t417 - x[0] * t324) * d_Psid[0] -
+    d_xd[2]));
+  real t534 = (-1.0) + t416;
+  real t544 = Psid[0] * t421 + t534 * d_Psid[0] - (Psid[1] * t430 + t428 * d_Psid[1]) - (Psid[2] *
+    t439 + t437 * d_Psid[2]);
+  d_w[0] = t544;
+  real t546 = (-1.0) + t377;
+  real t556 = Psid[1] * t382 + t546 * d_Psid[1] - (Psid[0] * t360 + t324 * d_Psid[0]) - (Psid[2] *
+    t401 + t399 * d_Psid[2]);
+  d_w[1] = t556;
+  real t558 = (-1.0) + t404;
+  real t568 = Psid[2] * t409 + t558 * d_Psid[2] - (Psid[1] * t395 + t387 * d_Psid[1] + (Psid[0] *
+    t373 + t365 * d_Psid[0]));
+  d_w[2] = t568;
+  real t573 = t558 * Psid[2] - (t365 * Psid[0] + t387 * Psid[1]);
+  real t582 = t546 * Psid[1] - t324 * Psid[0] - t399 * Psid[2];
+  real t588 = t534 * Psid[0] - t428 * Psid[1] - t437 * Psid[2];
+  real t590 = x[0] * t582 - x[1] * t588;
+  real t598 = t582 * d_x[0] + x[0] * t556 - (t588 * d_x[1] + x[1] * t544);
+  real t603 = x[2] * t588 - x[0] * t573;
+  real t611 = t588 * d_x[2] + x[2] * t544 - (t573 * d_x[0] + x[0] * t568);
+  real t624 = t5 * 8.896791392450573e-21 + (-3.6992858609809485e-18);
+  real t626 = t5 * t624 + ((real)1 / (real)800296713216000);
+  real t628 = t5 * t626 + (-((real)1 / (real)2988969984000));
+  real t630 = t5 * t628 + ((real)1 / (real)14529715200);
+  real t632 = t5 * t630 + (-((real)1 / (real)95800320));
+  real t634 = t5 * t632 + ((real)1 / (real)907200);
+  real t636 = t5 * t634 + (-((real)1 / (real)13440));
+  real t638 = t5 * t636 + ((real)1 / (real)360);
+  real t640 = (-((real)1 / (real)24)) + t5 * t638;
+  real t646 = (Psi[2] * Psid[2] + (Psi[0] * Psid[0] + Psi[1] * Psid[1])) * 2.0;
+  real t647 = t640 * t646;
+  real t650 = Psi[2] * Psid[0] - Psi[0] * Psid[2];
+  real t654 = t5 * 3.868170170630684e-22 + (-1.7615646957052136e-19);
+  real t656 = t5 * t654 + 6.576508197299464e-17;
+  real t658 = t5 * t656 + (-((real)1 / (real)50812489728000));
+  real t660 = t5 * t658 + ((real)1 / (real)217945728000);
+  real t662 = t5 * t660 + (-((real)1 / (real)1245404160));
+  real t664 = t5 * t662 + ((real)1 / (real)9979200);
+  real t666 = t5 * t664 + (-((real)1 / (real)120960));
+  real t668 = t5 * t666 + ((real)1 / (real)2520);
+  real t670 = (-((real)1 / (real)120)) + t5 * t668;
+  real t671 = t646 * t670;
+  real t674 = Psi[1] * Psid[2] - Psi[2] * Psid[1];
+  real t678 = Psi[0] * Psid[1] - Psi[1] * Psid[0];
+  real t680 = Psi[2] * t674 - Psi[0] * t678;
+  real t684 = Psid[2] * t674 - Psid[0] * t678;
+  real t690 = t324 * Psidd[0] + (t399 * Psidd[2] + (t647 * t650 + (t378 * Psidd[1] + (t671 * t680 +
+    t322 * t684))));
+  real t700 = Psid[2] * d_Psi[1] + Psi[1] * d_Psid[2] - (Psid[1] * d_Psi[2] + Psi[2] * d_Psid[1]);
+  real t710 = Psid[1] * d_Psi[0] + Psi[0] * d_Psid[1] - (Psid[0] * d_Psi[1] + Psi[1] * d_Psid[0]);
+  real t727 = 2.0 * (Psid[1] * d_Psi[1] + Psi[1] * d_Psid[1] + (Psid[0] * d_Psi[0] + Psi[0] *
+    d_Psid[0]) + (Psid[2] * d_Psi[2] + Psi[2] * d_Psid[2]));
+  real t755 = t670 * t727 + t646 * (t668 * t31 + t5 * (t666 * t31 + t5 * (t664 * t31 + t5 * (t662 *
+    t31 + t5 * (t660 * t31 + t5 * (t658 * t31 + t5 * (t656 * t31 + t5 * (t654 * t31 + t5 *
+    (3.868170170630684e-22 * t31)))))))));
+  real t798 = t646 * (t638 * t31 + t5 * (t636 * t31 + t5 * (t634 * t31 + t5 * (t632 * t31 + t5 *
+    (t630 * t31 + t5 * (t628 * t31 + t5 * (t626 * t31 + t5 * (t624 * t31 + t5 *
+    (8.896791392450573e-21 * t31))))))))) + t640 * t727;
+  real t806 = Psid[0] * d_Psi[2] + Psi[2] * d_Psid[0] - (Psid[2] * d_Psi[0] + Psi[0] * d_Psid[2]);
+  real t817 = t684 * t354 + t322 * (t674 * d_Psid[2] + Psid[2] * t700 - (t678 * d_Psid[0] + Psid[0]
+    * t710)) + (t680 * t755 + t671 * (t674 * d_Psi[2] + Psi[2] * t700 - (t678 * d_Psi[0] + Psi[0] *
+    t710))) + (t378 * d_Psidd[1] - Psidd[1] * t382) + (t650 * t798 + t647 * t806) + (Psidd[2] * t401
+    + t399 * d_Psidd[2]) + (Psidd[0] * t360 + t324 * d_Psidd[0]);
+  real t827 = Psi[0] * t650 - Psi[1] * t674;
+  real t831 = Psid[0] * t650 - Psid[1] * t674;
+  real t837 = t365 * Psidd[0] + (t387 * Psidd[1] + (t647 * t678 + (t405 * Psidd[2] + (t671 * t827 +
+    t322 * t831))));
+  real t875 = t831 * t354 + t322 * (t650 * d_Psid[0] + Psid[0] * t806 - (t674 * d_Psid[1] + Psid[1]
+    * t700)) + (t827 * t755 + t671 * (t650 * d_Psi[0] + Psi[0] * t806 - (t674 * d_Psi[1] + Psi[1] *
+    t700))) + (t405 * d_Psidd[2] - Psidd[2] * t409) + (t678 * t798 + t647 * t710) + (Psidd[1] * t395
+    + t387 * d_Psidd[1]) + (Psidd[0] * t373 + t365 * d_Psidd[0]);
+  d_c[0] = 2.0 * (t573 * d_xd[1] + xd[1] * t568) + (t590 * t556 + t582 * t598 - (t603 * t568 + t573
+    * t611) - 2.0 * (t582 * d_xd[2] + xd[2] * t556)) + (t690 * d_x[2] + x[2] * t817) - (t837 *
+    d_x[1] + x[1] * t875) - d_xdd[0];
+  real t886 = x[1] * t573 - x[2] * t582;
+  real t894 = t573 * d_x[1] + x[1] * t568 - (t582 * d_x[2] + x[2] * t556);
+  real t913 = Psi[1] * t678 - Psi[2] * t650;
+  real t917 = Psid[1] * t678 - Psid[2] * t650;
+  real t923 = t437 * Psidd[2] + (t428 * Psidd[1] + (t647 * t674 + (t417 * Psidd[0] + (t671 * t913 +
+    t322 * t917))));
+  real t961 = t917 * t354 + t322 * (t678 * d_Psid[1] + Psid[1] * t710 - (t650 * d_Psid[2] + Psid[2]
+    * t806)) + (t913 * t755 + t671 * (t678 * d_Psi[1] + Psi[1] * t710 - (t650 * d_Psi[2] + Psi[2] *
+    t806))) + (t417 * d_Psidd[0] - Psidd[0] * t421) + (t674 * t798 + t647 * t700) + (Psidd[1] * t430
+    + t428 * d_Psidd[1]) + (Psidd[2] * t439 + t437 * d_Psidd[2]);
+  d_c[1] = 2.0 * (t588 * d_xd[2] + xd[2] * t544) + (t886 * t568 + t573 * t894 - (t590 * t544 + t588
+    * t598)) - 2.0 * (t573 * d_xd[0] + xd[0] * t568) - (t923 * d_x[2] + x[2] * t961) + (t837 *
+    d_x[0] + x[0] * t875) - d_xdd[1];
+  d_c[2] = 2.0 * (t582 * d_xd[0] + xd[0] * t556) + (t603 * t544 + t588 * t611 - (t886 * t556 + t582
+    * t894) - 2.0 * (t588 * d_xd[1] + xd[1] * t544)) + (t923 * d_x[1] + x[1] * t961) - (t690 *
+    d_x[0] + x[0] * t817) - d_xdd[2];
+  d_c[3] = -t961;
+  d_c[4] = -t817;
+  d_c[5] = -t875;
+  return 0;
 }
 
-static int mstmm_sweep_modal_frame_motion_slope_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_modal_frame_motion_slope(in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_modal_frame_motion_slope_inputs[] = {
-    {"R_end", 9, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"Psi", 3, "rad", 0, 0},
-    {"xd", 3, "m/s", 0, 0},
-    {"Psid", 3, "rad/s", 0, 0},
-    {"xdd", 3, "m/s2", 0, 0},
-    {"Psidd", 3, "rad/s2", 0, 0},
-    {"d_x", 3, "m", 0, 0},
-    {"d_Psi", 3, "rad", 0, 0},
-    {"d_xd", 3, "m/s", 0, 0},
-    {"d_Psid", 3, "rad/s", 0, 0},
-    {"d_xdd", 3, "m/s2", 0, 0},
-    {"d_Psidd", 3, "rad/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_frame_motion_slope_outputs[] = {
-    {"d_R", 9, "", 0, 0},
-    {"d_d", 3, "m", 0, 0},
-    {"d_H6", 36, "", 0, 0},
-    {"d_v", 3, "m/s", 0, 0},
-    {"d_w", 3, "rad/s", 0, 0},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_frame_motion_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]))
 
 /* subspace and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -8892,195 +4392,60 @@ static const mstmm_port mstmm_sweep_modal_frame_motion_slope_outputs[] = {
  * out d_H[6][n] derivative of H
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_subspace_slope_sized(int n, const real *restrict H6, const real *restrict Phi,
-    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H)
+int mstmm_sweep_modal_subspace_slope_sized(int n, in_t H6, in_t Phi, in_t d_H6, in_t d_Phi,
+    out_t d_H)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = Phi[5 * n + k] * d_H6[5];
-        const real t1 = H6[5] * d_Phi[5 * n + k];
-        const real t2 = t0 + t1;
-        const real t3 = Phi[4 * n + k] * d_H6[4];
-        const real t4 = H6[4] * d_Phi[4 * n + k];
-        const real t5 = t3 + t4;
-        const real t6 = Phi[3 * n + k] * d_H6[3];
-        const real t7 = H6[3] * d_Phi[3 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = Phi[2 * n + k] * d_H6[2];
-        const real t10 = H6[2] * d_Phi[2 * n + k];
-        const real t11 = t9 + t10;
-        const real t12 = Phi[n + k] * d_H6[1];
-        const real t13 = H6[1] * d_Phi[n + k];
-        const real t14 = t12 + t13;
-        const real t15 = Phi[k] * d_H6[0];
-        const real t16 = H6[0] * d_Phi[k];
-        const real t17 = t15 + t16;
-        const real t18 = t14 + t17;
-        const real t19 = t11 + t18;
-        const real t20 = t8 + t19;
-        const real t21 = t5 + t20;
-        const real t22 = t2 + t21;
-        d_H[k] = t22;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t23 = H6[11] * d_Phi[5 * n + k];
-        const real t24 = Phi[5 * n + k] * d_H6[11];
-        const real t25 = t23 + t24;
-        const real t26 = H6[10] * d_Phi[4 * n + k];
-        const real t27 = Phi[4 * n + k] * d_H6[10];
-        const real t28 = t26 + t27;
-        const real t29 = H6[9] * d_Phi[3 * n + k];
-        const real t30 = Phi[3 * n + k] * d_H6[9];
-        const real t31 = t29 + t30;
-        const real t32 = H6[8] * d_Phi[2 * n + k];
-        const real t33 = Phi[2 * n + k] * d_H6[8];
-        const real t34 = t32 + t33;
-        const real t35 = H6[7] * d_Phi[n + k];
-        const real t36 = Phi[n + k] * d_H6[7];
-        const real t37 = t35 + t36;
-        const real t38 = H6[6] * d_Phi[k];
-        const real t39 = Phi[k] * d_H6[6];
-        const real t40 = t38 + t39;
-        const real t41 = t37 + t40;
-        const real t42 = t34 + t41;
-        const real t43 = t31 + t42;
-        const real t44 = t28 + t43;
-        const real t45 = t25 + t44;
-        d_H[n + k] = t45;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t46 = H6[17] * d_Phi[5 * n + k];
-        const real t47 = Phi[5 * n + k] * d_H6[17];
-        const real t48 = t46 + t47;
-        const real t49 = H6[16] * d_Phi[4 * n + k];
-        const real t50 = Phi[4 * n + k] * d_H6[16];
-        const real t51 = t49 + t50;
-        const real t52 = H6[15] * d_Phi[3 * n + k];
-        const real t53 = Phi[3 * n + k] * d_H6[15];
-        const real t54 = t52 + t53;
-        const real t55 = H6[14] * d_Phi[2 * n + k];
-        const real t56 = Phi[2 * n + k] * d_H6[14];
-        const real t57 = t55 + t56;
-        const real t58 = H6[13] * d_Phi[n + k];
-        const real t59 = Phi[n + k] * d_H6[13];
-        const real t60 = t58 + t59;
-        const real t61 = H6[12] * d_Phi[k];
-        const real t62 = Phi[k] * d_H6[12];
-        const real t63 = t61 + t62;
-        const real t64 = t60 + t63;
-        const real t65 = t57 + t64;
-        const real t66 = t54 + t65;
-        const real t67 = t51 + t66;
-        const real t68 = t48 + t67;
-        d_H[2 * n + k] = t68;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t69 = H6[23] * d_Phi[5 * n + k];
-        const real t70 = Phi[5 * n + k] * d_H6[23];
-        const real t71 = t69 + t70;
-        const real t72 = H6[22] * d_Phi[4 * n + k];
-        const real t73 = Phi[4 * n + k] * d_H6[22];
-        const real t74 = t72 + t73;
-        const real t75 = H6[21] * d_Phi[3 * n + k];
-        const real t76 = Phi[3 * n + k] * d_H6[21];
-        const real t77 = t75 + t76;
-        const real t78 = H6[20] * d_Phi[2 * n + k];
-        const real t79 = Phi[2 * n + k] * d_H6[20];
-        const real t80 = t78 + t79;
-        const real t81 = H6[19] * d_Phi[n + k];
-        const real t82 = Phi[n + k] * d_H6[19];
-        const real t83 = t81 + t82;
-        const real t84 = H6[18] * d_Phi[k];
-        const real t85 = Phi[k] * d_H6[18];
-        const real t86 = t84 + t85;
-        const real t87 = t83 + t86;
-        const real t88 = t80 + t87;
-        const real t89 = t77 + t88;
-        const real t90 = t74 + t89;
-        const real t91 = t71 + t90;
-        d_H[3 * n + k] = t91;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t92 = H6[29] * d_Phi[5 * n + k];
-        const real t93 = Phi[5 * n + k] * d_H6[29];
-        const real t94 = t92 + t93;
-        const real t95 = H6[28] * d_Phi[4 * n + k];
-        const real t96 = Phi[4 * n + k] * d_H6[28];
-        const real t97 = t95 + t96;
-        const real t98 = H6[27] * d_Phi[3 * n + k];
-        const real t99 = Phi[3 * n + k] * d_H6[27];
-        const real t100 = t98 + t99;
-        const real t101 = H6[26] * d_Phi[2 * n + k];
-        const real t102 = Phi[2 * n + k] * d_H6[26];
-        const real t103 = t101 + t102;
-        const real t104 = H6[25] * d_Phi[n + k];
-        const real t105 = Phi[n + k] * d_H6[25];
-        const real t106 = t104 + t105;
-        const real t107 = H6[24] * d_Phi[k];
-        const real t108 = Phi[k] * d_H6[24];
-        const real t109 = t107 + t108;
-        const real t110 = t106 + t109;
-        const real t111 = t103 + t110;
-        const real t112 = t100 + t111;
-        const real t113 = t97 + t112;
-        const real t114 = t94 + t113;
-        d_H[4 * n + k] = t114;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t115 = H6[35] * d_Phi[5 * n + k];
-        const real t116 = Phi[5 * n + k] * d_H6[35];
-        const real t117 = t115 + t116;
-        const real t118 = H6[34] * d_Phi[4 * n + k];
-        const real t119 = Phi[4 * n + k] * d_H6[34];
-        const real t120 = t118 + t119;
-        const real t121 = H6[33] * d_Phi[3 * n + k];
-        const real t122 = Phi[3 * n + k] * d_H6[33];
-        const real t123 = t121 + t122;
-        const real t124 = H6[32] * d_Phi[2 * n + k];
-        const real t125 = Phi[2 * n + k] * d_H6[32];
-        const real t126 = t124 + t125;
-        const real t127 = H6[31] * d_Phi[n + k];
-        const real t128 = Phi[n + k] * d_H6[31];
-        const real t129 = t127 + t128;
-        const real t130 = H6[30] * d_Phi[k];
-        const real t131 = Phi[k] * d_H6[30];
-        const real t132 = t130 + t131;
-        const real t133 = t129 + t132;
-        const real t134 = t126 + t133;
-        const real t135 = t123 + t134;
-        const real t136 = t120 + t135;
-        const real t137 = t117 + t136;
-        d_H[5 * n + k] = t137;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    d_H[k] = Phi[5 * n + k] * d_H6[5] + H6[5] * d_Phi[5 * n + k] + (Phi[4 * n + k] * d_H6[4] + H6[4]
+      * d_Phi[4 * n + k] + (Phi[3 * n + k] * d_H6[3] + H6[3] * d_Phi[3 * n + k] + (Phi[2 * n + k] *
+      d_H6[2] + H6[2] * d_Phi[2 * n + k] + (Phi[n + k] * d_H6[1] + H6[1] * d_Phi[n + k] + (Phi[k] *
+      d_H6[0] + H6[0] * d_Phi[k])))));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_H[n + k] = H6[11] * d_Phi[5 * n + k] + Phi[5 * n + k] * d_H6[11] + (H6[10] * d_Phi[4 * n + k]
+      + Phi[4 * n + k] * d_H6[10] + (H6[9] * d_Phi[3 * n + k] + Phi[3 * n + k] * d_H6[9] + (H6[8] *
+      d_Phi[2 * n + k] + Phi[2 * n + k] * d_H6[8] + (H6[7] * d_Phi[n + k] + Phi[n + k] * d_H6[7] +
+      (H6[6] * d_Phi[k] + Phi[k] * d_H6[6])))));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_H[2 * n + k] = H6[17] * d_Phi[5 * n + k] + Phi[5 * n + k] * d_H6[17] + (H6[16] * d_Phi[4 * n +
+      k] + Phi[4 * n + k] * d_H6[16] + (H6[15] * d_Phi[3 * n + k] + Phi[3 * n + k] * d_H6[15] +
+      (H6[14] * d_Phi[2 * n + k] + Phi[2 * n + k] * d_H6[14] + (H6[13] * d_Phi[n + k] + Phi[n + k] *
+      d_H6[13] + (H6[12] * d_Phi[k] + Phi[k] * d_H6[12])))));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_H[3 * n + k] = H6[23] * d_Phi[5 * n + k] + Phi[5 * n + k] * d_H6[23] + (H6[22] * d_Phi[4 * n +
+      k] + Phi[4 * n + k] * d_H6[22] + (H6[21] * d_Phi[3 * n + k] + Phi[3 * n + k] * d_H6[21] +
+      (H6[20] * d_Phi[2 * n + k] + Phi[2 * n + k] * d_H6[20] + (H6[19] * d_Phi[n + k] + Phi[n + k] *
+      d_H6[19] + (H6[18] * d_Phi[k] + Phi[k] * d_H6[18])))));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_H[4 * n + k] = H6[29] * d_Phi[5 * n + k] + Phi[5 * n + k] * d_H6[29] + (H6[28] * d_Phi[4 * n +
+      k] + Phi[4 * n + k] * d_H6[28] + (H6[27] * d_Phi[3 * n + k] + Phi[3 * n + k] * d_H6[27] +
+      (H6[26] * d_Phi[2 * n + k] + Phi[2 * n + k] * d_H6[26] + (H6[25] * d_Phi[n + k] + Phi[n + k] *
+      d_H6[25] + (H6[24] * d_Phi[k] + Phi[k] * d_H6[24])))));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_H[5 * n + k] = H6[35] * d_Phi[5 * n + k] + Phi[5 * n + k] * d_H6[35] + (H6[34] * d_Phi[4 * n +
+      k] + Phi[4 * n + k] * d_H6[34] + (H6[33] * d_Phi[3 * n + k] + Phi[3 * n + k] * d_H6[33] +
+      (H6[32] * d_Phi[2 * n + k] + Phi[2 * n + k] * d_H6[32] + (H6[31] * d_Phi[n + k] + Phi[n + k] *
+      d_H6[31] + (H6[30] * d_Phi[k] + Phi[k] * d_H6[30])))));
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_subspace_slope(int n, const real *restrict H6, const real *restrict Phi,
-    const real *restrict d_H6, const real *restrict d_Phi, real *restrict d_H)
+int mstmm_sweep_modal_subspace_slope(int n, in_t H6, in_t Phi, in_t d_H6, in_t d_Phi, out_t d_H)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_subspace_slope_sized(1, H6, Phi, d_H6, d_Phi, d_H);
-    case 2: return mstmm_sweep_modal_subspace_slope_sized(2, H6, Phi, d_H6, d_Phi, d_H);
-    case 3: return mstmm_sweep_modal_subspace_slope_sized(3, H6, Phi, d_H6, d_Phi, d_H);
-    case 4: return mstmm_sweep_modal_subspace_slope_sized(4, H6, Phi, d_H6, d_Phi, d_H);
-    default: return mstmm_sweep_modal_subspace_slope_sized(n, H6, Phi, d_H6, d_Phi, d_H);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_subspace_slope_sized(1, H6, Phi, d_H6, d_Phi, d_H);
+  case 2: return mstmm_sweep_modal_subspace_slope_sized(2, H6, Phi, d_H6, d_Phi, d_H);
+  case 3: return mstmm_sweep_modal_subspace_slope_sized(3, H6, Phi, d_H6, d_Phi, d_H);
+  case 4: return mstmm_sweep_modal_subspace_slope_sized(4, H6, Phi, d_H6, d_Phi, d_H);
+  default: return mstmm_sweep_modal_subspace_slope_sized(n, H6, Phi, d_H6, d_Phi, d_H);
+  }
 }
 
-static int mstmm_sweep_modal_subspace_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_subspace_slope(n, in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_subspace_slope_inputs[] = {
-    {"H6", 36, "", 0, 0},
-    {"Phi", 6, "", 0, 1},
-    {"d_H6", 36, "", 0, 0},
-    {"d_Phi", 6, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_subspace_slope_outputs[] = {
-    {"d_H", 6, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_subspace_slope, (n, in[0], in[1], in[2], in[3], out[0]))
 
 /* prescribed_bias and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
@@ -9095,98 +4460,57 @@ static const mstmm_port mstmm_sweep_modal_subspace_slope_outputs[] = {
  * out d_c_s[6] derivative of c_s
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_prescribed_bias_slope_sized(int n, const real *restrict H,
-    const real *restrict s, const real *restrict c, const real *restrict d_H,
-    const real *restrict d_s, const real *restrict d_c, real *restrict d_c_s)
+int mstmm_sweep_modal_prescribed_bias_slope_sized(int n, in_t H, in_t s, in_t c, in_t d_H, in_t d_s,
+    in_t d_c, out_t d_c_s)
 {
-    (void)c;
-    real t3 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = s[k] * d_H[k];
-        const real t1 = H[k] * d_s[k];
-        const real t2 = t0 + t1;
-        t3 += t2;
-    }
-    const real t4 = d_c[0] + t3;
-    d_c_s[0] = t4;
-    real t8 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t5 = H[n + k] * d_s[k];
-        const real t6 = s[k] * d_H[n + k];
-        const real t7 = t5 + t6;
-        t8 += t7;
-    }
-    const real t9 = d_c[1] + t8;
-    d_c_s[1] = t9;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t10 = H[2 * n + k] * d_s[k];
-        const real t11 = s[k] * d_H[2 * n + k];
-        const real t12 = t10 + t11;
-        t13 += t12;
-    }
-    const real t14 = d_c[2] + t13;
-    d_c_s[2] = t14;
-    real t18 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = H[3 * n + k] * d_s[k];
-        const real t16 = s[k] * d_H[3 * n + k];
-        const real t17 = t15 + t16;
-        t18 += t17;
-    }
-    const real t19 = d_c[3] + t18;
-    d_c_s[3] = t19;
-    real t23 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t20 = H[4 * n + k] * d_s[k];
-        const real t21 = s[k] * d_H[4 * n + k];
-        const real t22 = t20 + t21;
-        t23 += t22;
-    }
-    const real t24 = d_c[4] + t23;
-    d_c_s[4] = t24;
-    real t28 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t25 = H[5 * n + k] * d_s[k];
-        const real t26 = s[k] * d_H[5 * n + k];
-        const real t27 = t25 + t26;
-        t28 += t27;
-    }
-    const real t29 = d_c[5] + t28;
-    d_c_s[5] = t29;
-    return 0;
+  (void)c;
+  real t3 = 0;
+  for (int k = 0; k < n; ++k) {
+    t3 += s[k] * d_H[k] + H[k] * d_s[k];
+  }
+  d_c_s[0] = d_c[0] + t3;
+  real t8 = 0;
+  for (int k = 0; k < n; ++k) {
+    t8 += H[n + k] * d_s[k] + s[k] * d_H[n + k];
+  }
+  d_c_s[1] = d_c[1] + t8;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += H[2 * n + k] * d_s[k] + s[k] * d_H[2 * n + k];
+  }
+  d_c_s[2] = d_c[2] + t13;
+  real t18 = 0;
+  for (int k = 0; k < n; ++k) {
+    t18 += H[3 * n + k] * d_s[k] + s[k] * d_H[3 * n + k];
+  }
+  d_c_s[3] = d_c[3] + t18;
+  real t23 = 0;
+  for (int k = 0; k < n; ++k) {
+    t23 += H[4 * n + k] * d_s[k] + s[k] * d_H[4 * n + k];
+  }
+  d_c_s[4] = d_c[4] + t23;
+  real t28 = 0;
+  for (int k = 0; k < n; ++k) {
+    t28 += H[5 * n + k] * d_s[k] + s[k] * d_H[5 * n + k];
+  }
+  d_c_s[5] = d_c[5] + t28;
+  return 0;
 }
 
-int mstmm_sweep_modal_prescribed_bias_slope(int n, const real *restrict H, const real *restrict s,
-    const real *restrict c, const real *restrict d_H, const real *restrict d_s,
-    const real *restrict d_c, real *restrict d_c_s)
+int mstmm_sweep_modal_prescribed_bias_slope(int n, in_t H, in_t s, in_t c, in_t d_H, in_t d_s,
+    in_t d_c, out_t d_c_s)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_prescribed_bias_slope_sized(1, H, s, c, d_H, d_s, d_c, d_c_s);
-    case 2: return mstmm_sweep_modal_prescribed_bias_slope_sized(2, H, s, c, d_H, d_s, d_c, d_c_s);
-    case 3: return mstmm_sweep_modal_prescribed_bias_slope_sized(3, H, s, c, d_H, d_s, d_c, d_c_s);
-    case 4: return mstmm_sweep_modal_prescribed_bias_slope_sized(4, H, s, c, d_H, d_s, d_c, d_c_s);
-    default: return mstmm_sweep_modal_prescribed_bias_slope_sized(n, H, s, c, d_H, d_s, d_c, d_c_s);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_prescribed_bias_slope_sized(1, H, s, c, d_H, d_s, d_c, d_c_s);
+  case 2: return mstmm_sweep_modal_prescribed_bias_slope_sized(2, H, s, c, d_H, d_s, d_c, d_c_s);
+  case 3: return mstmm_sweep_modal_prescribed_bias_slope_sized(3, H, s, c, d_H, d_s, d_c, d_c_s);
+  case 4: return mstmm_sweep_modal_prescribed_bias_slope_sized(4, H, s, c, d_H, d_s, d_c, d_c_s);
+  default: return mstmm_sweep_modal_prescribed_bias_slope_sized(n, H, s, c, d_H, d_s, d_c, d_c_s);
+  }
 }
 
-static int mstmm_sweep_modal_prescribed_bias_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_prescribed_bias_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_prescribed_bias_slope_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"s", 1, "", 0, 1},
-    {"c", 6, "m/s2, rad/s2", 0, 0},
-    {"d_H", 6, "", 0, 1},
-    {"d_s", 1, "", 0, 1},
-    {"d_c", 6, "m/s2, rad/s2", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_modal_prescribed_bias_slope_outputs[] = {
-    {"d_c_s", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_modal_prescribed_bias_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5],
+  out[0]))
 
 /* prescribed_load and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -9200,99 +4524,63 @@ static const mstmm_port mstmm_sweep_modal_prescribed_bias_slope_outputs[] = {
  * out d_e_f[n] derivative of e_f, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_prescribed_load_slope_sized(int n, const real *restrict S_rf,
-    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
-    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f)
+int mstmm_sweep_modal_prescribed_load_slope_sized(int n, in_t S_rf, in_t S_ff, in_t s, in_t d_S_rf,
+    in_t d_s, out_t d_e, out_t d_e_f)
 {
-    real t3 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = s[k] * d_S_rf[k];
-        const real t1 = S_rf[k] * d_s[k];
-        const real t2 = t0 + t1;
-        t3 += t2;
+  real t3 = 0;
+  for (int k = 0; k < n; ++k) {
+    t3 += s[k] * d_S_rf[k] + S_rf[k] * d_s[k];
+  }
+  d_e[0] += t3;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += S_rf[n + k] * d_s[k] + s[k] * d_S_rf[n + k];
+  }
+  d_e[1] += t7;
+  real t11 = 0;
+  for (int k = 0; k < n; ++k) {
+    t11 += S_rf[2 * n + k] * d_s[k] + s[k] * d_S_rf[2 * n + k];
+  }
+  d_e[2] += t11;
+  real t15 = 0;
+  for (int k = 0; k < n; ++k) {
+    t15 += S_rf[3 * n + k] * d_s[k] + s[k] * d_S_rf[3 * n + k];
+  }
+  d_e[3] += t15;
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += S_rf[4 * n + k] * d_s[k] + s[k] * d_S_rf[4 * n + k];
+  }
+  d_e[4] += t19;
+  real t23 = 0;
+  for (int k = 0; k < n; ++k) {
+    t23 += S_rf[5 * n + k] * d_s[k] + s[k] * d_S_rf[5 * n + k];
+  }
+  d_e[5] += t23;
+  for (int k = 0; k < n; ++k) {
+    real t25 = 0;
+    for (int l = 0; l < n; ++l) {
+      t25 += S_ff[n * k + l] * d_s[l];
     }
-    d_e[0] += t3;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t4 = S_rf[n + k] * d_s[k];
-        const real t5 = s[k] * d_S_rf[n + k];
-        const real t6 = t4 + t5;
-        t7 += t6;
-    }
-    d_e[1] += t7;
-    real t11 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t8 = S_rf[2 * n + k] * d_s[k];
-        const real t9 = s[k] * d_S_rf[2 * n + k];
-        const real t10 = t8 + t9;
-        t11 += t10;
-    }
-    d_e[2] += t11;
-    real t15 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = S_rf[3 * n + k] * d_s[k];
-        const real t13 = s[k] * d_S_rf[3 * n + k];
-        const real t14 = t12 + t13;
-        t15 += t14;
-    }
-    d_e[3] += t15;
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t16 = S_rf[4 * n + k] * d_s[k];
-        const real t17 = s[k] * d_S_rf[4 * n + k];
-        const real t18 = t16 + t17;
-        t19 += t18;
-    }
-    d_e[4] += t19;
-    real t23 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t20 = S_rf[5 * n + k] * d_s[k];
-        const real t21 = s[k] * d_S_rf[5 * n + k];
-        const real t22 = t20 + t21;
-        t23 += t22;
-    }
-    d_e[5] += t23;
-    for (int k = 0; k < n; ++k) {
-        real t25 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t24 = S_ff[n * k + l] * d_s[l];
-            t25 += t24;
-        }
-        d_e_f[k] += t25;
-    }
-    return 0;
+    d_e_f[k] += t25;
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_prescribed_load_slope(int n, const real *restrict S_rf,
-    const real *restrict S_ff, const real *restrict s, const real *restrict d_S_rf,
-    const real *restrict d_s, real *restrict d_e, real *restrict d_e_f)
+int mstmm_sweep_modal_prescribed_load_slope(int n, in_t S_rf, in_t S_ff, in_t s, in_t d_S_rf,
+    in_t d_s, out_t d_e, out_t d_e_f)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_prescribed_load_slope_sized(1, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    case 2: return mstmm_sweep_modal_prescribed_load_slope_sized(2, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    case 3: return mstmm_sweep_modal_prescribed_load_slope_sized(3, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    case 4: return mstmm_sweep_modal_prescribed_load_slope_sized(4, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    default: return mstmm_sweep_modal_prescribed_load_slope_sized(n, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_prescribed_load_slope_sized(1, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+  case 2: return mstmm_sweep_modal_prescribed_load_slope_sized(2, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+  case 3: return mstmm_sweep_modal_prescribed_load_slope_sized(3, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+  case 4: return mstmm_sweep_modal_prescribed_load_slope_sized(4, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+  default: return mstmm_sweep_modal_prescribed_load_slope_sized(n, S_rf, S_ff, s, d_S_rf, d_s, d_e, d_e_f);
+  }
 }
 
-static int mstmm_sweep_modal_prescribed_load_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_prescribed_load_slope(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_modal_prescribed_load_slope_inputs[] = {
-    {"S_rf", 6, "", 0, 1},
-    {"S_ff", 1, "", 0, 2},
-    {"s", 1, "", 0, 1},
-    {"d_S_rf", 6, "", 0, 1},
-    {"d_s", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_prescribed_load_slope_outputs[] = {
-    {"d_e", 6, "N, N*m", 1, 0},
-    {"d_e_f", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_prescribed_load_slope, (n, in[0], in[1], in[2], in[3], in[4], out[0],
+  out[1]))
 
 /* modal_effort and its derivative along a direction
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -9306,464 +4594,213 @@ static const mstmm_port mstmm_sweep_modal_prescribed_load_slope_outputs[] = {
  * out d_tau[n] derivative of tau
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_modal_modal_effort_slope_sized(int n, const real *restrict H,
-    const real *restrict e, const real *restrict e_f, const real *restrict d_H,
-    const real *restrict d_e, const real *restrict d_e_f, real *restrict d_tau)
+int mstmm_sweep_modal_modal_effort_slope_sized(int n, in_t H, in_t e, in_t e_f, in_t d_H, in_t d_e,
+    in_t d_e_f, out_t d_tau)
 {
-    (void)e_f;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = H[5 * n + k] * d_e[5];
-        const real t1 = e[5] * d_H[5 * n + k];
-        const real t2 = t0 + t1;
-        const real t3 = H[4 * n + k] * d_e[4];
-        const real t4 = e[4] * d_H[4 * n + k];
-        const real t5 = t3 + t4;
-        const real t6 = H[3 * n + k] * d_e[3];
-        const real t7 = e[3] * d_H[3 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = H[2 * n + k] * d_e[2];
-        const real t10 = e[2] * d_H[2 * n + k];
-        const real t11 = t9 + t10;
-        const real t12 = H[n + k] * d_e[1];
-        const real t13 = e[1] * d_H[n + k];
-        const real t14 = t12 + t13;
-        const real t15 = H[k] * d_e[0];
-        const real t16 = e[0] * d_H[k];
-        const real t17 = t15 + t16;
-        const real t18 = t14 + t17;
-        const real t19 = t11 + t18;
-        const real t20 = t8 + t19;
-        const real t21 = t5 + t20;
-        const real t22 = t2 + t21;
-        const real t23 = d_e_f[k] + t22;
-        d_tau[k] = t23;
-    }
-    return 0;
+  (void)e_f;
+  for (int k = 0; k < n; ++k) {
+    d_tau[k] = d_e_f[k] + (H[5 * n + k] * d_e[5] + e[5] * d_H[5 * n + k] + (H[4 * n + k] * d_e[4] +
+      e[4] * d_H[4 * n + k] + (H[3 * n + k] * d_e[3] + e[3] * d_H[3 * n + k] + (H[2 * n + k] *
+      d_e[2] + e[2] * d_H[2 * n + k] + (H[n + k] * d_e[1] + e[1] * d_H[n + k] + (H[k] * d_e[0] +
+      e[0] * d_H[k]))))));
+  }
+  return 0;
 }
 
-int mstmm_sweep_modal_modal_effort_slope(int n, const real *restrict H, const real *restrict e,
-    const real *restrict e_f, const real *restrict d_H, const real *restrict d_e,
-    const real *restrict d_e_f, real *restrict d_tau)
+int mstmm_sweep_modal_modal_effort_slope(int n, in_t H, in_t e, in_t e_f, in_t d_H, in_t d_e,
+    in_t d_e_f, out_t d_tau)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_modal_modal_effort_slope_sized(1, H, e, e_f, d_H, d_e, d_e_f, d_tau);
-    case 2: return mstmm_sweep_modal_modal_effort_slope_sized(2, H, e, e_f, d_H, d_e, d_e_f, d_tau);
-    case 3: return mstmm_sweep_modal_modal_effort_slope_sized(3, H, e, e_f, d_H, d_e, d_e_f, d_tau);
-    case 4: return mstmm_sweep_modal_modal_effort_slope_sized(4, H, e, e_f, d_H, d_e, d_e_f, d_tau);
-    default: return mstmm_sweep_modal_modal_effort_slope_sized(n, H, e, e_f, d_H, d_e, d_e_f, d_tau);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_modal_effort_slope_sized(1, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+  case 2: return mstmm_sweep_modal_modal_effort_slope_sized(2, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+  case 3: return mstmm_sweep_modal_modal_effort_slope_sized(3, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+  case 4: return mstmm_sweep_modal_modal_effort_slope_sized(4, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+  default: return mstmm_sweep_modal_modal_effort_slope_sized(n, H, e, e_f, d_H, d_e, d_e_f, d_tau);
+  }
 }
 
-static int mstmm_sweep_modal_modal_effort_slope_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_modal_modal_effort_slope(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_modal_modal_effort_slope_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 1},
-    {"d_H", 6, "", 0, 1},
-    {"d_e", 6, "N, N*m", 0, 0},
-    {"d_e_f", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_modal_modal_effort_slope_outputs[] = {
-    {"d_tau", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_modal_modal_effort_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5],
+  out[0]))
 
 static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
-    {
-        .name = "residual",
-        .function = (void (*)(void))mstmm_sweep_modal_residual,
-        .call = mstmm_sweep_modal_residual_call,
-        .n_inputs = 22,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_residual_inputs,
-        .outputs = mstmm_sweep_modal_residual_outputs,
-        .ir_hash = "4294ac21676d77f1343051938646a9166faf3e3931cd8852b8cd0690d9227a79",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "momentum",
-        .function = (void (*)(void))mstmm_sweep_modal_momentum,
-        .call = mstmm_sweep_modal_momentum_call,
-        .n_inputs = 21,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_momentum_inputs,
-        .outputs = mstmm_sweep_modal_momentum_outputs,
-        .ir_hash = "9ea40fbbb3bc7be92b226e2e7214b2049be85919d99b9e3ad1791448fe75e884",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "strain_energy",
-        .function = (void (*)(void))mstmm_sweep_modal_strain_energy,
-        .call = mstmm_sweep_modal_strain_energy_call,
-        .n_inputs = 4,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_modal_strain_energy_inputs,
-        .outputs = mstmm_sweep_modal_strain_energy_outputs,
-        .ir_hash = "c2ddbd1d7394af6c7cf25a48a6d6e885296a7e3da46d32b6a35f7a51bf397c0e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "section",
-        .function = (void (*)(void))mstmm_sweep_modal_section,
-        .call = mstmm_sweep_modal_section_call,
-        .n_inputs = 11,
-        .n_outputs = 7,
-        .inputs = mstmm_sweep_modal_section_inputs,
-        .outputs = mstmm_sweep_modal_section_outputs,
-        .ir_hash = "fd5280df307416a890e6d4f93cf72ef1516c5022c5c62021aa8c9a2002c7130a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "end_motion",
-        .function = (void (*)(void))mstmm_sweep_modal_end_motion,
-        .call = mstmm_sweep_modal_end_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_end_motion_inputs,
-        .outputs = mstmm_sweep_modal_end_motion_outputs,
-        .ir_hash = "43f9a513099fa377dd8e1f2b6281eae0e30bfcdb5a2e7a5625548bf0da952d94",
-        .n_guards = 1,
-        .guards = mstmm_sweep_modal_end_motion_guards,
-    },
-    {
-        .name = "frame_motion",
-        .function = (void (*)(void))mstmm_sweep_modal_frame_motion,
-        .call = mstmm_sweep_modal_frame_motion_call,
-        .n_inputs = 7,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_frame_motion_inputs,
-        .outputs = mstmm_sweep_modal_frame_motion_outputs,
-        .ir_hash = "c5afdbeff30ed79f87f8d613b2780850e5f6f7b774e678adea1eaa29f48f7467",
-        .n_guards = 1,
-        .guards = mstmm_sweep_modal_frame_motion_guards,
-    },
-    {
-        .name = "subspace",
-        .function = (void (*)(void))mstmm_sweep_modal_subspace,
-        .call = mstmm_sweep_modal_subspace_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_subspace_inputs,
-        .outputs = mstmm_sweep_modal_subspace_outputs,
-        .ir_hash = "172d0f978f177dd484c98b96f4243e8a2ebb3271719ba80c55b4557c1700d692",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "prescribed_bias",
-        .function = (void (*)(void))mstmm_sweep_modal_prescribed_bias,
-        .call = mstmm_sweep_modal_prescribed_bias_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_prescribed_bias_inputs,
-        .outputs = mstmm_sweep_modal_prescribed_bias_outputs,
-        .ir_hash = "2d726b7d582e90b91907be5705c9e080025ce98ce5ef5ca4799d7b065940e99b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "assemble_port",
-        .function = (void (*)(void))mstmm_sweep_modal_assemble_port,
-        .call = mstmm_sweep_modal_assemble_port_call,
-        .n_inputs = 5,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_modal_assemble_port_inputs,
-        .outputs = mstmm_sweep_modal_assemble_port_outputs,
-        .ir_hash = "30002e99838e363b0f3a6f5f25d729994b04daac6099431bcf7e6d73d82234ae",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "rebase",
-        .function = (void (*)(void))mstmm_sweep_modal_rebase,
-        .call = mstmm_sweep_modal_rebase_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_modal_rebase_inputs,
-        .outputs = mstmm_sweep_modal_rebase_outputs,
-        .ir_hash = "c19811da715bcccc9aa4e9b210d1e91837f72ffe85ab5c5cabfd94b1184104ee",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense",
-        .function = (void (*)(void))mstmm_sweep_modal_condense,
-        .call = mstmm_sweep_modal_condense_call,
-        .n_inputs = 5,
-        .n_outputs = 5,
-        .inputs = mstmm_sweep_modal_condense_inputs,
-        .outputs = mstmm_sweep_modal_condense_outputs,
-        .ir_hash = "d26e8ba53446be1f4d87d582a99095780d808d59c1b42498050200be926aff2f",
-        .n_guards = 1,
-        .guards = mstmm_sweep_modal_condense_guards,
-    },
-    {
-        .name = "recover",
-        .function = (void (*)(void))mstmm_sweep_modal_recover,
-        .call = mstmm_sweep_modal_recover_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_recover_inputs,
-        .outputs = mstmm_sweep_modal_recover_outputs,
-        .ir_hash = "48c3eacf6037117ec0d386d2bda9dab1c3af20e451922d1339a2c1a1fb61d0bd",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "port_deviation",
-        .function = (void (*)(void))mstmm_sweep_modal_port_deviation,
-        .call = mstmm_sweep_modal_port_deviation_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_port_deviation_inputs,
-        .outputs = mstmm_sweep_modal_port_deviation_outputs,
-        .ir_hash = "8975587b446f7853c32b6f049b1f22d2e8da01237dbd525d94a4bf46d72745f7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "prescribed_load",
-        .function = (void (*)(void))mstmm_sweep_modal_prescribed_load,
-        .call = mstmm_sweep_modal_prescribed_load_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_modal_prescribed_load_inputs,
-        .outputs = mstmm_sweep_modal_prescribed_load_outputs,
-        .ir_hash = "ab38b6f5add6558728be3715b7970037e68b20ce4b1c0de37d68960a97c10644",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "modal_effort",
-        .function = (void (*)(void))mstmm_sweep_modal_modal_effort,
-        .call = mstmm_sweep_modal_modal_effort_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_modal_effort_inputs,
-        .outputs = mstmm_sweep_modal_modal_effort_outputs,
-        .ir_hash = "9f6b5fecd98714c085fdf44016d61b7b9da4157c6264246f9d132487aeff8425",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_modal_column_load,
-        .call = mstmm_sweep_modal_column_load_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_column_load_inputs,
-        .outputs = mstmm_sweep_modal_column_load_outputs,
-        .ir_hash = "d582b01a6e20069acb3ff9f1ca7776e083d16eb51d4783982b0d6db984e8a0d5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_modal_column_acceleration,
-        .call = mstmm_sweep_modal_column_acceleration_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_modal_column_acceleration_inputs,
-        .outputs = mstmm_sweep_modal_column_acceleration_outputs,
-        .ir_hash = "1a35f072c58a847a005ade89d40201eb6bbcc3ef04960142517165e8091a426a",
-        .n_guards = 1,
-        .guards = mstmm_sweep_modal_column_acceleration_guards,
-    },
-    {
-        .name = "step_stiffness",
-        .function = (void (*)(void))mstmm_sweep_modal_step_stiffness,
-        .call = mstmm_sweep_modal_step_stiffness_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_step_stiffness_inputs,
-        .outputs = mstmm_sweep_modal_step_stiffness_outputs,
-        .ir_hash = "d06cbd29f326f0b422e4f360be1b565134f7271d734a307de49f311cd2183f59",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "strain_load",
-        .function = (void (*)(void))mstmm_sweep_modal_strain_load,
-        .call = mstmm_sweep_modal_strain_load_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_strain_load_inputs,
-        .outputs = mstmm_sweep_modal_strain_load_outputs,
-        .ir_hash = "977ba7f80ebc36a1ea85ea3b33e08cc7577142a75346c94215ac5326c50d9fa9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "modal_column",
-        .function = (void (*)(void))mstmm_sweep_modal_modal_column,
-        .call = mstmm_sweep_modal_modal_column_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_modal_column_inputs,
-        .outputs = mstmm_sweep_modal_modal_column_outputs,
-        .ir_hash = "dee2750b61c474501f8228dc31312dc8f7db9967063ddb29a5b2ffb569ad8ef2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "condense_row",
-        .function = (void (*)(void))mstmm_sweep_modal_condense_row,
-        .call = mstmm_sweep_modal_condense_row_call,
-        .n_inputs = 3,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_modal_condense_row_inputs,
-        .outputs = mstmm_sweep_modal_condense_row_outputs,
-        .ir_hash = "d547d71365f50fb532772d60150f6f97eee78bcdd00b9aaa67785b98df48ffb1",
-        .n_guards = 1,
-        .guards = mstmm_sweep_modal_condense_row_guards,
-    },
-    {
-        .name = "row_coupling",
-        .function = (void (*)(void))mstmm_sweep_modal_row_coupling,
-        .call = mstmm_sweep_modal_row_coupling_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_row_coupling_inputs,
-        .outputs = mstmm_sweep_modal_row_coupling_outputs,
-        .ir_hash = "0ead0db280aa87ebaf0e566f7ae467ac84db22601ea4976a3ee774987ac0a920",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "multiplier_acceleration",
-        .function = (void (*)(void))mstmm_sweep_modal_multiplier_acceleration,
-        .call = mstmm_sweep_modal_multiplier_acceleration_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_multiplier_acceleration_inputs,
-        .outputs = mstmm_sweep_modal_multiplier_acceleration_outputs,
-        .ir_hash = "dc3c964a08a8ef7cf76a93e0431ef641d6d4134104dd69396474c7b5097efd02",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "residual_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_residual_slope,
-        .call = mstmm_sweep_modal_residual_slope_call,
-        .n_inputs = 27,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_modal_residual_slope_inputs,
-        .outputs = mstmm_sweep_modal_residual_slope_outputs,
-        .ir_hash = "0c131d9b7a68d974fee8da2362df36dde24ba35a867555da137c3a3a62d193d2",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "momentum_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_momentum_slope,
-        .call = mstmm_sweep_modal_momentum_slope_call,
-        .n_inputs = 28,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_modal_momentum_slope_inputs,
-        .outputs = mstmm_sweep_modal_momentum_slope_outputs,
-        .ir_hash = "88b0476e6adfd34d6ff7ef40c27fceabc9fddfe162ee90e879a7207f7abf7204",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "section_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_section_slope,
-        .call = mstmm_sweep_modal_section_slope_call,
-        .n_inputs = 14,
-        .n_outputs = 7,
-        .inputs = mstmm_sweep_modal_section_slope_inputs,
-        .outputs = mstmm_sweep_modal_section_slope_outputs,
-        .ir_hash = "b96dc0fb3b278f8d3cf4185c057d86f11a366278dd2b256ffb72eb9340814b9a",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "end_motion_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_end_motion_slope,
-        .call = mstmm_sweep_modal_end_motion_slope_call,
-        .n_inputs = 13,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_end_motion_slope_inputs,
-        .outputs = mstmm_sweep_modal_end_motion_slope_outputs,
-        .ir_hash = "10fccd1d1fc9cae48b9f1dbec3486a614fe9fff13eaa73d80be4c633a52d848c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "frame_motion_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_frame_motion_slope,
-        .call = mstmm_sweep_modal_frame_motion_slope_call,
-        .n_inputs = 13,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_modal_frame_motion_slope_inputs,
-        .outputs = mstmm_sweep_modal_frame_motion_slope_outputs,
-        .ir_hash = "5a89cbe9ec3c3f06397fc39e72827f162aa3174b791bd3cd87c8fef904c6439f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "subspace_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_subspace_slope,
-        .call = mstmm_sweep_modal_subspace_slope_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_subspace_slope_inputs,
-        .outputs = mstmm_sweep_modal_subspace_slope_outputs,
-        .ir_hash = "8afb6bfe44eb412068dd7c892a58366c762508478adf3d49dfafdda8a3c72e94",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "prescribed_bias_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_prescribed_bias_slope,
-        .call = mstmm_sweep_modal_prescribed_bias_slope_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_prescribed_bias_slope_inputs,
-        .outputs = mstmm_sweep_modal_prescribed_bias_slope_outputs,
-        .ir_hash = "c026525651375df7e3fee89ece78633051518219d491a365e9aa102dd1289319",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "prescribed_load_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_prescribed_load_slope,
-        .call = mstmm_sweep_modal_prescribed_load_slope_call,
-        .n_inputs = 5,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_modal_prescribed_load_slope_inputs,
-        .outputs = mstmm_sweep_modal_prescribed_load_slope_outputs,
-        .ir_hash = "2aa45a3f6c8ff818f8686574df419b968d042a0d902811e019f0d55d095908ab",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "modal_effort_slope",
-        .function = (void (*)(void))mstmm_sweep_modal_modal_effort_slope,
-        .call = mstmm_sweep_modal_modal_effort_slope_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_modal_modal_effort_slope_inputs,
-        .outputs = mstmm_sweep_modal_modal_effort_slope_outputs,
-        .ir_hash = "3dbd36778f4d6433ac5e406377ea45247a7b6f77a48279b3085b6fc2572d3b0f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"residual", MSTMM_FUNCTIONS(mstmm_sweep_modal_residual), 22, 6, (const mstmm_port[]){{"p", 10,
+    "", 0, 0}, {"C", 3, "", 0, 1}, {"P", 3, "", 0, 1}, {"B", 6, "", 0, 1}, {"Z_xx", 1, "", 0, 2},
+    {"Z_xy", 1, "", 0, 2}, {"Z_xz", 1, "", 0, 2}, {"Z_yy", 1, "", 0, 2}, {"Z_yz", 1, "", 0, 2},
+    {"Z_zz", 1, "", 0, 2}, {"Y_x", 1, "", 0, 2}, {"Y_y", 1, "", 0, 2}, {"Y_z", 1, "", 0, 2}, {"G_x",
+    1, "", 0, 2}, {"G_y", 1, "", 0, 2}, {"G_z", 1, "", 0, 2}, {"M", 1, "", 0, 2}, {"K", 1, "", 0,
+    2}, {"D", 1, "", 0, 2}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1}, {"motion", 9, "", 0, 0}},
+    (const mstmm_port[]){{"S", 21, "", 0, 0}, {"S_rf", 6, "", 0, 1}, {"A", 6, "", 0, 1}, {"S_ff", 1,
+    "", 0, 2}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 1}},
+    "aea4b02a4691a1608bf36e3e2cf8ba707114cddb8eda0b59b03c22ec5e0a4555", 0, NULL},
+  {"momentum", MSTMM_FUNCTIONS(mstmm_sweep_modal_momentum), 21, 6, (const mstmm_port[]){{"p", 10,
+    "", 0, 0}, {"C", 3, "", 0, 1}, {"P", 3, "", 0, 1}, {"B", 6, "", 0, 1}, {"Z_xx", 1, "", 0, 2},
+    {"Z_xy", 1, "", 0, 2}, {"Z_xz", 1, "", 0, 2}, {"Z_yy", 1, "", 0, 2}, {"Z_yz", 1, "", 0, 2},
+    {"Z_zz", 1, "", 0, 2}, {"Y_x", 1, "", 0, 2}, {"Y_y", 1, "", 0, 2}, {"Y_z", 1, "", 0, 2}, {"G_x",
+    1, "", 0, 2}, {"G_y", 1, "", 0, 2}, {"G_z", 1, "", 0, 2}, {"M", 1, "", 0, 2}, {"eta", 1, "", 0,
+    1}, {"etad", 1, "", 0, 1}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}}, (const
+    mstmm_port[]){{"S", 21, "", 0, 0}, {"S_rf", 6, "", 0, 1}, {"A", 6, "", 0, 1}, {"h", 6,
+    "N*s, N*m*s", 0, 0}, {"h_f", 1, "", 0, 1}, {"T", 1, "J", 0, 0}},
+    "2f5c07e4b75b84642811d530450780866482ab4fd0d7b8f1fff1dea7bff9cda5", 0, NULL},
+  {"strain_energy", MSTMM_FUNCTIONS(mstmm_sweep_modal_strain_energy), 4, 2, (const
+    mstmm_port[]){{"K", 1, "", 0, 2}, {"D", 1, "", 0, 2}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0,
+    1}}, (const mstmm_port[]){{"V", 1, "J", 0, 0}, {"W_d", 1, "W", 0, 0}},
+    "d6f1803906e64ca78e3b3b461190059af6845f72d83c7246324e0e8f2885eedf", 0, NULL},
+  {"section", MSTMM_FUNCTIONS(mstmm_sweep_modal_section), 11, 7, (const mstmm_port[]){{"r", 3, "m",
+    0, 0}, {"phi", 3, "", 0, 1}, {"theta", 3, "", 0, 1}, {"g_x", 1, "", 0, 2}, {"g_y", 1, "", 0, 2},
+    {"g_z", 1, "", 0, 2}, {"h_x", 1, "", 0, 2}, {"h_y", 1, "", 0, 2}, {"h_z", 1, "", 0, 2}, {"eta",
+    1, "", 0, 1}, {"etad", 1, "", 0, 1}}, (const mstmm_port[]){{"Phi", 6, "", 0, 1}, {"x", 3, "m",
+    0, 0}, {"Psi", 3, "rad", 0, 0}, {"xd", 3, "m/s", 0, 0}, {"Psid", 3, "rad/s", 0, 0}, {"xdd", 3,
+    "m/s2", 0, 0}, {"Psidd", 3, "rad/s2", 0, 0}},
+    "f036c66d8af684b7e2c9988390fd18d9f1dac15a4f8a0790191dfee732aeab6e", 0, NULL},
+  {"end_motion", MSTMM_FUNCTIONS(mstmm_sweep_modal_end_motion), 7, 6, (const mstmm_port[]){{"R_end",
+    9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"Psi", 3, "rad", 0, 0}, {"xd", 3, "m/s", 0, 0}, {"Psid", 3,
+    "rad/s", 0, 0}, {"xdd", 3, "m/s2", 0, 0}, {"Psidd", 3, "rad/s2", 0, 0}}, (const
+    mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H6", 36, "", 0, 0}, {"v", 3, "m/s", 0,
+    0}, {"w", 3, "rad/s", 0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}},
+    "24c462aa6af8661019193c07ff33af21a3971364cf40080cf0c8f14010856157", 1, (const mstmm_guard[]){{1,
+    "a section rotates by more than 3/2 rad relative to its floating frame"}}},
+  {"frame_motion", MSTMM_FUNCTIONS(mstmm_sweep_modal_frame_motion), 7, 6, (const
+    mstmm_port[]){{"R_end", 9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"Psi", 3, "rad", 0, 0}, {"xd", 3,
+    "m/s", 0, 0}, {"Psid", 3, "rad/s", 0, 0}, {"xdd", 3, "m/s2", 0, 0}, {"Psidd", 3, "rad/s2", 0,
+    0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H6", 36, "", 0, 0}, {"v",
+    3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}},
+    "1a9365dcba5402f0b29574ff039e0d20b23f653b753f4765d9e3e8f2a028d34d", 1, (const mstmm_guard[]){{1,
+    "a section rotates by more than 3/2 rad relative to its floating frame"}}},
+  {"subspace", MSTMM_FUNCTIONS(mstmm_sweep_modal_subspace), 2, 1, (const mstmm_port[]){{"H6", 36,
+    "", 0, 0}, {"Phi", 6, "", 0, 1}}, (const mstmm_port[]){{"H", 6, "", 0, 1}},
+    "c60dc44f72bd50f346ca5e436cca19b5c99854330b7478aefcc0650a69cf0ca5", 0, NULL},
+  {"prescribed_bias", MSTMM_FUNCTIONS(mstmm_sweep_modal_prescribed_bias), 3, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 1}, {"s", 1, "", 0, 1}, {"c", 6, "m/s2, rad/s2", 0, 0}}, (const
+    mstmm_port[]){{"c_s", 6, "", 0, 0}},
+    "94dc6a100a5d87becc51945b1164b4d02e7511735e02a0729860e5c00a049d89", 0, NULL},
+  {"assemble_port", MSTMM_FUNCTIONS(mstmm_sweep_modal_assemble_port), 5, 4, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 1}, {"S", 21, "", 0, 0},
+    {"e", 6, "N, N*m", 0, 0}}, (const mstmm_port[]){{"U", 6, "", 0, 1}, {"S_rf", 6, "", 1, 1},
+    {"S_ff", 1, "", 1, 2}, {"e_f", 1, "", 1, 1}},
+    "849d9b1febcba7aca00fbebdf2528a7df2436736f25b2919f61a89c19e160881", 0, NULL},
+  {"rebase", MSTMM_FUNCTIONS(mstmm_sweep_modal_rebase), 4, 3, (const mstmm_port[]){{"H", 6, "", 0,
+    1}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"S_rf", 6, "", 0, 1}}, (const
+    mstmm_port[]){{"S_rf_I", 6, "", 0, 1}, {"S_ff", 1, "", 1, 2}, {"e_f", 1, "", 1, 1}},
+    "53f63cb74d2d4b48ca967f1ea24dbe7b242df2424cc48086a7656cbaa1382aad", 0, NULL},
+  {"condense", MSTMM_FUNCTIONS(mstmm_sweep_modal_condense), 5, 5, (const mstmm_port[]){{"S", 21, "",
+    0, 0}, {"e", 6, "N, N*m", 0, 0}, {"S_rf", 6, "", 0, 1}, {"S_ff", 1, "", 0, 2}, {"e_f", 1, "", 0,
+    1}}, (const mstmm_port[]){{"right", 7, "", 0, 1}, {"Gg", 7, "", 0, 1}, {"S_c", 21, "", 0, 0},
+    {"e_c", 6, "N, N*m", 0, 0}, {"work", 1, "", 0, 2}},
+    "feb3a69169125bfc2ed93474b3d5a73b0504c7fcdcf8c7fedcb21030c41da089", 1, (const mstmm_guard[]){{1,
+    "a pivot of S_ff vanishes: a motion of the modes is undetermined"}}},
+  {"recover", MSTMM_FUNCTIONS(mstmm_sweep_modal_recover), 2, 1, (const mstmm_port[]){{"Gg", 7, "",
+    0, 1}, {"delta_I", 6, "", 0, 0}}, (const mstmm_port[]){{"etadd", 1, "", 0, 1}},
+    "38cf3428141b26f21c69a62b1a109c8725489f45d6c1541ff6d8fef451a8edbf", 0, NULL},
+  {"port_deviation", MSTMM_FUNCTIONS(mstmm_sweep_modal_port_deviation), 3, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 1}, {"etadd", 1, "", 0, 1}, {"delta_I", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"delta", 6, "", 0, 0}},
+    "d8a233afb4817afc530c49b276342299b990159fd384a755fcea3d92132ff1bc", 0, NULL},
+  {"prescribed_load", MSTMM_FUNCTIONS(mstmm_sweep_modal_prescribed_load), 3, 2, (const
+    mstmm_port[]){{"S_rf", 6, "", 0, 1}, {"S_ff", 1, "", 0, 2}, {"s", 1, "", 0, 1}}, (const
+    mstmm_port[]){{"e", 6, "N, N*m", 1, 0}, {"e_f", 1, "", 1, 1}},
+    "fcf1c4d4fdaefe7e2fe7357c7c07af213453e04a19ecc16677f4347476928123", 0, NULL},
+  {"modal_effort", MSTMM_FUNCTIONS(mstmm_sweep_modal_modal_effort), 3, 1, (const mstmm_port[]){{"H",
+    6, "", 0, 1}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 1}}, (const mstmm_port[]){{"tau", 1,
+    "", 0, 1}}, "27ec8ed3004d46d61109410ff6e0840af443fddcf24cd8616623cace6450521e", 0, NULL},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_modal_column_load), 3, 1, (const mstmm_port[]){{"Gg",
+    7, "", 0, 1}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 1}}, (const mstmm_port[]){{"e_c", 6,
+    "N, N*m", 0, 0}}, "6c279a00c19a529f7b91a0bcc2f38364f8291cfcb272be48b267861441b7d05b", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_modal_column_acceleration), 4, 3, (const
+    mstmm_port[]){{"S_ff", 1, "", 0, 2}, {"e_f", 1, "", 0, 1}, {"Gg", 7, "", 0, 1}, {"delta_I", 6,
+    "", 0, 0}}, (const mstmm_port[]){{"y", 1, "", 0, 1}, {"etadd", 1, "", 0, 1}, {"work", 1, "", 0,
+    2}}, "b7cf8e3d4580837b2d0461954910f55e8bb46fd97fdc51517acdd78d8d7e0106", 1, (const
+    mstmm_guard[]){{1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"}}},
+  {"step_stiffness", MSTMM_FUNCTIONS(mstmm_sweep_modal_step_stiffness), 4, 1, (const
+    mstmm_port[]){{"K", 1, "", 0, 2}, {"D", 1, "", 0, 2}, {"rate", 1, "s", 0, 0}, {"sq", 1, "1/s2",
+    0, 0}}, (const mstmm_port[]){{"S_ff", 1, "", 1, 2}},
+    "d87a68cf85c48a1a794343a538846e911fa62dce1db71e37aa442e40e97d68f7", 0, NULL},
+  {"strain_load", MSTMM_FUNCTIONS(mstmm_sweep_modal_strain_load), 4, 1, (const mstmm_port[]){{"K",
+    1, "", 0, 2}, {"D", 1, "", 0, 2}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1}}, (const
+    mstmm_port[]){{"e_f", 1, "", 1, 1}},
+    "c2b4eae9b005303e4ef2bd566ceb9f2b3543f19d16fd5082624f5847e40e5043", 0, NULL},
+  {"modal_column", MSTMM_FUNCTIONS(mstmm_sweep_modal_modal_column), 2, 1, (const mstmm_port[]){{"H",
+    6, "", 0, 1}, {"K", 6, "", 0, 0}}, (const mstmm_port[]){{"K_f", 1, "", 1, 1}},
+    "8e75b7b26f9285f72fb350ea4c3b522ec03d08e1cf1431cb56953ab4b0057bad", 0, NULL},
+  {"condense_row", MSTMM_FUNCTIONS(mstmm_sweep_modal_condense_row), 3, 4, (const
+    mstmm_port[]){{"S_ff", 1, "", 0, 2}, {"K_f", 1, "", 0, 1}, {"Gg", 7, "", 0, 1}}, (const
+    mstmm_port[]){{"Y", 1, "", 0, 1}, {"K", 6, "", 1, 0}, {"l", 1, "", 1, 0}, {"work", 1, "", 0,
+    2}}, "4f3c615e314d6562d114f00058d0a4e28be6e16b8e2c658422818ad4fec8771d", 1, (const
+    mstmm_guard[]){{1, "a pivot of S_ff vanishes: a motion of the modes is undetermined"}}},
+  {"row_coupling", MSTMM_FUNCTIONS(mstmm_sweep_modal_row_coupling), 2, 1, (const
+    mstmm_port[]){{"K_f", 1, "", 0, 1}, {"Y", 1, "", 0, 1}}, (const mstmm_port[]){{"L_ij", 1, "", 1,
+    0}}, "12a32c006c94de665495b3a4b039b4c27183b001e42750acb7c7ac50a5938018", 0, NULL},
+  {"multiplier_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_modal_multiplier_acceleration), 2, 1,
+    (const mstmm_port[]){{"Y", 1, "", 0, 1}, {"x", 1, "", 0, 0}}, (const mstmm_port[]){{"etadd", 1,
+    "", 1, 1}}, "9353ac76e3c9bc5b9a05add3322a6e302349bf8a80dc141a98d898c64959cad4", 0, NULL},
+  {"residual_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_residual_slope), 27, 4, (const
+    mstmm_port[]){{"p", 10, "", 0, 0}, {"C", 3, "", 0, 1}, {"P", 3, "", 0, 1}, {"B", 6, "", 0, 1},
+    {"Z_xx", 1, "", 0, 2}, {"Z_xy", 1, "", 0, 2}, {"Z_xz", 1, "", 0, 2}, {"Z_yy", 1, "", 0, 2},
+    {"Z_yz", 1, "", 0, 2}, {"Z_zz", 1, "", 0, 2}, {"Y_x", 1, "", 0, 2}, {"Y_y", 1, "", 0, 2},
+    {"Y_z", 1, "", 0, 2}, {"G_x", 1, "", 0, 2}, {"G_y", 1, "", 0, 2}, {"G_z", 1, "", 0, 2}, {"M", 1,
+    "", 0, 2}, {"K", 1, "", 0, 2}, {"D", 1, "", 0, 2}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1},
+    {"motion", 9, "", 0, 0}, {"S_rf", 6, "", 0, 1}, {"A", 6, "", 0, 1}, {"d_eta", 1, "", 0, 1},
+    {"d_etad", 1, "", 0, 1}, {"d_motion", 9, "", 0, 0}}, (const mstmm_port[]){{"d_S_rf", 6, "", 0,
+    1}, {"d_A", 6, "", 0, 1}, {"d_e", 6, "N, N*m", 0, 0}, {"d_e_f", 1, "", 0, 1}},
+    "2b0ad06bf77880e7653773aa40ab1d497c7c5878a3807b34e3ab8dde1988fbb9", 0, NULL},
+  {"momentum_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_momentum_slope), 28, 4, (const
+    mstmm_port[]){{"p", 10, "", 0, 0}, {"C", 3, "", 0, 1}, {"P", 3, "", 0, 1}, {"B", 6, "", 0, 1},
+    {"Z_xx", 1, "", 0, 2}, {"Z_xy", 1, "", 0, 2}, {"Z_xz", 1, "", 0, 2}, {"Z_yy", 1, "", 0, 2},
+    {"Z_yz", 1, "", 0, 2}, {"Z_zz", 1, "", 0, 2}, {"Y_x", 1, "", 0, 2}, {"Y_y", 1, "", 0, 2},
+    {"Y_z", 1, "", 0, 2}, {"G_x", 1, "", 0, 2}, {"G_y", 1, "", 0, 2}, {"G_z", 1, "", 0, 2}, {"M", 1,
+    "", 0, 2}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1}, {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s",
+    0, 0}, {"S_rf", 6, "", 0, 1}, {"A", 6, "", 0, 1}, {"h_f", 1, "", 0, 1}, {"d_eta", 1, "", 0, 1},
+    {"d_etad", 1, "", 0, 1}, {"d_v", 3, "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}}, (const
+    mstmm_port[]){{"d_S_rf", 6, "", 0, 1}, {"d_A", 6, "", 0, 1}, {"d_h", 6, "N*s, N*m*s", 0, 0},
+    {"d_h_f", 1, "", 0, 1}}, "fc4a1f34dd7055aa09cbb1ae5e47c0593495336f75f45fa223abb6f143acc86d", 0,
+    NULL},
+  {"section_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_section_slope), 14, 7, (const
+    mstmm_port[]){{"r", 3, "m", 0, 0}, {"phi", 3, "", 0, 1}, {"theta", 3, "", 0, 1}, {"g_x", 1, "",
+    0, 2}, {"g_y", 1, "", 0, 2}, {"g_z", 1, "", 0, 2}, {"h_x", 1, "", 0, 2}, {"h_y", 1, "", 0, 2},
+    {"h_z", 1, "", 0, 2}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1}, {"Phi", 6, "", 0, 1},
+    {"d_eta", 1, "", 0, 1}, {"d_etad", 1, "", 0, 1}}, (const mstmm_port[]){{"d_Phi", 6, "", 0, 1},
+    {"d_x", 3, "m", 0, 0}, {"d_Psi", 3, "rad", 0, 0}, {"d_xd", 3, "m/s", 0, 0}, {"d_Psid", 3,
+    "rad/s", 0, 0}, {"d_xdd", 3, "m/s2", 0, 0}, {"d_Psidd", 3, "rad/s2", 0, 0}},
+    "67dde0f18eef543d5dd987fbe7144b14918a77c71b31a9c54bb8493f034a2d38", 0, NULL},
+  {"end_motion_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_end_motion_slope), 13, 6, (const
+    mstmm_port[]){{"R_end", 9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"Psi", 3, "rad", 0, 0}, {"xd", 3,
+    "m/s", 0, 0}, {"Psid", 3, "rad/s", 0, 0}, {"xdd", 3, "m/s2", 0, 0}, {"Psidd", 3, "rad/s2", 0,
+    0}, {"d_x", 3, "m", 0, 0}, {"d_Psi", 3, "rad", 0, 0}, {"d_xd", 3, "m/s", 0, 0}, {"d_Psid", 3,
+    "rad/s", 0, 0}, {"d_xdd", 3, "m/s2", 0, 0}, {"d_Psidd", 3, "rad/s2", 0, 0}}, (const
+    mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H6", 36, "", 0, 0}, {"d_v", 3,
+    "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}},
+    "3397e64645d8f454d5c2eb573bfe24674ce2914d0ea3e77534a1b09c1d44ac90", 0, NULL},
+  {"frame_motion_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_frame_motion_slope), 13, 6, (const
+    mstmm_port[]){{"R_end", 9, "", 0, 0}, {"x", 3, "m", 0, 0}, {"Psi", 3, "rad", 0, 0}, {"xd", 3,
+    "m/s", 0, 0}, {"Psid", 3, "rad/s", 0, 0}, {"xdd", 3, "m/s2", 0, 0}, {"Psidd", 3, "rad/s2", 0,
+    0}, {"d_x", 3, "m", 0, 0}, {"d_Psi", 3, "rad", 0, 0}, {"d_xd", 3, "m/s", 0, 0}, {"d_Psid", 3,
+    "rad/s", 0, 0}, {"d_xdd", 3, "m/s2", 0, 0}, {"d_Psidd", 3, "rad/s2", 0, 0}}, (const
+    mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H6", 36, "", 0, 0}, {"d_v", 3,
+    "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}},
+    "03fcefdd4b3fd4857435baf2ea7f4cb939e7014116c6165462e063c71acfd6b3", 0, NULL},
+  {"subspace_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_subspace_slope), 4, 1, (const
+    mstmm_port[]){{"H6", 36, "", 0, 0}, {"Phi", 6, "", 0, 1}, {"d_H6", 36, "", 0, 0}, {"d_Phi", 6,
+    "", 0, 1}}, (const mstmm_port[]){{"d_H", 6, "", 0, 1}},
+    "70d6af5964d027cb07a95f2caeb99133acb1338464425b10924bc81a12b0b3a8", 0, NULL},
+  {"prescribed_bias_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_prescribed_bias_slope), 6, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 1}, {"s", 1, "", 0, 1}, {"c", 6, "m/s2, rad/s2", 0, 0}, {"d_H", 6,
+    "", 0, 1}, {"d_s", 1, "", 0, 1}, {"d_c", 6, "m/s2, rad/s2", 0, 0}}, (const
+    mstmm_port[]){{"d_c_s", 6, "", 0, 0}},
+    "4f5e9df6ae0f87e8bd8207506ed5f894d723f4dacb5ae68d73711e56ed4c4275", 0, NULL},
+  {"prescribed_load_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_prescribed_load_slope), 5, 2, (const
+    mstmm_port[]){{"S_rf", 6, "", 0, 1}, {"S_ff", 1, "", 0, 2}, {"s", 1, "", 0, 1}, {"d_S_rf", 6,
+    "", 0, 1}, {"d_s", 1, "", 0, 1}}, (const mstmm_port[]){{"d_e", 6, "N, N*m", 1, 0}, {"d_e_f", 1,
+    "", 1, 1}}, "7e6315f86eb2c42d9cf00a19c10f3fcb7bd45669136be749e8eae84b89106f03", 0, NULL},
+  {"modal_effort_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_modal_effort_slope), 6, 1, (const
+    mstmm_port[]){{"H", 6, "", 0, 1}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 1}, {"d_H", 6, "",
+    0, 1}, {"d_e", 6, "N, N*m", 0, 0}, {"d_e_f", 1, "", 0, 1}}, (const mstmm_port[]){{"d_tau", 1,
+    "", 0, 1}}, "7f5a9b62c4bb9ef6641e6852ba65c150d1c3db86d1374138722930e7a67410ca", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "c39d4466944b17d9a62288ab36b747e55d24d4043ce1835763dc8d737af3e8b1",
+    .hash = "b79e951dda22bb7cf4c29c70cfa48e575f3d638b1ba6a34425cadef826a71ae6",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -7,71 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_planar_pin;
-int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict Rc, real *restrict motion, real *restrict qdot);
-int mstmm_sweep_planar_pin_inertia(const real *restrict p, real *restrict S);
-int mstmm_sweep_planar_pin_bias_load(const real *restrict p, const real *restrict motion,
-    real *restrict e);
-int mstmm_sweep_planar_pin_pose(const real *restrict A_I, const real *restrict x_I,
-    const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x);
-int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restrict r,
-    const real *restrict v_I, const real *restrict w_I, real *restrict v);
-int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
-    const real *restrict v, const real *restrict motion, const real *restrict offset,
-    real *restrict x_K, real *restrict v_K);
-int mstmm_sweep_planar_pin_angular_motion(const real *restrict A, const real *restrict motion,
-    real *restrict w_K);
-int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
-    real *restrict A_end);
-int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *restrict A_F,
-    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e);
-int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
-    real *restrict G, real *restrict S_I);
-int mstmm_sweep_planar_pin_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
-    real *restrict e_I);
-int mstmm_sweep_planar_pin_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta);
-int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z);
-int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
-    real *restrict L_ij);
-int mstmm_sweep_planar_pin_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l);
-int mstmm_sweep_planar_pin_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0);
-int mstmm_sweep_planar_pin_ground_column_load(const real *restrict e, const real *restrict tau,
-    real *restrict y);
-int mstmm_sweep_planar_pin_relative_pose(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
-    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
-    real *restrict d);
-int mstmm_sweep_planar_pin_slip(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
-    const real *restrict v_B, const real *restrict w_B, real *restrict slip);
-int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
-    const real *restrict motion_B, real *restrict drift);
-int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
-    real *restrict J_B);
-int mstmm_sweep_planar_pin_known_parts(const real *restrict W, const real *restrict relative,
-    real *restrict l);
-int mstmm_sweep_planar_pin_row_acceleration(const real *restrict J_A, const real *restrict J_B,
-    const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
-    real *restrict c);
-int mstmm_sweep_planar_pin_apply_effort(const real *restrict J, const real *restrict tau,
-    real *restrict e);
-int mstmm_sweep_planar_pin_eliminate_row(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, real *restrict S, real *restrict e);
-int mstmm_sweep_planar_pin_update_column(const real *restrict inverse, const real *restrict K,
-    const real *restrict L_p, real *restrict K_p);
-int mstmm_sweep_planar_pin_multiplier_of_motion(const real *restrict inverse,
-    const real *restrict K, const real *restrict delta, real *restrict x);
-
 /* bias motion outboard of the pin hinge, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -85,96 +20,47 @@ int mstmm_sweep_planar_pin_multiplier_of_motion(const real *restrict inverse,
  * out motion[4] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[1] coordinate rates
  */
-int mstmm_sweep_planar_pin_forward(const real *restrict Rt, const real *restrict ro,
-    const real *restrict p, const real *restrict q, const real *restrict u,
-    const real *restrict motion_I, real *restrict Rc, real *restrict motion, real *restrict qdot)
+int mstmm_sweep_planar_pin_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t motion_I,
+    out_t Rc, out_t motion, out_t qdot)
 {
-    (void)p;
-    const real t0 = cos(q[0]);
-    const real t1 = Rt[0] * t0;
-    const real t2 = sin(q[0]);
-    const real t3 = Rt[1] * t2;
-    const real t4 = t1 - t3;
-    Rc[0] = t4;
-    const real t5 = Rt[1] * t0;
-    const real t6 = Rt[0] * t2;
-    const real t7 = t5 + t6;
-    Rc[1] = t7;
-    const real t8 = u[0] + motion_I[0];
-    motion[0] = t8;
-    motion[1] = motion_I[1];
-    const real t9 = ro[1] * motion_I[1];
-    const real t10 = motion_I[0] * motion_I[0];
-    const real t11 = ro[0] * t10;
-    const real t12 = t9 + t11;
-    const real t13 = motion_I[2] - t12;
-    const real t14 = t4 * t13;
-    const real t15 = ro[0] * motion_I[1];
-    const real t16 = ro[1] * t10;
-    const real t17 = t15 - t16;
-    const real t18 = motion_I[3] + t17;
-    const real t19 = t7 * t18;
-    const real t20 = t14 + t19;
-    motion[2] = t20;
-    const real t21 = t4 * t18;
-    const real t22 = t7 * t13;
-    const real t23 = t21 - t22;
-    motion[3] = t23;
-    qdot[0] = u[0];
-    return 0;
+  (void)p;
+  real t0 = cos(q[0]);
+  real t2 = sin(q[0]);
+  real t4 = Rt[0] * t0 - Rt[1] * t2;
+  Rc[0] = t4;
+  real t7 = Rt[1] * t0 + Rt[0] * t2;
+  Rc[1] = t7;
+  motion[0] = u[0] + motion_I[0];
+  motion[1] = motion_I[1];
+  real t10 = motion_I[0] * motion_I[0];
+  real t13 = motion_I[2] - (ro[1] * motion_I[1] + ro[0] * t10);
+  real t18 = motion_I[3] + (ro[0] * motion_I[1] - ro[1] * t10);
+  motion[2] = t4 * t13 + t7 * t18;
+  motion[3] = t4 * t18 - t7 * t13;
+  qdot[0] = u[0];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_forward_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_forward(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_forward_inputs[] = {
-    {"Rt", 2, "", 0, 0},
-    {"ro", 2, "m", 0, 0},
-    {"p", 0, "", 0, 0},
-    {"q", 1, "", 0, 0},
-    {"u", 1, "", 0, 0},
-    {"motion_I", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_forward_outputs[] = {
-    {"Rc", 2, "", 0, 0},
-    {"motion", 4, "", 0, 0},
-    {"qdot", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_forward, (in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1], out[2]))
 
 /* mass matrix of the rigid body, in a plane
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
  * in  p[4] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * out S[6] f = S a + e of everything outboard, at P
  */
-int mstmm_sweep_planar_pin_inertia(const real *restrict p, real *restrict S)
+int mstmm_sweep_planar_pin_inertia(in_t p, out_t S)
 {
-    S[0] = p[0];
-    S[1] = 0.0;
-    const real t0 = -p[2];
-    S[2] = t0;
-    S[3] = p[0];
-    S[4] = p[1];
-    S[5] = p[3];
-    return 0;
+  S[0] = p[0];
+  S[1] = 0.0;
+  S[2] = -p[2];
+  S[3] = p[0];
+  S[4] = p[1];
+  S[5] = p[3];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_inertia_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_inertia(in[0], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_inertia_inputs[] = {
-    {"p", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_inertia_outputs[] = {
-    {"S", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_inertia, (in[0], out[0]))
 
 /* load required by the bias motion of the rigid body, in a plane
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.25)
@@ -182,45 +68,16 @@ static const mstmm_port mstmm_sweep_planar_pin_inertia_outputs[] = {
  * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
  * out e[3] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_sweep_planar_pin_bias_load(const real *restrict p, const real *restrict motion,
-    real *restrict e)
+int mstmm_sweep_planar_pin_bias_load(in_t p, in_t motion, out_t e)
 {
-    const real t0 = p[0] * motion[2];
-    const real t1 = p[2] * motion[1];
-    const real t2 = motion[0] * motion[0];
-    const real t3 = p[1] * t2;
-    const real t4 = t1 + t3;
-    const real t5 = t0 - t4;
-    e[0] = t5;
-    const real t6 = p[0] * motion[3];
-    const real t7 = p[1] * motion[1];
-    const real t8 = p[2] * t2;
-    const real t9 = t7 - t8;
-    const real t10 = t6 + t9;
-    e[1] = t10;
-    const real t11 = p[1] * motion[3];
-    const real t12 = p[3] * motion[1];
-    const real t13 = p[2] * motion[2];
-    const real t14 = t12 - t13;
-    const real t15 = t11 + t14;
-    e[2] = t15;
-    return 0;
+  real t2 = motion[0] * motion[0];
+  e[0] = p[0] * motion[2] - (p[2] * motion[1] + p[1] * t2);
+  e[1] = p[0] * motion[3] + (p[1] * motion[1] - p[2] * t2);
+  e[2] = p[1] * motion[3] + (p[3] * motion[1] - p[2] * motion[2]);
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_bias_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_bias_load(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_bias_load_inputs[] = {
-    {"p", 4, "", 0, 0},
-    {"motion", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_bias_load_outputs[] = {
-    {"e", 3, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_bias_load, (in[0], in[1], out[0]))
 
 /* pose of a body, in a plane
  * in  A_I[2] rotation, parent axes to inertial axes
@@ -230,49 +87,17 @@ static const mstmm_port mstmm_sweep_planar_pin_bias_load_outputs[] = {
  * out A[2] rotation, body axes to inertial axes
  * out x[3] (m) P of the body, inertial axes
  */
-int mstmm_sweep_planar_pin_pose(const real *restrict A_I, const real *restrict x_I,
-    const real *restrict Rc, const real *restrict r, real *restrict A, real *restrict x)
+int mstmm_sweep_planar_pin_pose(in_t A_I, in_t x_I, in_t Rc, in_t r, out_t A, out_t x)
 {
-    const real t0 = A_I[0] * Rc[0];
-    const real t1 = A_I[1] * Rc[1];
-    const real t2 = t0 - t1;
-    A[0] = t2;
-    const real t3 = A_I[0] * Rc[1];
-    const real t4 = A_I[1] * Rc[0];
-    const real t5 = t3 + t4;
-    A[1] = t5;
-    const real t6 = A_I[0] * r[0];
-    const real t7 = A_I[1] * r[1];
-    const real t8 = t6 - t7;
-    const real t9 = x_I[0] + t8;
-    x[0] = t9;
-    const real t10 = A_I[1] * r[0];
-    const real t11 = A_I[0] * r[1];
-    const real t12 = t10 + t11;
-    const real t13 = x_I[1] + t12;
-    x[1] = t13;
-    const real t14 = x_I[2] + r[2];
-    x[2] = t14;
-    return 0;
+  A[0] = A_I[0] * Rc[0] - A_I[1] * Rc[1];
+  A[1] = A_I[0] * Rc[1] + A_I[1] * Rc[0];
+  x[0] = x_I[0] + (A_I[0] * r[0] - A_I[1] * r[1]);
+  x[1] = x_I[1] + (A_I[1] * r[0] + A_I[0] * r[1]);
+  x[2] = x_I[2] + r[2];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_pose_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_pose(in[0], in[1], in[2], in[3], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_pose_inputs[] = {
-    {"A_I", 2, "", 0, 0},
-    {"x_I", 3, "m", 0, 0},
-    {"Rc", 2, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_pose_outputs[] = {
-    {"A", 2, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_pose, (in[0], in[1], in[2], in[3], out[0], out[1]))
 
 /* velocity of a body's input end, in a plane
  * in  Rc[2] rotation, body axes to parent axes
@@ -281,40 +106,16 @@ static const mstmm_port mstmm_sweep_planar_pin_pose_outputs[] = {
  * in  w_I[1] (rad/s) angular velocity of the parent, parent axes
  * out v[2] (m/s) velocity of P, body axes
  */
-int mstmm_sweep_planar_pin_velocity(const real *restrict Rc, const real *restrict r,
-    const real *restrict v_I, const real *restrict w_I, real *restrict v)
+int mstmm_sweep_planar_pin_velocity(in_t Rc, in_t r, in_t v_I, in_t w_I, out_t v)
 {
-    const real t0 = r[1] * w_I[0];
-    const real t1 = v_I[0] - t0;
-    const real t2 = Rc[0] * t1;
-    const real t3 = r[0] * w_I[0];
-    const real t4 = v_I[1] + t3;
-    const real t5 = Rc[1] * t4;
-    const real t6 = t2 + t5;
-    v[0] = t6;
-    const real t7 = Rc[0] * t4;
-    const real t8 = Rc[1] * t1;
-    const real t9 = t7 - t8;
-    v[1] = t9;
-    return 0;
+  real t1 = v_I[0] - r[1] * w_I[0];
+  real t4 = v_I[1] + r[0] * w_I[0];
+  v[0] = Rc[0] * t1 + Rc[1] * t4;
+  v[1] = Rc[0] * t4 - Rc[1] * t1;
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_velocity_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_velocity(in[0], in[1], in[2], in[3], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_velocity_inputs[] = {
-    {"Rc", 2, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"v_I", 2, "m/s", 0, 0},
-    {"w_I", 1, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_velocity_outputs[] = {
-    {"v", 2, "m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_velocity, (in[0], in[1], in[2], in[3], out[0]))
 
 /* motion of a point of a body, in a plane
  * in  A[2] rotation, body axes to inertial axes
@@ -325,139 +126,57 @@ static const mstmm_port mstmm_sweep_planar_pin_velocity_outputs[] = {
  * out x_K[3] (m) position, inertial axes
  * out v_K[3] (m/s) velocity, inertial axes
  */
-int mstmm_sweep_planar_pin_point(const real *restrict A, const real *restrict x,
-    const real *restrict v, const real *restrict motion, const real *restrict offset,
-    real *restrict x_K, real *restrict v_K)
+int mstmm_sweep_planar_pin_point(in_t A, in_t x, in_t v, in_t motion, in_t offset, out_t x_K,
+    out_t v_K)
 {
-    const real t0 = A[0] * offset[0];
-    const real t1 = A[1] * offset[1];
-    const real t2 = t0 - t1;
-    const real t3 = x[0] + t2;
-    x_K[0] = t3;
-    const real t4 = A[1] * offset[0];
-    const real t5 = A[0] * offset[1];
-    const real t6 = t4 + t5;
-    const real t7 = x[1] + t6;
-    x_K[1] = t7;
-    const real t8 = x[2] + offset[2];
-    x_K[2] = t8;
-    const real t9 = motion[0] * offset[1];
-    const real t10 = v[0] - t9;
-    const real t11 = A[0] * t10;
-    const real t12 = motion[0] * offset[0];
-    const real t13 = v[1] + t12;
-    const real t14 = A[1] * t13;
-    const real t15 = t11 - t14;
-    v_K[0] = t15;
-    const real t16 = A[1] * t10;
-    const real t17 = A[0] * t13;
-    const real t18 = t16 + t17;
-    v_K[1] = t18;
-    v_K[2] = 0.0;
-    return 0;
+  x_K[0] = x[0] + (A[0] * offset[0] - A[1] * offset[1]);
+  x_K[1] = x[1] + (A[1] * offset[0] + A[0] * offset[1]);
+  x_K[2] = x[2] + offset[2];
+  real t10 = v[0] - motion[0] * offset[1];
+  real t13 = v[1] + motion[0] * offset[0];
+  v_K[0] = A[0] * t10 - A[1] * t13;
+  v_K[1] = A[1] * t10 + A[0] * t13;
+  v_K[2] = 0.0;
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_point_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_point(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_point_inputs[] = {
-    {"A", 2, "", 0, 0},
-    {"x", 3, "m", 0, 0},
-    {"v", 2, "m/s", 0, 0},
-    {"motion", 4, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_point_outputs[] = {
-    {"x_K", 3, "m", 0, 0},
-    {"v_K", 3, "m/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_point, (in[0], in[1], in[2], in[3], in[4], out[0], out[1]))
 
 /* rotation of a body, in a plane
  * in  A[2] rotation, body axes to inertial axes
  * in  motion[4] bias motion of the body: w, wd, rdd of its P, own axes
  * out w_K[3] (rad/s) angular velocity, inertial axes
  */
-int mstmm_sweep_planar_pin_angular_motion(const real *restrict A, const real *restrict motion,
-    real *restrict w_K)
+int mstmm_sweep_planar_pin_angular_motion(in_t A, in_t motion, out_t w_K)
 {
-    (void)A;
-    w_K[0] = 0.0;
-    w_K[1] = 0.0;
-    w_K[2] = motion[0];
-    return 0;
+  (void)A;
+  w_K[0] = w_K[1] = 0.0;
+  w_K[2] = motion[0];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_angular_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_angular_motion(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_angular_motion_inputs[] = {
-    {"A", 2, "", 0, 0},
-    {"motion", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_angular_motion_outputs[] = {
-    {"w_K", 3, "rad/s", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_angular_motion, (in[0], in[1], out[0]))
 
 /* axes of an end, in a plane
  * in  A[2] rotation, body axes to inertial axes
  * in  R_end[3][3] rotation, end axes to body axes
  * out A_end[3][3] rotation, end axes to inertial axes
  */
-int mstmm_sweep_planar_pin_end_frame(const real *restrict A, const real *restrict R_end,
-    real *restrict A_end)
+int mstmm_sweep_planar_pin_end_frame(in_t A, in_t R_end, out_t A_end)
 {
-    const real t0 = A[0] * R_end[0];
-    const real t1 = A[1] * R_end[3];
-    const real t2 = t0 - t1;
-    A_end[0] = t2;
-    const real t3 = A[0] * R_end[1];
-    const real t4 = A[1] * R_end[4];
-    const real t5 = t3 - t4;
-    A_end[1] = t5;
-    const real t6 = A[0] * R_end[2];
-    const real t7 = A[1] * R_end[5];
-    const real t8 = t6 - t7;
-    A_end[2] = t8;
-    const real t9 = A[1] * R_end[0];
-    const real t10 = A[0] * R_end[3];
-    const real t11 = t9 + t10;
-    A_end[3] = t11;
-    const real t12 = A[1] * R_end[1];
-    const real t13 = A[0] * R_end[4];
-    const real t14 = t12 + t13;
-    A_end[4] = t14;
-    const real t15 = A[1] * R_end[2];
-    const real t16 = A[0] * R_end[5];
-    const real t17 = t15 + t16;
-    A_end[5] = t17;
-    A_end[6] = R_end[6];
-    A_end[7] = R_end[7];
-    A_end[8] = R_end[8];
-    return 0;
+  A_end[0] = A[0] * R_end[0] - A[1] * R_end[3];
+  A_end[1] = A[0] * R_end[1] - A[1] * R_end[4];
+  A_end[2] = A[0] * R_end[2] - A[1] * R_end[5];
+  A_end[3] = A[1] * R_end[0] + A[0] * R_end[3];
+  A_end[4] = A[1] * R_end[1] + A[0] * R_end[4];
+  A_end[5] = A[1] * R_end[2] + A[0] * R_end[5];
+  A_end[6] = R_end[6];
+  A_end[7] = R_end[7];
+  A_end[8] = R_end[8];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_end_frame_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_end_frame(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_end_frame_inputs[] = {
-    {"A", 2, "", 0, 0},
-    {"R_end", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_end_frame_outputs[] = {
-    {"A_end", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_end_frame, (in[0], in[1], out[0]))
 
 /* load applied at a point of a body, in a plane
  * in  A[2] rotation, body axes to inertial axes
@@ -467,71 +186,19 @@ static const mstmm_port mstmm_sweep_planar_pin_end_frame_outputs[] = {
  * in  M[3] (N*m) moment, axes of the load
  * out e[3] (N, N*m) contribution to e, added to what is there
  */
-int mstmm_sweep_planar_pin_applied_load(const real *restrict A, const real *restrict A_F,
-    const real *restrict offset, const real *restrict F, const real *restrict M, real *restrict e)
+int mstmm_sweep_planar_pin_applied_load(in_t A, in_t A_F, in_t offset, in_t F, in_t M, out_t e)
 {
-    const real t0 = A[0] * A_F[0];
-    const real t1 = A[1] * A_F[3];
-    const real t2 = t0 + t1;
-    const real t3 = F[0] * t2;
-    const real t4 = A[0] * A_F[1];
-    const real t5 = A[1] * A_F[4];
-    const real t6 = t4 + t5;
-    const real t7 = F[1] * t6;
-    const real t8 = t3 + t7;
-    const real t9 = A[0] * A_F[2];
-    const real t10 = A[1] * A_F[5];
-    const real t11 = t9 + t10;
-    const real t12 = F[2] * t11;
-    const real t13 = t8 + t12;
-    const real t14 = -t13;
-    e[0] += t14;
-    const real t15 = A[0] * A_F[3];
-    const real t16 = A[1] * A_F[0];
-    const real t17 = t15 - t16;
-    const real t18 = F[0] * t17;
-    const real t19 = A[0] * A_F[4];
-    const real t20 = A[1] * A_F[1];
-    const real t21 = t19 - t20;
-    const real t22 = F[1] * t21;
-    const real t23 = t18 + t22;
-    const real t24 = A[0] * A_F[5];
-    const real t25 = A[1] * A_F[2];
-    const real t26 = t24 - t25;
-    const real t27 = F[2] * t26;
-    const real t28 = t23 + t27;
-    const real t29 = -t28;
-    e[1] += t29;
-    const real t30 = offset[1] * t13;
-    const real t31 = offset[0] * t28;
-    const real t32 = t30 - t31;
-    const real t33 = A_F[6] * M[0];
-    const real t34 = A_F[7] * M[1];
-    const real t35 = t33 + t34;
-    const real t36 = A_F[8] * M[2];
-    const real t37 = t35 + t36;
-    const real t38 = t32 - t37;
-    e[2] += t38;
-    return 0;
+  real t13 = F[0] * (A[0] * A_F[0] + A[1] * A_F[3]) + F[1] * (A[0] * A_F[1] + A[1] * A_F[4]) + F[2]
+    * (A[0] * A_F[2] + A[1] * A_F[5]);
+  e[0] += -t13;
+  real t28 = F[0] * (A[0] * A_F[3] - A[1] * A_F[0]) + F[1] * (A[0] * A_F[4] - A[1] * A_F[1]) + F[2]
+    * (A[0] * A_F[5] - A[1] * A_F[2]);
+  e[1] += -t28;
+  e[2] += offset[1] * t13 - offset[0] * t28 - (A_F[6] * M[0] + A_F[7] * M[1] + A_F[8] * M[2]);
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_applied_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_applied_load(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_applied_load_inputs[] = {
-    {"A", 2, "", 0, 0},
-    {"A_F", 9, "", 0, 0},
-    {"offset", 3, "m", 0, 0},
-    {"F", 3, "N", 0, 0},
-    {"M", 3, "N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_applied_load_outputs[] = {
-    {"e", 3, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_applied_load, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* S carried across a hinge with 1 free speed, and the factor of D, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -545,112 +212,48 @@ static const mstmm_port mstmm_sweep_planar_pin_applied_load_outputs[] = {
  * out G[3] D^-1 H^T S
  * out S_I[6] contribution to the parent's S, added to what is there
  */
-int mstmm_sweep_planar_pin_factor(const real *restrict Rc, const real *restrict r,
-    const real *restrict J, const real *restrict floor_, const real *restrict S, real *restrict F,
-    real *restrict G, real *restrict S_I)
+int mstmm_sweep_planar_pin_factor(in_t Rc, in_t r, in_t J, in_t floor_, in_t S, out_t F, out_t G,
+    out_t S_I)
 {
-    const real t0 = J[0] + S[5];
-    const real t1 = 0.0 < t0;
-    if (!(t1 != 0)) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
-    const real t2 = 0.0 < floor_[0];
-    const real t3 = S[5] * ((real)1 / (real)300000000000000);
-    const real t4 = t2 != 0 ? floor_[0] : t3;
-    const real t5 = t4 < t0;
-    if (!(t5 != 0)) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
-    const real t6 = 1.0 / t0;
-    F[0] = t6;
-    const real t7 = S[2] * t6;
-    G[0] = t7;
-    const real t8 = S[4] * t6;
-    G[1] = t8;
-    const real t9 = S[5] * t6;
-    G[2] = t9;
-    const real t10 = S[2] * t7;
-    const real t11 = S[0] - t10;
-    const real t12 = Rc[0] * t11;
-    const real t13 = S[2] * t8;
-    const real t14 = S[1] - t13;
-    const real t15 = Rc[1] * t14;
-    const real t16 = t12 - t15;
-    const real t17 = Rc[0] * t16;
-    const real t18 = Rc[0] * t14;
-    const real t19 = S[4] * t8;
-    const real t20 = S[3] - t19;
-    const real t21 = Rc[1] * t20;
-    const real t22 = t18 - t21;
-    const real t23 = Rc[1] * t22;
-    const real t24 = t17 - t23;
-    S_I[0] += t24;
-    const real t25 = Rc[1] * t16;
-    const real t26 = Rc[0] * t22;
-    const real t27 = t25 + t26;
-    S_I[1] += t27;
-    const real t28 = S[2] * t9;
-    const real t29 = S[2] - t28;
-    const real t30 = Rc[0] * t29;
-    const real t31 = S[4] * t9;
-    const real t32 = S[4] - t31;
-    const real t33 = Rc[1] * t32;
-    const real t34 = t30 - t33;
-    const real t35 = r[0] * t27;
-    const real t36 = r[1] * t24;
-    const real t37 = t35 - t36;
-    const real t38 = t34 + t37;
-    S_I[2] += t38;
-    const real t39 = Rc[1] * t11;
-    const real t40 = t18 + t39;
-    const real t41 = Rc[1] * t40;
-    const real t42 = Rc[0] * t20;
-    const real t43 = t15 + t42;
-    const real t44 = Rc[0] * t43;
-    const real t45 = t41 + t44;
-    S_I[3] += t45;
-    const real t46 = Rc[1] * t29;
-    const real t47 = Rc[0] * t32;
-    const real t48 = t46 + t47;
-    const real t49 = r[0] * t45;
-    const real t50 = r[1] * t27;
-    const real t51 = t49 - t50;
-    const real t52 = t48 + t51;
-    S_I[4] += t52;
-    const real t53 = S[5] * t9;
-    const real t54 = S[5] - t53;
-    const real t55 = r[0] * t52;
-    const real t56 = r[1] * t38;
-    const real t57 = t55 - t56;
-    const real t58 = r[0] * t48;
-    const real t59 = r[1] * t34;
-    const real t60 = t58 - t59;
-    const real t61 = t57 + t60;
-    const real t62 = t54 + t61;
-    S_I[5] += t62;
-    return 0;
+  real t0 = J[0] + S[5];
+  if (!((0.0 < t0))) return 1; /* pivot 1 of 1 vanishes: a motion of the hinge is undetermined */
+  real t3 = S[5] * ((real)1 / (real)300000000000000);
+  if (!((((0.0 < floor_[0]) ? floor_[0] : t3) < t0))) return 1; /* speed 1 of 1 moves no inertia: its acceleration is undetermined */
+  real t6 = 1.0 / t0;
+  F[0] = t6;
+  real t7 = S[2] * t6;
+  G[0] = t7;
+  real t8 = S[4] * t6;
+  G[1] = t8;
+  real t9 = S[5] * t6;
+  G[2] = t9;
+  real t11 = S[0] - S[2] * t7;
+  real t14 = S[1] - S[2] * t8;
+  real t15 = Rc[1] * t14;
+  real t16 = Rc[0] * t11 - t15;
+  real t18 = Rc[0] * t14;
+  real t20 = S[3] - S[4] * t8;
+  real t22 = t18 - Rc[1] * t20;
+  real t24 = Rc[0] * t16 - Rc[1] * t22;
+  S_I[0] += t24;
+  real t27 = Rc[1] * t16 + Rc[0] * t22;
+  S_I[1] += t27;
+  real t29 = S[2] - S[2] * t9;
+  real t32 = S[4] - S[4] * t9;
+  real t34 = Rc[0] * t29 - Rc[1] * t32;
+  real t38 = t34 + (r[0] * t27 - r[1] * t24);
+  S_I[2] += t38;
+  real t45 = Rc[1] * (t18 + Rc[1] * t11) + Rc[0] * (t15 + Rc[0] * t20);
+  S_I[3] += t45;
+  real t48 = Rc[1] * t29 + Rc[0] * t32;
+  real t52 = t48 + (r[0] * t45 - r[1] * t27);
+  S_I[4] += t52;
+  S_I[5] += S[5] - S[5] * t9 + (r[0] * t52 - r[1] * t38 + (r[0] * t48 - r[1] * t34));
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_factor_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_factor(in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_factor_inputs[] = {
-    {"Rc", 2, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"J", 1, "kg*m2 or kg", 0, 0},
-    {"floor", 1, "kg, kg*m2", 0, 0},
-    {"S", 6, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_factor_outputs[] = {
-    {"F", 1, "", 0, 0},
-    {"G", 3, "", 0, 0},
-    {"S_I", 6, "", 1, 0},
-};
-
-static const mstmm_guard mstmm_sweep_planar_pin_factor_guards[] = {
-    {1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"},
-    {1, "speed 1 of 1 moves no inertia: its acceleration is undetermined"},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_factor, (in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2]))
 
 /* load of a right-hand side carried across a hinge with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -663,58 +266,21 @@ static const mstmm_guard mstmm_sweep_planar_pin_factor_guards[] = {
  * out y[1] (N, N*m) tau - H^T e
  * out e_I[3] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_sweep_planar_pin_column_load(const real *restrict Rc, const real *restrict r,
-    const real *restrict G, const real *restrict e, const real *restrict tau, real *restrict y,
-    real *restrict e_I)
+int mstmm_sweep_planar_pin_column_load(in_t Rc, in_t r, in_t G, in_t e, in_t tau, out_t y,
+    out_t e_I)
 {
-    const real t0 = tau[0] - e[2];
-    y[0] = t0;
-    const real t1 = G[0] * t0;
-    const real t2 = e[0] + t1;
-    const real t3 = Rc[0] * t2;
-    const real t4 = G[1] * t0;
-    const real t5 = e[1] + t4;
-    const real t6 = Rc[1] * t5;
-    const real t7 = t3 - t6;
-    e_I[0] += t7;
-    const real t8 = Rc[1] * t2;
-    const real t9 = Rc[0] * t5;
-    const real t10 = t8 + t9;
-    e_I[1] += t10;
-    const real t11 = G[2] * t0;
-    const real t12 = e[2] + t11;
-    const real t13 = Rc[1] * r[0];
-    const real t14 = Rc[0] * r[1];
-    const real t15 = t13 - t14;
-    const real t16 = t2 * t15;
-    const real t17 = Rc[0] * r[0];
-    const real t18 = Rc[1] * r[1];
-    const real t19 = t17 + t18;
-    const real t20 = t5 * t19;
-    const real t21 = t16 + t20;
-    const real t22 = t12 + t21;
-    e_I[2] += t22;
-    return 0;
+  real t0 = tau[0] - e[2];
+  y[0] = t0;
+  real t2 = e[0] + G[0] * t0;
+  real t5 = e[1] + G[1] * t0;
+  e_I[0] += Rc[0] * t2 - Rc[1] * t5;
+  e_I[1] += Rc[1] * t2 + Rc[0] * t5;
+  e_I[2] += e[2] + G[2] * t0 + (t2 * (Rc[1] * r[0] - Rc[0] * r[1]) + t5 * (Rc[0] * r[0] + Rc[1] *
+    r[1]));
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_column_load(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_column_load_inputs[] = {
-    {"Rc", 2, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"G", 3, "", 0, 0},
-    {"e", 3, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_column_load_outputs[] = {
-    {"y", 1, "N, N*m", 0, 0},
-    {"e_I", 3, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_column_load, (in[0], in[1], in[2], in[3], in[4], out[0], out[1]))
 
 /* accelerations due to a right-hand side, across a hinge with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -728,54 +294,23 @@ static const mstmm_port mstmm_sweep_planar_pin_column_load_outputs[] = {
  * out udot[1] accelerations of the free coordinates
  * out delta[3] deviation of the body's acceleration, at P
  */
-int mstmm_sweep_planar_pin_column_acceleration(const real *restrict Rc, const real *restrict r,
-    const real *restrict F, const real *restrict G, const real *restrict y,
-    const real *restrict delta_I, real *restrict udot, real *restrict delta)
+int mstmm_sweep_planar_pin_column_acceleration(in_t Rc, in_t r, in_t F, in_t G, in_t y,
+    in_t delta_I, out_t udot, out_t delta)
 {
-    const real t0 = F[0] * y[0];
-    const real t1 = r[1] * delta_I[2];
-    const real t2 = delta_I[0] - t1;
-    const real t3 = Rc[0] * t2;
-    const real t4 = r[0] * delta_I[2];
-    const real t5 = delta_I[1] + t4;
-    const real t6 = Rc[1] * t5;
-    const real t7 = t3 + t6;
-    const real t8 = G[0] * t7;
-    const real t9 = Rc[0] * t5;
-    const real t10 = Rc[1] * t2;
-    const real t11 = t9 - t10;
-    const real t12 = G[1] * t11;
-    const real t13 = t8 + t12;
-    const real t14 = G[2] * delta_I[2];
-    const real t15 = t13 + t14;
-    const real t16 = t0 - t15;
-    udot[0] = t16;
-    delta[0] = t7;
-    delta[1] = t11;
-    const real t17 = delta_I[2] + t16;
-    delta[2] = t17;
-    return 0;
+  real t2 = delta_I[0] - r[1] * delta_I[2];
+  real t5 = delta_I[1] + r[0] * delta_I[2];
+  real t7 = Rc[0] * t2 + Rc[1] * t5;
+  real t11 = Rc[0] * t5 - Rc[1] * t2;
+  real t16 = F[0] * y[0] - (G[0] * t7 + G[1] * t11 + G[2] * delta_I[2]);
+  udot[0] = t16;
+  delta[0] = t7;
+  delta[1] = t11;
+  delta[2] = delta_I[2] + t16;
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_column_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_column_acceleration(in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_column_acceleration_inputs[] = {
-    {"Rc", 2, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"F", 1, "", 0, 0},
-    {"G", 3, "", 0, 0},
-    {"y", 1, "N, N*m", 0, 0},
-    {"delta_I", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_column_acceleration_outputs[] = {
-    {"udot", 1, "", 0, 0},
-    {"delta", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_column_acceleration, (in[0], in[1], in[2], in[3], in[4], in[5],
+  out[0], out[1]))
 
 /* a column's rows divided by D, across a hinge with 1 speeds, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -784,27 +319,13 @@ static const mstmm_port mstmm_sweep_planar_pin_column_acceleration_outputs[] = {
  * in  y[1] -H^T K - C
  * out z[1] D^-1 y
  */
-int mstmm_sweep_planar_pin_divide(const real *restrict F, const real *restrict y, real *restrict z)
+int mstmm_sweep_planar_pin_divide(in_t F, in_t y, out_t z)
 {
-    const real t0 = F[0] * y[0];
-    z[0] = t0;
-    return 0;
+  z[0] = F[0] * y[0];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_divide_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_divide(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_divide_inputs[] = {
-    {"F", 1, "", 0, 0},
-    {"y", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_divide_outputs[] = {
-    {"z", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_divide, (in[0], in[1], out[0]))
 
 /* two columns coupled by a hinge with 1 speeds, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -813,28 +334,13 @@ static const mstmm_port mstmm_sweep_planar_pin_divide_outputs[] = {
  * in  z[1] of the other
  * out L_ij[1] entry of L of both, added to what is there
  */
-int mstmm_sweep_planar_pin_couple(const real *restrict y, const real *restrict z,
-    real *restrict L_ij)
+int mstmm_sweep_planar_pin_couple(in_t y, in_t z, out_t L_ij)
 {
-    const real t0 = y[0] * z[0];
-    L_ij[0] += t0;
-    return 0;
+  L_ij[0] += y[0] * z[0];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_couple_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_couple(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_couple_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"z", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_couple_outputs[] = {
-    {"L_ij", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_couple, (in[0], in[1], out[0]))
 
 /* contribution of a hinge with 1 speeds to a row, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -843,29 +349,13 @@ static const mstmm_port mstmm_sweep_planar_pin_couple_outputs[] = {
  * in  z[1] of the row
  * out l[1] known part of the row, added to what is there
  */
-int mstmm_sweep_planar_pin_add_known_part(const real *restrict y, const real *restrict z,
-    real *restrict l)
+int mstmm_sweep_planar_pin_add_known_part(in_t y, in_t z, out_t l)
 {
-    const real t0 = y[0] * z[0];
-    const real t1 = -t0;
-    l[0] += t1;
-    return 0;
+  l[0] += -(y[0] * z[0]);
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_add_known_part_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_add_known_part(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_add_known_part_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"z", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_add_known_part_outputs[] = {
-    {"l", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_add_known_part, (in[0], in[1], out[0]))
 
 /* contribution of a multiplier to a hinge with 1 speeds, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -874,28 +364,13 @@ static const mstmm_port mstmm_sweep_planar_pin_add_known_part_outputs[] = {
  * in  x[1] (N, N*m) multiplier
  * out y_0[1] tau - H^T e, added to what is there
  */
-int mstmm_sweep_planar_pin_add_multiplier_effort(const real *restrict y, const real *restrict x,
-    real *restrict y_0)
+int mstmm_sweep_planar_pin_add_multiplier_effort(in_t y, in_t x, out_t y_0)
 {
-    const real t0 = y[0] * x[0];
-    y_0[0] += t0;
-    return 0;
+  y_0[0] += y[0] * x[0];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_add_multiplier_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_add_multiplier_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_add_multiplier_effort_inputs[] = {
-    {"y", 1, "", 0, 0},
-    {"x", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_add_multiplier_effort_outputs[] = {
-    {"y_0", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_add_multiplier_effort, (in[0], in[1], out[0]))
 
 /* load of a right-hand side along a hinge on the ground with 1 free speed, in a plane
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -904,28 +379,13 @@ static const mstmm_port mstmm_sweep_planar_pin_add_multiplier_effort_outputs[] =
  * in  tau[1] (N, N*m) efforts of the right-hand side on the free coordinates
  * out y[1] (N, N*m) tau - H^T e
  */
-int mstmm_sweep_planar_pin_ground_column_load(const real *restrict e, const real *restrict tau,
-    real *restrict y)
+int mstmm_sweep_planar_pin_ground_column_load(in_t e, in_t tau, out_t y)
 {
-    const real t0 = tau[0] - e[2];
-    y[0] = t0;
-    return 0;
+  y[0] = tau[0] - e[2];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_ground_column_load_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_ground_column_load(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_ground_column_load_inputs[] = {
-    {"e", 3, "N, N*m", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_ground_column_load_outputs[] = {
-    {"y", 1, "N, N*m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_ground_column_load, (in[0], in[1], out[0]))
 
 /* the two sides of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -941,72 +401,24 @@ static const mstmm_port mstmm_sweep_planar_pin_ground_column_load_outputs[] = {
  * out r_A[2] (m) the end of B from P of A, axes of A
  * out d[2] (m) that end from the origin of C, axes of C
  */
-int mstmm_sweep_planar_pin_relative_pose(const real *restrict A_C, const real *restrict x_C,
-    const real *restrict A_B, const real *restrict x_B, const real *restrict r_e,
-    const real *restrict Rc, const real *restrict r, real *restrict R_C, real *restrict r_A,
-    real *restrict d)
+int mstmm_sweep_planar_pin_relative_pose(in_t A_C, in_t x_C, in_t A_B, in_t x_B, in_t r_e, in_t Rc,
+    in_t r, out_t R_C, out_t r_A, out_t d)
 {
-    const real t0 = A_C[0] * A_B[0];
-    const real t1 = A_C[1] * A_B[1];
-    const real t2 = t0 + t1;
-    R_C[0] = t2;
-    const real t3 = A_C[0] * A_B[1];
-    const real t4 = A_C[1] * A_B[0];
-    const real t5 = t3 - t4;
-    const real t6 = -t5;
-    R_C[1] = t6;
-    const real t7 = A_B[0] * r_e[0];
-    const real t8 = A_B[1] * r_e[1];
-    const real t9 = t7 - t8;
-    const real t10 = t9 - x_C[0];
-    const real t11 = x_B[0] + t10;
-    const real t12 = A_C[0] * t11;
-    const real t13 = A_B[1] * r_e[0];
-    const real t14 = A_B[0] * r_e[1];
-    const real t15 = t13 + t14;
-    const real t16 = t15 - x_C[1];
-    const real t17 = x_B[1] + t16;
-    const real t18 = A_C[1] * t17;
-    const real t19 = t12 + t18;
-    const real t20 = Rc[0] * t19;
-    const real t21 = A_C[0] * t17;
-    const real t22 = A_C[1] * t11;
-    const real t23 = t21 - t22;
-    const real t24 = Rc[1] * t23;
-    const real t25 = t20 - t24;
-    const real t26 = r[0] + t25;
-    r_A[0] = t26;
-    const real t27 = Rc[1] * t19;
-    const real t28 = Rc[0] * t23;
-    const real t29 = t27 + t28;
-    const real t30 = r[1] + t29;
-    r_A[1] = t30;
-    d[0] = t19;
-    d[1] = t23;
-    return 0;
+  R_C[0] = A_C[0] * A_B[0] + A_C[1] * A_B[1];
+  R_C[1] = -(A_C[0] * A_B[1] - A_C[1] * A_B[0]);
+  real t11 = x_B[0] + (A_B[0] * r_e[0] - A_B[1] * r_e[1] - x_C[0]);
+  real t17 = x_B[1] + (A_B[1] * r_e[0] + A_B[0] * r_e[1] - x_C[1]);
+  real t19 = A_C[0] * t11 + A_C[1] * t17;
+  real t23 = A_C[0] * t17 - A_C[1] * t11;
+  r_A[0] = r[0] + (Rc[0] * t19 - Rc[1] * t23);
+  r_A[1] = r[1] + (Rc[1] * t19 + Rc[0] * t23);
+  d[0] = t19;
+  d[1] = t23;
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_relative_pose_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_relative_pose(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_relative_pose_inputs[] = {
-    {"A_C", 2, "", 0, 0},
-    {"x_C", 3, "m", 0, 0},
-    {"A_B", 2, "", 0, 0},
-    {"x_B", 3, "m", 0, 0},
-    {"r_e", 2, "m", 0, 0},
-    {"Rc", 2, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_relative_pose_outputs[] = {
-    {"R_C", 2, "", 0, 0},
-    {"r_A", 2, "m", 0, 0},
-    {"d", 2, "m", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_relative_pose, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2]))
 
 /* velocity error of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1020,52 +432,18 @@ static const mstmm_port mstmm_sweep_planar_pin_relative_pose_outputs[] = {
  * in  w_B[1] (rad/s) angular velocity of B, own axes
  * out slip[3] rate of d and relative angular velocity, axes of C
  */
-int mstmm_sweep_planar_pin_slip(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict v_C, const real *restrict w_C,
-    const real *restrict v_B, const real *restrict w_B, real *restrict slip)
+int mstmm_sweep_planar_pin_slip(in_t R_C, in_t r_e, in_t d, in_t v_C, in_t w_C, in_t v_B, in_t w_B,
+    out_t slip)
 {
-    const real t0 = r_e[1] * w_B[0];
-    const real t1 = v_B[0] - t0;
-    const real t2 = R_C[0] * t1;
-    const real t3 = r_e[0] * w_B[0];
-    const real t4 = v_B[1] + t3;
-    const real t5 = R_C[1] * t4;
-    const real t6 = t2 + t5;
-    const real t7 = d[1] * w_C[0];
-    const real t8 = t7 - v_C[0];
-    const real t9 = t6 + t8;
-    slip[0] = t9;
-    const real t10 = R_C[0] * t4;
-    const real t11 = R_C[1] * t1;
-    const real t12 = t10 - t11;
-    const real t13 = d[0] * w_C[0];
-    const real t14 = v_C[1] + t13;
-    const real t15 = t12 - t14;
-    slip[1] = t15;
-    const real t16 = w_B[0] - w_C[0];
-    slip[2] = t16;
-    return 0;
+  real t1 = v_B[0] - r_e[1] * w_B[0];
+  real t4 = v_B[1] + r_e[0] * w_B[0];
+  slip[0] = R_C[0] * t1 + R_C[1] * t4 + (d[1] * w_C[0] - v_C[0]);
+  slip[1] = R_C[0] * t4 - R_C[1] * t1 - (v_C[1] + d[0] * w_C[0]);
+  slip[2] = w_B[0] - w_C[0];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_slip_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_slip(in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_slip_inputs[] = {
-    {"R_C", 2, "", 0, 0},
-    {"r_e", 2, "m", 0, 0},
-    {"d", 2, "m", 0, 0},
-    {"v_C", 2, "m/s", 0, 0},
-    {"w_C", 1, "rad/s", 0, 0},
-    {"v_B", 2, "m/s", 0, 0},
-    {"w_B", 1, "rad/s", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_slip_outputs[] = {
-    {"slip", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_slip, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0]))
 
 /* drift of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1078,67 +456,22 @@ static const mstmm_port mstmm_sweep_planar_pin_slip_outputs[] = {
  * in  motion_B[4] bias motion of B: w, wd, rdd, own axes
  * out drift[3] rate of the velocity error in the bias motion, axes of C
  */
-int mstmm_sweep_planar_pin_drift(const real *restrict R_C, const real *restrict r_e,
-    const real *restrict d, const real *restrict slip, const real *restrict motion_C,
-    const real *restrict motion_B, real *restrict drift)
+int mstmm_sweep_planar_pin_drift(in_t R_C, in_t r_e, in_t d, in_t slip, in_t motion_C,
+    in_t motion_B, out_t drift)
 {
-    const real t0 = slip[1] * motion_C[0];
-    const real t1 = t0 * 2.0;
-    const real t2 = t1 - motion_C[2];
-    const real t3 = r_e[1] * motion_B[1];
-    const real t4 = motion_B[0] * motion_B[0];
-    const real t5 = r_e[0] * t4;
-    const real t6 = t3 + t5;
-    const real t7 = motion_B[2] - t6;
-    const real t8 = R_C[0] * t7;
-    const real t9 = r_e[0] * motion_B[1];
-    const real t10 = r_e[1] * t4;
-    const real t11 = t9 - t10;
-    const real t12 = motion_B[3] + t11;
-    const real t13 = R_C[1] * t12;
-    const real t14 = t8 + t13;
-    const real t15 = d[1] * motion_C[1];
-    const real t16 = motion_C[0] * motion_C[0];
-    const real t17 = d[0] * t16;
-    const real t18 = t15 + t17;
-    const real t19 = t14 + t18;
-    const real t20 = t2 + t19;
-    drift[0] = t20;
-    const real t21 = R_C[0] * t12;
-    const real t22 = R_C[1] * t7;
-    const real t23 = t21 - t22;
-    const real t24 = d[1] * t16;
-    const real t25 = d[0] * motion_C[1];
-    const real t26 = t24 - t25;
-    const real t27 = t23 + t26;
-    const real t28 = slip[0] * motion_C[0];
-    const real t29 = 2.0 * t28;
-    const real t30 = motion_C[3] + t29;
-    const real t31 = t27 - t30;
-    drift[1] = t31;
-    const real t32 = motion_B[1] - motion_C[1];
-    drift[2] = t32;
-    return 0;
+  real t4 = motion_B[0] * motion_B[0];
+  real t7 = motion_B[2] - (r_e[1] * motion_B[1] + r_e[0] * t4);
+  real t12 = motion_B[3] + (r_e[0] * motion_B[1] - r_e[1] * t4);
+  real t16 = motion_C[0] * motion_C[0];
+  drift[0] = slip[1] * motion_C[0] * 2.0 - motion_C[2] + (R_C[0] * t7 + R_C[1] * t12 + (d[1] *
+    motion_C[1] + d[0] * t16));
+  drift[1] = R_C[0] * t12 - R_C[1] * t7 + (d[1] * t16 - d[0] * motion_C[1]) - (motion_C[3] + 2.0 *
+    (slip[0] * motion_C[0]));
+  drift[2] = motion_B[1] - motion_C[1];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_drift_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_drift(in[0], in[1], in[2], in[3], in[4], in[5], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_drift_inputs[] = {
-    {"R_C", 2, "", 0, 0},
-    {"r_e", 2, "m", 0, 0},
-    {"d", 2, "m", 0, 0},
-    {"slip", 3, "", 0, 0},
-    {"motion_C", 4, "", 0, 0},
-    {"motion_B", 4, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_drift_outputs[] = {
-    {"drift", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_drift, (in[0], in[1], in[2], in[3], in[4], in[5], out[0]))
 
 /* row of a direction of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1151,59 +484,23 @@ static const mstmm_port mstmm_sweep_planar_pin_drift_outputs[] = {
  * out J_A[3] row by the acceleration of A, at its P
  * out J_B[3] row by the acceleration of B, at its P
  */
-int mstmm_sweep_planar_pin_row(const real *restrict w, const real *restrict R_C,
-    const real *restrict r_e, const real *restrict Rc, const real *restrict r_A, real *restrict J_A,
-    real *restrict J_B)
+int mstmm_sweep_planar_pin_row(in_t w, in_t R_C, in_t r_e, in_t Rc, in_t r_A, out_t J_A, out_t J_B)
 {
-    const real t0 = w[1] * Rc[1];
-    const real t1 = w[0] * Rc[0];
-    const real t2 = t0 - t1;
-    J_A[0] = t2;
-    const real t3 = w[0] * Rc[1];
-    const real t4 = w[1] * Rc[0];
-    const real t5 = t3 + t4;
-    const real t6 = -t5;
-    J_A[1] = t6;
-    const real t7 = t1 - t0;
-    const real t8 = r_A[1] * t7;
-    const real t9 = r_A[0] * t5;
-    const real t10 = t8 - t9;
-    const real t11 = t10 - w[2];
-    J_A[2] = t11;
-    const real t12 = w[0] * R_C[0];
-    const real t13 = w[1] * R_C[1];
-    const real t14 = t12 - t13;
-    J_B[0] = t14;
-    const real t15 = w[0] * R_C[1];
-    const real t16 = w[1] * R_C[0];
-    const real t17 = t15 + t16;
-    J_B[1] = t17;
-    const real t18 = r_e[0] * t17;
-    const real t19 = r_e[1] * t14;
-    const real t20 = t18 - t19;
-    const real t21 = w[2] + t20;
-    J_B[2] = t21;
-    return 0;
+  real t0 = w[1] * Rc[1];
+  real t1 = w[0] * Rc[0];
+  J_A[0] = t0 - t1;
+  real t5 = w[0] * Rc[1] + w[1] * Rc[0];
+  J_A[1] = -t5;
+  J_A[2] = r_A[1] * (t1 - t0) - r_A[0] * t5 - w[2];
+  real t14 = w[0] * R_C[0] - w[1] * R_C[1];
+  J_B[0] = t14;
+  real t17 = w[0] * R_C[1] + w[1] * R_C[0];
+  J_B[1] = t17;
+  J_B[2] = w[2] + (r_e[0] * t17 - r_e[1] * t14);
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_row_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_row(in[0], in[1], in[2], in[3], in[4], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_row_inputs[] = {
-    {"w", 3, "", 0, 0},
-    {"R_C", 2, "", 0, 0},
-    {"r_e", 2, "m", 0, 0},
-    {"Rc", 2, "", 0, 0},
-    {"r_A", 2, "m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_row_outputs[] = {
-    {"J_A", 3, "", 0, 0},
-    {"J_B", 3, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_row, (in[0], in[1], in[2], in[3], in[4], out[0], out[1]))
 
 /* known parts of the rows of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1212,62 +509,18 @@ static const mstmm_port mstmm_sweep_planar_pin_row_outputs[] = {
  * in  relative[3] motion of the end of B relative to C
  * out l[6] known parts of the rows
  */
-int mstmm_sweep_planar_pin_known_parts(const real *restrict W, const real *restrict relative,
-    real *restrict l)
+int mstmm_sweep_planar_pin_known_parts(in_t W, in_t relative, out_t l)
 {
-    const real t0 = W[0] * relative[0];
-    const real t1 = W[1] * relative[1];
-    const real t2 = t0 + t1;
-    const real t3 = W[2] * relative[2];
-    const real t4 = t2 + t3;
-    l[0] = t4;
-    const real t5 = W[3] * relative[0];
-    const real t6 = W[4] * relative[1];
-    const real t7 = t5 + t6;
-    const real t8 = W[5] * relative[2];
-    const real t9 = t7 + t8;
-    l[1] = t9;
-    const real t10 = W[6] * relative[0];
-    const real t11 = W[7] * relative[1];
-    const real t12 = t10 + t11;
-    const real t13 = W[8] * relative[2];
-    const real t14 = t12 + t13;
-    l[2] = t14;
-    const real t15 = W[9] * relative[0];
-    const real t16 = W[10] * relative[1];
-    const real t17 = t15 + t16;
-    const real t18 = W[11] * relative[2];
-    const real t19 = t17 + t18;
-    l[3] = t19;
-    const real t20 = W[12] * relative[0];
-    const real t21 = W[13] * relative[1];
-    const real t22 = t20 + t21;
-    const real t23 = W[14] * relative[2];
-    const real t24 = t22 + t23;
-    l[4] = t24;
-    const real t25 = W[15] * relative[0];
-    const real t26 = W[16] * relative[1];
-    const real t27 = t25 + t26;
-    const real t28 = W[17] * relative[2];
-    const real t29 = t27 + t28;
-    l[5] = t29;
-    return 0;
+  l[0] = W[0] * relative[0] + W[1] * relative[1] + W[2] * relative[2];
+  l[1] = W[3] * relative[0] + W[4] * relative[1] + W[5] * relative[2];
+  l[2] = W[6] * relative[0] + W[7] * relative[1] + W[8] * relative[2];
+  l[3] = W[9] * relative[0] + W[10] * relative[1] + W[11] * relative[2];
+  l[4] = W[12] * relative[0] + W[13] * relative[1] + W[14] * relative[2];
+  l[5] = W[15] * relative[0] + W[16] * relative[1] + W[17] * relative[2];
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_known_parts_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_known_parts(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_known_parts_inputs[] = {
-    {"W", 18, "", 0, 0},
-    {"relative", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_known_parts_outputs[] = {
-    {"l", 6, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_known_parts, (in[0], in[1], out[0]))
 
 /* acceleration along a direction of a cut hinge, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1279,43 +532,15 @@ static const mstmm_port mstmm_sweep_planar_pin_known_parts_outputs[] = {
  * in  delta_B[3] deviation of the acceleration of B
  * out c[1] acceleration along the direction
  */
-int mstmm_sweep_planar_pin_row_acceleration(const real *restrict J_A, const real *restrict J_B,
-    const real *restrict l, const real *restrict delta_A, const real *restrict delta_B,
-    real *restrict c)
+int mstmm_sweep_planar_pin_row_acceleration(in_t J_A, in_t J_B, in_t l, in_t delta_A, in_t delta_B,
+    out_t c)
 {
-    const real t0 = J_A[0] * delta_A[0];
-    const real t1 = J_A[1] * delta_A[1];
-    const real t2 = t0 + t1;
-    const real t3 = J_A[2] * delta_A[2];
-    const real t4 = t2 + t3;
-    const real t5 = J_B[0] * delta_B[0];
-    const real t6 = J_B[1] * delta_B[1];
-    const real t7 = t5 + t6;
-    const real t8 = J_B[2] * delta_B[2];
-    const real t9 = t7 + t8;
-    const real t10 = t4 + t9;
-    const real t11 = l[0] + t10;
-    c[0] = t11;
-    return 0;
+  c[0] = l[0] + (J_A[0] * delta_A[0] + J_A[1] * delta_A[1] + J_A[2] * delta_A[2] + (J_B[0] *
+    delta_B[0] + J_B[1] * delta_B[1] + J_B[2] * delta_B[2]));
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_row_acceleration_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_row_acceleration(in[0], in[1], in[2], in[3], in[4], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_row_acceleration_inputs[] = {
-    {"J_A", 3, "", 0, 0},
-    {"J_B", 3, "", 0, 0},
-    {"l", 1, "", 0, 0},
-    {"delta_A", 3, "", 0, 0},
-    {"delta_B", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_row_acceleration_outputs[] = {
-    {"c", 1, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_row_acceleration, (in[0], in[1], in[2], in[3], in[4], out[0]))
 
 /* load of an effort, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1324,35 +549,15 @@ static const mstmm_port mstmm_sweep_planar_pin_row_acceleration_outputs[] = {
  * in  tau[1] (N, N*m) effort
  * out e[3] (N, N*m) force part of f = S a + e, added to what is there
  */
-int mstmm_sweep_planar_pin_apply_effort(const real *restrict J, const real *restrict tau,
-    real *restrict e)
+int mstmm_sweep_planar_pin_apply_effort(in_t J, in_t tau, out_t e)
 {
-    const real t0 = J[0] * tau[0];
-    const real t1 = -t0;
-    e[0] += t1;
-    const real t2 = J[1] * tau[0];
-    const real t3 = -t2;
-    e[1] += t3;
-    const real t4 = J[2] * tau[0];
-    const real t5 = -t4;
-    e[2] += t5;
-    return 0;
+  e[0] += -(J[0] * tau[0]);
+  e[1] += -(J[1] * tau[0]);
+  e[2] += -(J[2] * tau[0]);
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_apply_effort_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_apply_effort(in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_apply_effort_inputs[] = {
-    {"J", 3, "", 0, 0},
-    {"tau", 1, "N, N*m", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_apply_effort_outputs[] = {
-    {"e", 3, "N, N*m", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_apply_effort, (in[0], in[1], out[0]))
 
 /* a row eliminated where its ends meet, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1363,49 +568,24 @@ static const mstmm_port mstmm_sweep_planar_pin_apply_effort_outputs[] = {
  * out S[6] S of the body, added to what is there
  * out e[3] e of the body, added to what is there
  */
-int mstmm_sweep_planar_pin_eliminate_row(const real *restrict inverse, const real *restrict K,
-    const real *restrict l, real *restrict S, real *restrict e)
+int mstmm_sweep_planar_pin_eliminate_row(in_t inverse, in_t K, in_t l, out_t S, out_t e)
 {
-    const real t0 = inverse[0] * K[0];
-    const real t1 = K[0] * t0;
-    S[0] += t1;
-    const real t2 = K[1] * t0;
-    S[1] += t2;
-    const real t3 = K[2] * t0;
-    S[2] += t3;
-    const real t4 = inverse[0] * K[1];
-    const real t5 = K[1] * t4;
-    S[3] += t5;
-    const real t6 = K[2] * t4;
-    S[4] += t6;
-    const real t7 = inverse[0] * K[2];
-    const real t8 = K[2] * t7;
-    S[5] += t8;
-    const real t9 = l[0] * t0;
-    e[0] += t9;
-    const real t10 = l[0] * t4;
-    e[1] += t10;
-    const real t11 = l[0] * t7;
-    e[2] += t11;
-    return 0;
+  real t0 = inverse[0] * K[0];
+  S[0] += K[0] * t0;
+  S[1] += K[1] * t0;
+  S[2] += K[2] * t0;
+  real t4 = inverse[0] * K[1];
+  S[3] += K[1] * t4;
+  S[4] += K[2] * t4;
+  real t7 = inverse[0] * K[2];
+  S[5] += K[2] * t7;
+  e[0] += l[0] * t0;
+  e[1] += l[0] * t4;
+  e[2] += l[0] * t7;
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_eliminate_row_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_eliminate_row(in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_eliminate_row_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"K", 3, "", 0, 0},
-    {"l", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_eliminate_row_outputs[] = {
-    {"S", 6, "", 1, 0},
-    {"e", 3, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_eliminate_row, (in[0], in[1], in[2], out[0], out[1]))
 
 /* column of a remaining row while another is eliminated, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1415,39 +595,15 @@ static const mstmm_port mstmm_sweep_planar_pin_eliminate_row_outputs[] = {
  * in  L_p[1] entry of L of the eliminated row and another
  * out K_p[3] column of row p, added to what is there
  */
-int mstmm_sweep_planar_pin_update_column(const real *restrict inverse, const real *restrict K,
-    const real *restrict L_p, real *restrict K_p)
+int mstmm_sweep_planar_pin_update_column(in_t inverse, in_t K, in_t L_p, out_t K_p)
 {
-    const real t0 = K[0] * L_p[0];
-    const real t1 = inverse[0] * t0;
-    const real t2 = -t1;
-    K_p[0] += t2;
-    const real t3 = K[1] * L_p[0];
-    const real t4 = inverse[0] * t3;
-    const real t5 = -t4;
-    K_p[1] += t5;
-    const real t6 = K[2] * L_p[0];
-    const real t7 = inverse[0] * t6;
-    const real t8 = -t7;
-    K_p[2] += t8;
-    return 0;
+  K_p[0] += -(inverse[0] * (K[0] * L_p[0]));
+  K_p[1] += -(inverse[0] * (K[1] * L_p[0]));
+  K_p[2] += -(inverse[0] * (K[2] * L_p[0]));
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_update_column_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_update_column(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_update_column_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"K", 3, "", 0, 0},
-    {"L_p", 1, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_update_column_outputs[] = {
-    {"K_p", 3, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_update_column, (in[0], in[1], in[2], out[0]))
 
 /* contribution of a motion to a multiplier, in a plane
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)
@@ -1457,369 +613,126 @@ static const mstmm_port mstmm_sweep_planar_pin_update_column_outputs[] = {
  * in  delta[3] deviation of the acceleration of the body
  * out x[1] multiplier of row r, added to what is there
  */
-int mstmm_sweep_planar_pin_multiplier_of_motion(const real *restrict inverse,
-    const real *restrict K, const real *restrict delta, real *restrict x)
+int mstmm_sweep_planar_pin_multiplier_of_motion(in_t inverse, in_t K, in_t delta, out_t x)
 {
-    const real t0 = inverse[0] * K[0];
-    const real t1 = delta[0] * t0;
-    const real t2 = inverse[0] * K[1];
-    const real t3 = delta[1] * t2;
-    const real t4 = t1 + t3;
-    const real t5 = inverse[0] * K[2];
-    const real t6 = delta[2] * t5;
-    const real t7 = t4 + t6;
-    x[0] += t7;
-    return 0;
+  x[0] += delta[0] * (inverse[0] * K[0]) + delta[1] * (inverse[0] * K[1]) + delta[2] * (inverse[0] *
+    K[2]);
+  return 0;
 }
 
-static int mstmm_sweep_planar_pin_multiplier_of_motion_call(int n, const real *const *in, real *const *out)
-{
-    (void)n;
-    return mstmm_sweep_planar_pin_multiplier_of_motion(in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_planar_pin_multiplier_of_motion_inputs[] = {
-    {"inverse", 1, "", 0, 0},
-    {"K", 3, "", 0, 0},
-    {"delta", 3, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_planar_pin_multiplier_of_motion_outputs[] = {
-    {"x", 1, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_planar_pin_multiplier_of_motion, (in[0], in[1], in[2], out[0]))
 
 static const mstmm_kernel mstmm_sweep_planar_pin_kernels[] = {
-    {
-        .name = "forward",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_forward,
-        .call = mstmm_sweep_planar_pin_forward_call,
-        .n_inputs = 6,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_planar_pin_forward_inputs,
-        .outputs = mstmm_sweep_planar_pin_forward_outputs,
-        .ir_hash = "53df184f3946e39f5c9cd9ce2ad730a30250d9144f34b0e08f2320d0a91ddc9b",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "inertia",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_inertia,
-        .call = mstmm_sweep_planar_pin_inertia_call,
-        .n_inputs = 1,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_inertia_inputs,
-        .outputs = mstmm_sweep_planar_pin_inertia_outputs,
-        .ir_hash = "9221973075f2a4079ea64a14a058fde1c9bfb12d2f7457147ae3bd878c55fd26",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "bias_load",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_bias_load,
-        .call = mstmm_sweep_planar_pin_bias_load_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_bias_load_inputs,
-        .outputs = mstmm_sweep_planar_pin_bias_load_outputs,
-        .ir_hash = "8fb890c1fd924abc89d39ced154b4f019c0542a5da1498777752f4f27747692c",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "pose",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_pose,
-        .call = mstmm_sweep_planar_pin_pose_call,
-        .n_inputs = 4,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_pose_inputs,
-        .outputs = mstmm_sweep_planar_pin_pose_outputs,
-        .ir_hash = "292105364161b6dc2dfad3c7619d471167607bc48a2c4387ff64f050764fcbd7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "velocity",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_velocity,
-        .call = mstmm_sweep_planar_pin_velocity_call,
-        .n_inputs = 4,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_velocity_inputs,
-        .outputs = mstmm_sweep_planar_pin_velocity_outputs,
-        .ir_hash = "0836c2a92d4eee18e79265ef3ea5797b31a40b7d54785bd338c17a88e4d58a97",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "point",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_point,
-        .call = mstmm_sweep_planar_pin_point_call,
-        .n_inputs = 5,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_point_inputs,
-        .outputs = mstmm_sweep_planar_pin_point_outputs,
-        .ir_hash = "fa4b38d0074fe495bb2f1ded388f32e2b8dd14d57a5c8e1c032d4ba9cba05c86",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "angular_motion",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_angular_motion,
-        .call = mstmm_sweep_planar_pin_angular_motion_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_angular_motion_inputs,
-        .outputs = mstmm_sweep_planar_pin_angular_motion_outputs,
-        .ir_hash = "1f53168ea35b81f7f4b175b86239f856aae030b69a270c30b6a470fe50414126",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "end_frame",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_end_frame,
-        .call = mstmm_sweep_planar_pin_end_frame_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_end_frame_inputs,
-        .outputs = mstmm_sweep_planar_pin_end_frame_outputs,
-        .ir_hash = "c23f318f4acc45aed30ec797f35142fa54efe0ff7bfbf1652edb32c91efd6095",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "applied_load",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_applied_load,
-        .call = mstmm_sweep_planar_pin_applied_load_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_applied_load_inputs,
-        .outputs = mstmm_sweep_planar_pin_applied_load_outputs,
-        .ir_hash = "8559b0588f4ed4eed30ea245354c5aa7c4a45a0b9d50256c8fc8882ed75636c1",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "factor",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_factor,
-        .call = mstmm_sweep_planar_pin_factor_call,
-        .n_inputs = 5,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_planar_pin_factor_inputs,
-        .outputs = mstmm_sweep_planar_pin_factor_outputs,
-        .ir_hash = "ccd108f49956a66dd6726e3c7036f5034b84c637e969c4ea6bbad8479e4411af",
-        .n_guards = 2,
-        .guards = mstmm_sweep_planar_pin_factor_guards,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_column_load,
-        .call = mstmm_sweep_planar_pin_column_load_call,
-        .n_inputs = 5,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_column_load_inputs,
-        .outputs = mstmm_sweep_planar_pin_column_load_outputs,
-        .ir_hash = "8a1ff31209cda5444a711e12923fa89ff87b87e92164dcc13752c3efcf2f054d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_acceleration",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_column_acceleration,
-        .call = mstmm_sweep_planar_pin_column_acceleration_call,
-        .n_inputs = 6,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_column_acceleration_inputs,
-        .outputs = mstmm_sweep_planar_pin_column_acceleration_outputs,
-        .ir_hash = "f2197df01c613433aed6d2595a9384b387065dd920f1bc4801d5ecc33aea757d",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "divide",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_divide,
-        .call = mstmm_sweep_planar_pin_divide_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_divide_inputs,
-        .outputs = mstmm_sweep_planar_pin_divide_outputs,
-        .ir_hash = "62ae41f7057b8c243921b1dbe3f5138432e92c52a058f6d4fe80ebd64d7573c0",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "couple",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_couple,
-        .call = mstmm_sweep_planar_pin_couple_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_couple_inputs,
-        .outputs = mstmm_sweep_planar_pin_couple_outputs,
-        .ir_hash = "f4b137d7aab8bf3c7c81b04483050363dc40d8c5aafbda20bcb74569ae84e238",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_known_part",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_add_known_part,
-        .call = mstmm_sweep_planar_pin_add_known_part_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_add_known_part_inputs,
-        .outputs = mstmm_sweep_planar_pin_add_known_part_outputs,
-        .ir_hash = "b76aea48673613afb27c3097d38c07d304d62be327ed59ab8963c76ec6fdeea7",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "add_multiplier_effort",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_add_multiplier_effort,
-        .call = mstmm_sweep_planar_pin_add_multiplier_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_add_multiplier_effort_inputs,
-        .outputs = mstmm_sweep_planar_pin_add_multiplier_effort_outputs,
-        .ir_hash = "e21ecdb2e2be7ad2e47ba4f481942a690b56eb0715b06f8a21fe5112a6798cfe",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "ground_column_load",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_ground_column_load,
-        .call = mstmm_sweep_planar_pin_ground_column_load_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_ground_column_load_inputs,
-        .outputs = mstmm_sweep_planar_pin_ground_column_load_outputs,
-        .ir_hash = "d0a69d4ed2372d42a0d82c10dafc574fb95ab50d1053f02ef4a46bc728dff541",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "relative_pose",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_relative_pose,
-        .call = mstmm_sweep_planar_pin_relative_pose_call,
-        .n_inputs = 7,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_planar_pin_relative_pose_inputs,
-        .outputs = mstmm_sweep_planar_pin_relative_pose_outputs,
-        .ir_hash = "1c7761cd34c7f9127f55b71085fa48552f734c101398fb587e44d0311956fe19",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "slip",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_slip,
-        .call = mstmm_sweep_planar_pin_slip_call,
-        .n_inputs = 7,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_slip_inputs,
-        .outputs = mstmm_sweep_planar_pin_slip_outputs,
-        .ir_hash = "d6c25802bf0c11a5b7a8c2fdbf7134d56934d7327bc4d8f711f9686bcf2ce506",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "drift",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_drift,
-        .call = mstmm_sweep_planar_pin_drift_call,
-        .n_inputs = 6,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_drift_inputs,
-        .outputs = mstmm_sweep_planar_pin_drift_outputs,
-        .ir_hash = "af7c366d6c26a2851428e5fa97e020d82935a78ca6772c38ea1d23f4f75ef8ce",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "row",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_row,
-        .call = mstmm_sweep_planar_pin_row_call,
-        .n_inputs = 5,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_row_inputs,
-        .outputs = mstmm_sweep_planar_pin_row_outputs,
-        .ir_hash = "0f2fb3eaf7412978af4a758c5ad1e16e0b09e7e49010c086aa13981b38c35845",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "known_parts",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_known_parts,
-        .call = mstmm_sweep_planar_pin_known_parts_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_known_parts_inputs,
-        .outputs = mstmm_sweep_planar_pin_known_parts_outputs,
-        .ir_hash = "a6239a278e51b143cddfc2653297de76d5ca09971643bb4e9c6715cf8c4ef310",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "row_acceleration",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_row_acceleration,
-        .call = mstmm_sweep_planar_pin_row_acceleration_call,
-        .n_inputs = 5,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_row_acceleration_inputs,
-        .outputs = mstmm_sweep_planar_pin_row_acceleration_outputs,
-        .ir_hash = "c2483029e4a6a812313d9b2689acbd55409a9bea694504868b96719f9bc21d6f",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "apply_effort",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_apply_effort,
-        .call = mstmm_sweep_planar_pin_apply_effort_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_apply_effort_inputs,
-        .outputs = mstmm_sweep_planar_pin_apply_effort_outputs,
-        .ir_hash = "f36eebe9b3f1e846374b38b05302f5b6cb50399967b199cd78583da39c057fb9",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "eliminate_row",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_eliminate_row,
-        .call = mstmm_sweep_planar_pin_eliminate_row_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_planar_pin_eliminate_row_inputs,
-        .outputs = mstmm_sweep_planar_pin_eliminate_row_outputs,
-        .ir_hash = "e542fd70dd9494e5b7d74b821ec3724b856740469296a4257afc6c1a3fe4ad9e",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "update_column",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_update_column,
-        .call = mstmm_sweep_planar_pin_update_column_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_update_column_inputs,
-        .outputs = mstmm_sweep_planar_pin_update_column_outputs,
-        .ir_hash = "ab09985ff58c32ddebae6cf7302e0c6144d0bdce0ed36bd3023061790c253023",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "multiplier_of_motion",
-        .function = (void (*)(void))mstmm_sweep_planar_pin_multiplier_of_motion,
-        .call = mstmm_sweep_planar_pin_multiplier_of_motion_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_planar_pin_multiplier_of_motion_inputs,
-        .outputs = mstmm_sweep_planar_pin_multiplier_of_motion_outputs,
-        .ir_hash = "1d160be48572d7b1bb7b0d84624b4aa3c5d43060d0a7238663c42de9893fd4ef",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"forward", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_forward), 6, 3, (const mstmm_port[]){{"Rt", 2,
+    "", 0, 0}, {"ro", 2, "m", 0, 0}, {"p", 0, "", 0, 0}, {"q", 1, "", 0, 0}, {"u", 1, "", 0, 0},
+    {"motion_I", 4, "", 0, 0}}, (const mstmm_port[]){{"Rc", 2, "", 0, 0}, {"motion", 4, "", 0, 0},
+    {"qdot", 1, "", 0, 0}}, "4fe2df497e52eee39023ea781e213a2f6e64f01d980f6d424cc8a81bc0328183", 0,
+    NULL},
+  {"inertia", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_inertia), 1, 1, (const mstmm_port[]){{"p", 4,
+    "", 0, 0}}, (const mstmm_port[]){{"S", 6, "", 0, 0}},
+    "f33c6739a0b3a2c12effad23bc6ab03eb0bcc6c0304cd1f9e18721bff777c98a", 0, NULL},
+  {"bias_load", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_bias_load), 2, 1, (const mstmm_port[]){{"p",
+    4, "", 0, 0}, {"motion", 4, "", 0, 0}}, (const mstmm_port[]){{"e", 3, "N, N*m", 0, 0}},
+    "8a92549e439d09debc0673231218c09fe5c2b72539669c6593a0bd278cac3fce", 0, NULL},
+  {"pose", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_pose), 4, 2, (const mstmm_port[]){{"A_I", 2, "",
+    0, 0}, {"x_I", 3, "m", 0, 0}, {"Rc", 2, "", 0, 0}, {"r", 3, "m", 0, 0}}, (const
+    mstmm_port[]){{"A", 2, "", 0, 0}, {"x", 3, "m", 0, 0}},
+    "15441e25bdccadfc80bddf85745a6f2d9654c591959746df1a53f4ec032c4513", 0, NULL},
+  {"velocity", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_velocity), 4, 1, (const mstmm_port[]){{"Rc",
+    2, "", 0, 0}, {"r", 3, "m", 0, 0}, {"v_I", 2, "m/s", 0, 0}, {"w_I", 1, "rad/s", 0, 0}}, (const
+    mstmm_port[]){{"v", 2, "m/s", 0, 0}},
+    "8bad21cfd5ccd918d2743552f7f95b5ce1d209e79ad7878cbe9d2a94b55a3fba", 0, NULL},
+  {"point", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_point), 5, 2, (const mstmm_port[]){{"A", 2, "",
+    0, 0}, {"x", 3, "m", 0, 0}, {"v", 2, "m/s", 0, 0}, {"motion", 4, "", 0, 0}, {"offset", 3, "m",
+    0, 0}}, (const mstmm_port[]){{"x_K", 3, "m", 0, 0}, {"v_K", 3, "m/s", 0, 0}},
+    "da98d789543f1f301bee07b2bc4149bf0b14ca5ec1031d852760ee52227b1b50", 0, NULL},
+  {"angular_motion", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_angular_motion), 2, 1, (const
+    mstmm_port[]){{"A", 2, "", 0, 0}, {"motion", 4, "", 0, 0}}, (const mstmm_port[]){{"w_K", 3,
+    "rad/s", 0, 0}}, "6bc39c666b1040748d6b79fd8b9c18c92f6953af8b69807445187e3d6f972ea6", 0, NULL},
+  {"end_frame", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_end_frame), 2, 1, (const mstmm_port[]){{"A",
+    2, "", 0, 0}, {"R_end", 9, "", 0, 0}}, (const mstmm_port[]){{"A_end", 9, "", 0, 0}},
+    "b0ad8dd79db9e4795b9f6439e8b44db645791dae818796fd7f4f795267a350a6", 0, NULL},
+  {"applied_load", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_applied_load), 5, 1, (const
+    mstmm_port[]){{"A", 2, "", 0, 0}, {"A_F", 9, "", 0, 0}, {"offset", 3, "m", 0, 0}, {"F", 3, "N",
+    0, 0}, {"M", 3, "N*m", 0, 0}}, (const mstmm_port[]){{"e", 3, "N, N*m", 1, 0}},
+    "fa3598d769b505ca4968747269fcc345d33c1349f9cd5f089cd05fd4543ea30e", 0, NULL},
+  {"factor", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_factor), 5, 3, (const mstmm_port[]){{"Rc", 2,
+    "", 0, 0}, {"r", 3, "m", 0, 0}, {"J", 1, "kg*m2 or kg", 0, 0}, {"floor", 1, "kg, kg*m2", 0, 0},
+    {"S", 6, "", 0, 0}}, (const mstmm_port[]){{"F", 1, "", 0, 0}, {"G", 3, "", 0, 0}, {"S_I", 6, "",
+    1, 0}}, "8eb32b8a29cb0e020b28f6c68c790b2a47035b18bcd6c838d1229bdda4d800cf", 2, (const
+    mstmm_guard[]){{1, "pivot 1 of 1 vanishes: a motion of the hinge is undetermined"}, {1,
+    "speed 1 of 1 moves no inertia: its acceleration is undetermined"}}},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_column_load), 5, 2, (const
+    mstmm_port[]){{"Rc", 2, "", 0, 0}, {"r", 3, "m", 0, 0}, {"G", 3, "", 0, 0}, {"e", 3, "N, N*m",
+    0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y", 1, "N, N*m", 0, 0}, {"e_I", 3,
+    "N, N*m", 1, 0}}, "b5c0890cf802748bb1f4bdbd78ad654488ea26ba15109a8d3d44ec7ad73520a5", 0, NULL},
+  {"column_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_column_acceleration), 6, 2, (const
+    mstmm_port[]){{"Rc", 2, "", 0, 0}, {"r", 3, "m", 0, 0}, {"F", 1, "", 0, 0}, {"G", 3, "", 0, 0},
+    {"y", 1, "N, N*m", 0, 0}, {"delta_I", 3, "", 0, 0}}, (const mstmm_port[]){{"udot", 1, "", 0, 0},
+    {"delta", 3, "", 0, 0}}, "aa65f4c5059984812edc247416b5acf6d0eb5cd651ed1de8db9c7da59c7b4fde", 0,
+    NULL},
+  {"divide", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_divide), 2, 1, (const mstmm_port[]){{"F", 1, "",
+    0, 0}, {"y", 1, "", 0, 0}}, (const mstmm_port[]){{"z", 1, "", 0, 0}},
+    "0cfa72441f2fa21f59103133a090b3b3b0fe727b5dff76d6066e8d57a9328b7e", 0, NULL},
+  {"couple", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_couple), 2, 1, (const mstmm_port[]){{"y", 1, "",
+    0, 0}, {"z", 1, "", 0, 0}}, (const mstmm_port[]){{"L_ij", 1, "", 1, 0}},
+    "f8636b09483860c15010fb74c9341d891c8584a84a718726c0108809cc04ab44", 0, NULL},
+  {"add_known_part", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_add_known_part), 2, 1, (const
+    mstmm_port[]){{"y", 1, "", 0, 0}, {"z", 1, "", 0, 0}}, (const mstmm_port[]){{"l", 1, "", 1, 0}},
+    "45deba0d1e1cb749cb92dc9cd4a2d6ae44764c6cd8433af7bf85ab542132b348", 0, NULL},
+  {"add_multiplier_effort", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_add_multiplier_effort), 2, 1,
+    (const mstmm_port[]){{"y", 1, "", 0, 0}, {"x", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y_0",
+    1, "", 1, 0}}, "64e9e963a8d61e332baafdf63efb483a51bc5f9f1065bc9f9f73eceee81f23cd", 0, NULL},
+  {"ground_column_load", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_ground_column_load), 2, 1, (const
+    mstmm_port[]){{"e", 3, "N, N*m", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"y",
+    1, "N, N*m", 0, 0}}, "aade4860b1194a26d121fb13c13121b1bad7552cc2a7295ba7e8c6da03e5b021", 0,
+    NULL},
+  {"relative_pose", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_relative_pose), 7, 3, (const
+    mstmm_port[]){{"A_C", 2, "", 0, 0}, {"x_C", 3, "m", 0, 0}, {"A_B", 2, "", 0, 0}, {"x_B", 3, "m",
+    0, 0}, {"r_e", 2, "m", 0, 0}, {"Rc", 2, "", 0, 0}, {"r", 3, "m", 0, 0}}, (const
+    mstmm_port[]){{"R_C", 2, "", 0, 0}, {"r_A", 2, "m", 0, 0}, {"d", 2, "m", 0, 0}},
+    "d0676a5a131baa08994b14b5f8e995033c6a7bee6c8dc2f682571be7e0b21b03", 0, NULL},
+  {"slip", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_slip), 7, 1, (const mstmm_port[]){{"R_C", 2, "",
+    0, 0}, {"r_e", 2, "m", 0, 0}, {"d", 2, "m", 0, 0}, {"v_C", 2, "m/s", 0, 0}, {"w_C", 1, "rad/s",
+    0, 0}, {"v_B", 2, "m/s", 0, 0}, {"w_B", 1, "rad/s", 0, 0}}, (const mstmm_port[]){{"slip", 3, "",
+    0, 0}}, "b875e3d0d21099674aaed996c7659eb718bcb967513a47f35154c0825e1714b9", 0, NULL},
+  {"drift", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_drift), 6, 1, (const mstmm_port[]){{"R_C", 2, "",
+    0, 0}, {"r_e", 2, "m", 0, 0}, {"d", 2, "m", 0, 0}, {"slip", 3, "", 0, 0}, {"motion_C", 4, "", 0,
+    0}, {"motion_B", 4, "", 0, 0}}, (const mstmm_port[]){{"drift", 3, "", 0, 0}},
+    "2803748074d5877f363c7a74950add5b492f73ad8f087da90dc429e70e80f94f", 0, NULL},
+  {"row", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_row), 5, 2, (const mstmm_port[]){{"w", 3, "", 0,
+    0}, {"R_C", 2, "", 0, 0}, {"r_e", 2, "m", 0, 0}, {"Rc", 2, "", 0, 0}, {"r_A", 2, "m", 0, 0}},
+    (const mstmm_port[]){{"J_A", 3, "", 0, 0}, {"J_B", 3, "", 0, 0}},
+    "d022599d3b608687145743a2a7cd43e97be016792312d815f9cb24b68fcc2c8c", 0, NULL},
+  {"known_parts", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_known_parts), 2, 1, (const
+    mstmm_port[]){{"W", 18, "", 0, 0}, {"relative", 3, "", 0, 0}}, (const mstmm_port[]){{"l", 6, "",
+    0, 0}}, "109e066cf1b7613d62fbd81f58e8f2d5f42b2af0a420e95b1c56d080ffb7a604", 0, NULL},
+  {"row_acceleration", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_row_acceleration), 5, 1, (const
+    mstmm_port[]){{"J_A", 3, "", 0, 0}, {"J_B", 3, "", 0, 0}, {"l", 1, "", 0, 0}, {"delta_A", 3, "",
+    0, 0}, {"delta_B", 3, "", 0, 0}}, (const mstmm_port[]){{"c", 1, "", 0, 0}},
+    "67c9103ba5cf1c3ad4895a82ba889358d738d5054f2c58c58471a41ed43b7002", 0, NULL},
+  {"apply_effort", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_apply_effort), 2, 1, (const
+    mstmm_port[]){{"J", 3, "", 0, 0}, {"tau", 1, "N, N*m", 0, 0}}, (const mstmm_port[]){{"e", 3,
+    "N, N*m", 1, 0}}, "e3a82355195c04a96a22444c6a409dde8b45bb4b5b98cc9516cc232f17823784", 0, NULL},
+  {"eliminate_row", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_eliminate_row), 3, 2, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"K", 3, "", 0, 0}, {"l", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"S", 6, "", 1, 0}, {"e", 3, "", 1, 0}},
+    "49ce02d1ad91480b20ec1561ccf3ff141ad5b5046a9f0948736252a424d24236", 0, NULL},
+  {"update_column", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_update_column), 3, 1, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 0}, {"K", 3, "", 0, 0}, {"L_p", 1, "", 0, 0}}, (const
+    mstmm_port[]){{"K_p", 3, "", 1, 0}},
+    "76ed931e11c382101be2c8d97fad502a8e6ecf27e43bdc8fc770966b9db06a8b", 0, NULL},
+  {"multiplier_of_motion", MSTMM_FUNCTIONS(mstmm_sweep_planar_pin_multiplier_of_motion), 3, 1,
+    (const mstmm_port[]){{"inverse", 1, "", 0, 0}, {"K", 3, "", 0, 0}, {"delta", 3, "", 0, 0}},
+    (const mstmm_port[]){{"x", 1, "", 1, 0}},
+    "b5d80d7c80f06f3b15876a9a20b6807812b144f4281c97d35f32d9c1b5419b9d", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_planar_pin = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "planar_pin",
-    .hash = "d64ad7a1caabbf6dcaaf36bdb7bcb7fcd4c3a5bacdcf71e1a1310de357b1a9c1",
+    .hash = "cd93f9f089f0c2ad5e6a98dcef319cea527f7dbb76ee6280a6d94a9b678f6905",
     .nq = 0,
     .nu = 0,
     .np = 0,

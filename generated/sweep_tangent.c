@@ -7,44 +7,6 @@
 
 #include "mstmm.h"
 
-extern const mstmm_element mstmm_sweep_tangent;
-int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
-    real *restrict inverse, real *restrict work);
-int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
-    const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
-    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
-int mstmm_sweep_tangent_assemble_port(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
-    const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
-    real *restrict Z_z, real *restrict Z_x);
-int mstmm_sweep_tangent_column_load(int n, const real *restrict H, const real *restrict V,
-    const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
-    real *restrict y, real *restrict e_c, real *restrict work);
-int mstmm_sweep_tangent_column_solution(int n, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z);
-int mstmm_sweep_tangent_port_motion(int n, const real *restrict B, const real *restrict x,
-    const real *restrict z_c, real *restrict z);
-int mstmm_sweep_tangent_increment_matrix(int n, const real *restrict sq, const real *restrict kappa,
-    const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
-    real *restrict work);
-int mstmm_sweep_tangent_coordinate_increment(int n, const real *restrict Q,
-    const real *restrict rate, real *restrict dq);
-int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
-    real *restrict Z_p);
-int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
-    const real *restrict Z_p, real *restrict K, real *restrict Z_x);
-int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const real *restrict Z_p,
-    const real *restrict V, real *restrict gain, real *restrict S_p);
-int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
-    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
-    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work);
-int mstmm_sweep_tangent_placed_port(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
-    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x);
-int mstmm_sweep_tangent_placed_remainder(int n, const real *restrict gain, const real *restrict p,
-    real *restrict y);
-
 #ifndef MSTMM_SOLVE_LU
 #define MSTMM_SOLVE_LU
 /* x = a^-1 b by LU with row exchange; a is n x n, b and x are n x m.  `work` (n x n) keeps the factors,
@@ -112,47 +74,27 @@ int mstmm_solve_lu(
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_invert_sized(int n, const real *restrict D, const real *restrict one,
-    real *restrict inverse, real *restrict work)
+int mstmm_sweep_tangent_invert_sized(int n, in_t D, in_t one, out_t inverse, out_t work)
 {
-    /* a pivot of D vanishes: a motion is undetermined */
-    const int found_inverse = mstmm_solve_lu(n, n, D, one, inverse, work, 1e-13);
-    if (found_inverse == 1) return 1;
-    if (found_inverse) return 2; /* a negative determinant */
-    return 0;
+  /* a pivot of D vanishes: a motion is undetermined */
+  const int found_inverse = mstmm_solve_lu(n, n, D, one, inverse, work, 1e-13);
+  if (found_inverse == 1) return 1;
+  if (found_inverse) return 2; /* a negative determinant */
+  return 0;
 }
 
-int mstmm_sweep_tangent_invert(int n, const real *restrict D, const real *restrict one,
-    real *restrict inverse, real *restrict work)
+int mstmm_sweep_tangent_invert(int n, in_t D, in_t one, out_t inverse, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_invert_sized(1, D, one, inverse, work);
-    case 2: return mstmm_sweep_tangent_invert_sized(2, D, one, inverse, work);
-    case 3: return mstmm_sweep_tangent_invert_sized(3, D, one, inverse, work);
-    case 4: return mstmm_sweep_tangent_invert_sized(4, D, one, inverse, work);
-    default: return mstmm_sweep_tangent_invert_sized(n, D, one, inverse, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_invert_sized(1, D, one, inverse, work);
+  case 2: return mstmm_sweep_tangent_invert_sized(2, D, one, inverse, work);
+  case 3: return mstmm_sweep_tangent_invert_sized(3, D, one, inverse, work);
+  case 4: return mstmm_sweep_tangent_invert_sized(4, D, one, inverse, work);
+  default: return mstmm_sweep_tangent_invert_sized(n, D, one, inverse, work);
+  }
 }
 
-static int mstmm_sweep_tangent_invert_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_invert(n, in[0], in[1], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_invert_inputs[] = {
-    {"D", 1, "", 0, 2},
-    {"one", 1, "", 0, 2},
-};
-
-static const mstmm_port mstmm_sweep_tangent_invert_outputs[] = {
-    {"inverse", 1, "", 0, 2},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_tangent_invert_guards[] = {
-    {1, "a pivot of D vanishes: a motion is undetermined"},
-    {2, "the determinant is negative; all results are there"},
-};
+MSTMM_CALL(mstmm_sweep_tangent_invert, (n, in[0], in[1], out[0], out[1]))
 
 /* unknowns of a flexible body eliminated
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -173,850 +115,389 @@ static const mstmm_guard mstmm_sweep_tangent_invert_guards[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_node_sized(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
-    const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
-    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
+int mstmm_sweep_tangent_node_sized(int n, in_t H, in_t B, in_t G, in_t W, in_t S, in_t K, in_t Z_z,
+    in_t Z_x, out_t V, out_t D, out_t right, out_t gain, out_t S_c, out_t work)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S[0] * B[9 * k];
-        const real t1 = S[6] * B[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = S[12] * B[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = S[18] * B[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = S[24] * B[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = S[30] * B[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = S[36] * B[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = S[42] * B[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = S[48] * B[9 * k + 8];
-        const real t16 = t14 + t15;
-        const real t17 = t16 + K[6 * k];
-        const real t18 = t17 + G[6 * k];
-        V[k] = t18;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t19 = S[1] * B[9 * k];
-        const real t20 = S[7] * B[9 * k + 1];
-        const real t21 = t19 + t20;
-        const real t22 = S[13] * B[9 * k + 2];
-        const real t23 = t21 + t22;
-        const real t24 = S[19] * B[9 * k + 3];
-        const real t25 = t23 + t24;
-        const real t26 = S[25] * B[9 * k + 4];
-        const real t27 = t25 + t26;
-        const real t28 = S[31] * B[9 * k + 5];
-        const real t29 = t27 + t28;
-        const real t30 = S[37] * B[9 * k + 6];
-        const real t31 = t29 + t30;
-        const real t32 = S[43] * B[9 * k + 7];
-        const real t33 = t31 + t32;
-        const real t34 = S[49] * B[9 * k + 8];
-        const real t35 = t33 + t34;
-        const real t36 = t35 + K[6 * k + 1];
-        const real t37 = t36 + G[6 * k + 1];
-        V[n + k] = t37;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t38 = S[2] * B[9 * k];
-        const real t39 = S[8] * B[9 * k + 1];
-        const real t40 = t38 + t39;
-        const real t41 = S[14] * B[9 * k + 2];
-        const real t42 = t40 + t41;
-        const real t43 = S[20] * B[9 * k + 3];
-        const real t44 = t42 + t43;
-        const real t45 = S[26] * B[9 * k + 4];
-        const real t46 = t44 + t45;
-        const real t47 = S[32] * B[9 * k + 5];
-        const real t48 = t46 + t47;
-        const real t49 = S[38] * B[9 * k + 6];
-        const real t50 = t48 + t49;
-        const real t51 = S[44] * B[9 * k + 7];
-        const real t52 = t50 + t51;
-        const real t53 = S[50] * B[9 * k + 8];
-        const real t54 = t52 + t53;
-        const real t55 = t54 + K[6 * k + 2];
-        const real t56 = t55 + G[6 * k + 2];
-        V[2 * n + k] = t56;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t57 = S[3] * B[9 * k];
-        const real t58 = S[9] * B[9 * k + 1];
-        const real t59 = t57 + t58;
-        const real t60 = S[15] * B[9 * k + 2];
-        const real t61 = t59 + t60;
-        const real t62 = S[21] * B[9 * k + 3];
-        const real t63 = t61 + t62;
-        const real t64 = S[27] * B[9 * k + 4];
-        const real t65 = t63 + t64;
-        const real t66 = S[33] * B[9 * k + 5];
-        const real t67 = t65 + t66;
-        const real t68 = S[39] * B[9 * k + 6];
-        const real t69 = t67 + t68;
-        const real t70 = S[45] * B[9 * k + 7];
-        const real t71 = t69 + t70;
-        const real t72 = S[51] * B[9 * k + 8];
-        const real t73 = t71 + t72;
-        const real t74 = t73 + K[6 * k + 3];
-        const real t75 = t74 + G[6 * k + 3];
-        V[3 * n + k] = t75;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t76 = S[4] * B[9 * k];
-        const real t77 = S[10] * B[9 * k + 1];
-        const real t78 = t76 + t77;
-        const real t79 = S[16] * B[9 * k + 2];
-        const real t80 = t78 + t79;
-        const real t81 = S[22] * B[9 * k + 3];
-        const real t82 = t80 + t81;
-        const real t83 = S[28] * B[9 * k + 4];
-        const real t84 = t82 + t83;
-        const real t85 = S[34] * B[9 * k + 5];
-        const real t86 = t84 + t85;
-        const real t87 = S[40] * B[9 * k + 6];
-        const real t88 = t86 + t87;
-        const real t89 = S[46] * B[9 * k + 7];
-        const real t90 = t88 + t89;
-        const real t91 = S[52] * B[9 * k + 8];
-        const real t92 = t90 + t91;
-        const real t93 = t92 + K[6 * k + 4];
-        const real t94 = t93 + G[6 * k + 4];
-        V[4 * n + k] = t94;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t95 = S[5] * B[9 * k];
-        const real t96 = S[11] * B[9 * k + 1];
-        const real t97 = t95 + t96;
-        const real t98 = S[17] * B[9 * k + 2];
-        const real t99 = t97 + t98;
-        const real t100 = S[23] * B[9 * k + 3];
-        const real t101 = t99 + t100;
-        const real t102 = S[29] * B[9 * k + 4];
-        const real t103 = t101 + t102;
-        const real t104 = S[35] * B[9 * k + 5];
-        const real t105 = t103 + t104;
-        const real t106 = S[41] * B[9 * k + 6];
-        const real t107 = t105 + t106;
-        const real t108 = S[47] * B[9 * k + 7];
-        const real t109 = t107 + t108;
-        const real t110 = S[53] * B[9 * k + 8];
-        const real t111 = t109 + t110;
-        const real t112 = t111 + K[6 * k + 5];
-        const real t113 = t112 + G[6 * k + 5];
-        V[5 * n + k] = t113;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t114 = S[0] * B[9 * l];
-            const real t115 = S[6] * B[9 * l + 1];
-            const real t116 = t114 + t115;
-            const real t117 = S[12] * B[9 * l + 2];
-            const real t118 = t116 + t117;
-            const real t119 = S[18] * B[9 * l + 3];
-            const real t120 = t118 + t119;
-            const real t121 = S[24] * B[9 * l + 4];
-            const real t122 = t120 + t121;
-            const real t123 = S[30] * B[9 * l + 5];
-            const real t124 = t122 + t123;
-            const real t125 = S[36] * B[9 * l + 6];
-            const real t126 = t124 + t125;
-            const real t127 = S[42] * B[9 * l + 7];
-            const real t128 = t126 + t127;
-            const real t129 = S[48] * B[9 * l + 8];
-            const real t130 = t128 + t129;
-            const real t131 = t130 + K[6 * l];
-            const real t132 = H[k] * t131;
-            const real t133 = S[1] * B[9 * l];
-            const real t134 = S[7] * B[9 * l + 1];
-            const real t135 = t133 + t134;
-            const real t136 = S[13] * B[9 * l + 2];
-            const real t137 = t135 + t136;
-            const real t138 = S[19] * B[9 * l + 3];
-            const real t139 = t137 + t138;
-            const real t140 = S[25] * B[9 * l + 4];
-            const real t141 = t139 + t140;
-            const real t142 = S[31] * B[9 * l + 5];
-            const real t143 = t141 + t142;
-            const real t144 = S[37] * B[9 * l + 6];
-            const real t145 = t143 + t144;
-            const real t146 = S[43] * B[9 * l + 7];
-            const real t147 = t145 + t146;
-            const real t148 = S[49] * B[9 * l + 8];
-            const real t149 = t147 + t148;
-            const real t150 = t149 + K[6 * l + 1];
-            const real t151 = H[n + k] * t150;
-            const real t152 = t132 + t151;
-            const real t153 = S[2] * B[9 * l];
-            const real t154 = S[8] * B[9 * l + 1];
-            const real t155 = t153 + t154;
-            const real t156 = S[14] * B[9 * l + 2];
-            const real t157 = t155 + t156;
-            const real t158 = S[20] * B[9 * l + 3];
-            const real t159 = t157 + t158;
-            const real t160 = S[26] * B[9 * l + 4];
-            const real t161 = t159 + t160;
-            const real t162 = S[32] * B[9 * l + 5];
-            const real t163 = t161 + t162;
-            const real t164 = S[38] * B[9 * l + 6];
-            const real t165 = t163 + t164;
-            const real t166 = S[44] * B[9 * l + 7];
-            const real t167 = t165 + t166;
-            const real t168 = S[50] * B[9 * l + 8];
-            const real t169 = t167 + t168;
-            const real t170 = t169 + K[6 * l + 2];
-            const real t171 = H[2 * n + k] * t170;
-            const real t172 = t152 + t171;
-            const real t173 = S[3] * B[9 * l];
-            const real t174 = S[9] * B[9 * l + 1];
-            const real t175 = t173 + t174;
-            const real t176 = S[15] * B[9 * l + 2];
-            const real t177 = t175 + t176;
-            const real t178 = S[21] * B[9 * l + 3];
-            const real t179 = t177 + t178;
-            const real t180 = S[27] * B[9 * l + 4];
-            const real t181 = t179 + t180;
-            const real t182 = S[33] * B[9 * l + 5];
-            const real t183 = t181 + t182;
-            const real t184 = S[39] * B[9 * l + 6];
-            const real t185 = t183 + t184;
-            const real t186 = S[45] * B[9 * l + 7];
-            const real t187 = t185 + t186;
-            const real t188 = S[51] * B[9 * l + 8];
-            const real t189 = t187 + t188;
-            const real t190 = t189 + K[6 * l + 3];
-            const real t191 = H[3 * n + k] * t190;
-            const real t192 = t172 + t191;
-            const real t193 = S[4] * B[9 * l];
-            const real t194 = S[10] * B[9 * l + 1];
-            const real t195 = t193 + t194;
-            const real t196 = S[16] * B[9 * l + 2];
-            const real t197 = t195 + t196;
-            const real t198 = S[22] * B[9 * l + 3];
-            const real t199 = t197 + t198;
-            const real t200 = S[28] * B[9 * l + 4];
-            const real t201 = t199 + t200;
-            const real t202 = S[34] * B[9 * l + 5];
-            const real t203 = t201 + t202;
-            const real t204 = S[40] * B[9 * l + 6];
-            const real t205 = t203 + t204;
-            const real t206 = S[46] * B[9 * l + 7];
-            const real t207 = t205 + t206;
-            const real t208 = S[52] * B[9 * l + 8];
-            const real t209 = t207 + t208;
-            const real t210 = t209 + K[6 * l + 4];
-            const real t211 = H[4 * n + k] * t210;
-            const real t212 = t192 + t211;
-            const real t213 = S[5] * B[9 * l];
-            const real t214 = S[11] * B[9 * l + 1];
-            const real t215 = t213 + t214;
-            const real t216 = S[17] * B[9 * l + 2];
-            const real t217 = t215 + t216;
-            const real t218 = S[23] * B[9 * l + 3];
-            const real t219 = t217 + t218;
-            const real t220 = S[29] * B[9 * l + 4];
-            const real t221 = t219 + t220;
-            const real t222 = S[35] * B[9 * l + 5];
-            const real t223 = t221 + t222;
-            const real t224 = S[41] * B[9 * l + 6];
-            const real t225 = t223 + t224;
-            const real t226 = S[47] * B[9 * l + 7];
-            const real t227 = t225 + t226;
-            const real t228 = S[53] * B[9 * l + 8];
-            const real t229 = t227 + t228;
-            const real t230 = t229 + K[6 * l + 5];
-            const real t231 = H[5 * n + k] * t230;
-            const real t232 = t212 + t231;
-            const real t233 = B[9 * l] * Z_z[k];
-            const real t234 = B[9 * l + 1] * Z_z[n + k];
-            const real t235 = t233 + t234;
-            const real t236 = B[9 * l + 2] * Z_z[2 * n + k];
-            const real t237 = t235 + t236;
-            const real t238 = B[9 * l + 3] * Z_z[3 * n + k];
-            const real t239 = t237 + t238;
-            const real t240 = B[9 * l + 4] * Z_z[4 * n + k];
-            const real t241 = t239 + t240;
-            const real t242 = B[9 * l + 5] * Z_z[5 * n + k];
-            const real t243 = t241 + t242;
-            const real t244 = B[9 * l + 6] * Z_z[6 * n + k];
-            const real t245 = t243 + t244;
-            const real t246 = B[9 * l + 7] * Z_z[7 * n + k];
-            const real t247 = t245 + t246;
-            const real t248 = B[9 * l + 8] * Z_z[8 * n + k];
-            const real t249 = t247 + t248;
-            const real t250 = t232 + t249;
-            const real t251 = W[n * l + k] + t250;
-            const real t252 = Z_x[n * l + k] + t251;
-            D[n * k + l] = t252;
-        }
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t253 = S[0] * H[k];
-        const real t254 = S[1] * H[n + k];
-        const real t255 = t253 + t254;
-        const real t256 = S[2] * H[2 * n + k];
-        const real t257 = t255 + t256;
-        const real t258 = S[3] * H[3 * n + k];
-        const real t259 = t257 + t258;
-        const real t260 = S[4] * H[4 * n + k];
-        const real t261 = t259 + t260;
-        const real t262 = S[5] * H[5 * n + k];
-        const real t263 = t261 + t262;
-        const real t264 = Z_z[k] + t263;
-        right[9 * k] = t264;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t265 = S[6] * H[k];
-        const real t266 = S[7] * H[n + k];
-        const real t267 = t265 + t266;
-        const real t268 = S[8] * H[2 * n + k];
-        const real t269 = t267 + t268;
-        const real t270 = S[9] * H[3 * n + k];
-        const real t271 = t269 + t270;
-        const real t272 = S[10] * H[4 * n + k];
-        const real t273 = t271 + t272;
-        const real t274 = S[11] * H[5 * n + k];
-        const real t275 = t273 + t274;
-        const real t276 = Z_z[n + k] + t275;
-        right[9 * k + 1] = t276;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t277 = S[12] * H[k];
-        const real t278 = S[13] * H[n + k];
-        const real t279 = t277 + t278;
-        const real t280 = S[14] * H[2 * n + k];
-        const real t281 = t279 + t280;
-        const real t282 = S[15] * H[3 * n + k];
-        const real t283 = t281 + t282;
-        const real t284 = S[16] * H[4 * n + k];
-        const real t285 = t283 + t284;
-        const real t286 = S[17] * H[5 * n + k];
-        const real t287 = t285 + t286;
-        const real t288 = Z_z[2 * n + k] + t287;
-        right[9 * k + 2] = t288;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t289 = S[18] * H[k];
-        const real t290 = S[19] * H[n + k];
-        const real t291 = t289 + t290;
-        const real t292 = S[20] * H[2 * n + k];
-        const real t293 = t291 + t292;
-        const real t294 = S[21] * H[3 * n + k];
-        const real t295 = t293 + t294;
-        const real t296 = S[22] * H[4 * n + k];
-        const real t297 = t295 + t296;
-        const real t298 = S[23] * H[5 * n + k];
-        const real t299 = t297 + t298;
-        const real t300 = Z_z[3 * n + k] + t299;
-        right[9 * k + 3] = t300;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t301 = S[24] * H[k];
-        const real t302 = S[25] * H[n + k];
-        const real t303 = t301 + t302;
-        const real t304 = S[26] * H[2 * n + k];
-        const real t305 = t303 + t304;
-        const real t306 = S[27] * H[3 * n + k];
-        const real t307 = t305 + t306;
-        const real t308 = S[28] * H[4 * n + k];
-        const real t309 = t307 + t308;
-        const real t310 = S[29] * H[5 * n + k];
-        const real t311 = t309 + t310;
-        const real t312 = Z_z[4 * n + k] + t311;
-        right[9 * k + 4] = t312;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t313 = S[30] * H[k];
-        const real t314 = S[31] * H[n + k];
-        const real t315 = t313 + t314;
-        const real t316 = S[32] * H[2 * n + k];
-        const real t317 = t315 + t316;
-        const real t318 = S[33] * H[3 * n + k];
-        const real t319 = t317 + t318;
-        const real t320 = S[34] * H[4 * n + k];
-        const real t321 = t319 + t320;
-        const real t322 = S[35] * H[5 * n + k];
-        const real t323 = t321 + t322;
-        const real t324 = Z_z[5 * n + k] + t323;
-        right[9 * k + 5] = t324;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t325 = S[36] * H[k];
-        const real t326 = S[37] * H[n + k];
-        const real t327 = t325 + t326;
-        const real t328 = S[38] * H[2 * n + k];
-        const real t329 = t327 + t328;
-        const real t330 = S[39] * H[3 * n + k];
-        const real t331 = t329 + t330;
-        const real t332 = S[40] * H[4 * n + k];
-        const real t333 = t331 + t332;
-        const real t334 = S[41] * H[5 * n + k];
-        const real t335 = t333 + t334;
-        const real t336 = Z_z[6 * n + k] + t335;
-        right[9 * k + 6] = t336;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t337 = S[42] * H[k];
-        const real t338 = S[43] * H[n + k];
-        const real t339 = t337 + t338;
-        const real t340 = S[44] * H[2 * n + k];
-        const real t341 = t339 + t340;
-        const real t342 = S[45] * H[3 * n + k];
-        const real t343 = t341 + t342;
-        const real t344 = S[46] * H[4 * n + k];
-        const real t345 = t343 + t344;
-        const real t346 = S[47] * H[5 * n + k];
-        const real t347 = t345 + t346;
-        const real t348 = Z_z[7 * n + k] + t347;
-        right[9 * k + 7] = t348;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t349 = S[48] * H[k];
-        const real t350 = S[49] * H[n + k];
-        const real t351 = t349 + t350;
-        const real t352 = S[50] * H[2 * n + k];
-        const real t353 = t351 + t352;
-        const real t354 = S[51] * H[3 * n + k];
-        const real t355 = t353 + t354;
-        const real t356 = S[52] * H[4 * n + k];
-        const real t357 = t355 + t356;
-        const real t358 = S[53] * H[5 * n + k];
-        const real t359 = t357 + t358;
-        const real t360 = Z_z[8 * n + k] + t359;
-        right[9 * k + 8] = t360;
-    }
-    /* a pivot of D vanishes: a motion is undetermined */
-    const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
-    if (found_gain == 1) return 1;
-    real t362 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t361 = gain[9 * k] * V[k];
-        t362 += t361;
-    }
-    const real t363 = S[0] - t362;
-    S_c[0] = t363;
-    real t365 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t364 = gain[9 * k] * V[n + k];
-        t365 += t364;
-    }
-    const real t366 = S[1] - t365;
-    S_c[1] = t366;
-    real t368 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t367 = gain[9 * k] * V[2 * n + k];
-        t368 += t367;
-    }
-    const real t369 = S[2] - t368;
-    S_c[2] = t369;
-    real t371 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t370 = gain[9 * k] * V[3 * n + k];
-        t371 += t370;
-    }
-    const real t372 = S[3] - t371;
-    S_c[3] = t372;
-    real t374 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t373 = gain[9 * k] * V[4 * n + k];
-        t374 += t373;
-    }
-    const real t375 = S[4] - t374;
-    S_c[4] = t375;
-    real t377 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t376 = gain[9 * k] * V[5 * n + k];
-        t377 += t376;
-    }
-    const real t378 = S[5] - t377;
-    S_c[5] = t378;
-    real t380 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t379 = V[k] * gain[9 * k + 1];
-        t380 += t379;
-    }
-    const real t381 = S[6] - t380;
-    S_c[6] = t381;
-    real t383 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t382 = V[n + k] * gain[9 * k + 1];
-        t383 += t382;
-    }
-    const real t384 = S[7] - t383;
-    S_c[7] = t384;
-    real t386 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t385 = V[2 * n + k] * gain[9 * k + 1];
-        t386 += t385;
-    }
-    const real t387 = S[8] - t386;
-    S_c[8] = t387;
-    real t389 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t388 = V[3 * n + k] * gain[9 * k + 1];
-        t389 += t388;
-    }
-    const real t390 = S[9] - t389;
-    S_c[9] = t390;
-    real t392 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t391 = V[4 * n + k] * gain[9 * k + 1];
-        t392 += t391;
-    }
-    const real t393 = S[10] - t392;
-    S_c[10] = t393;
-    real t395 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t394 = V[5 * n + k] * gain[9 * k + 1];
-        t395 += t394;
-    }
-    const real t396 = S[11] - t395;
-    S_c[11] = t396;
-    real t398 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t397 = V[k] * gain[9 * k + 2];
-        t398 += t397;
-    }
-    const real t399 = S[12] - t398;
-    S_c[12] = t399;
-    real t401 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t400 = V[n + k] * gain[9 * k + 2];
-        t401 += t400;
-    }
-    const real t402 = S[13] - t401;
-    S_c[13] = t402;
-    real t404 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t403 = V[2 * n + k] * gain[9 * k + 2];
-        t404 += t403;
-    }
-    const real t405 = S[14] - t404;
-    S_c[14] = t405;
-    real t407 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t406 = V[3 * n + k] * gain[9 * k + 2];
-        t407 += t406;
-    }
-    const real t408 = S[15] - t407;
-    S_c[15] = t408;
-    real t410 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t409 = V[4 * n + k] * gain[9 * k + 2];
-        t410 += t409;
-    }
-    const real t411 = S[16] - t410;
-    S_c[16] = t411;
-    real t413 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t412 = V[5 * n + k] * gain[9 * k + 2];
-        t413 += t412;
-    }
-    const real t414 = S[17] - t413;
-    S_c[17] = t414;
-    real t416 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t415 = V[k] * gain[9 * k + 3];
-        t416 += t415;
-    }
-    const real t417 = S[18] - t416;
-    S_c[18] = t417;
-    real t419 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t418 = V[n + k] * gain[9 * k + 3];
-        t419 += t418;
-    }
-    const real t420 = S[19] - t419;
-    S_c[19] = t420;
-    real t422 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t421 = V[2 * n + k] * gain[9 * k + 3];
-        t422 += t421;
-    }
-    const real t423 = S[20] - t422;
-    S_c[20] = t423;
-    real t425 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t424 = V[3 * n + k] * gain[9 * k + 3];
-        t425 += t424;
-    }
-    const real t426 = S[21] - t425;
-    S_c[21] = t426;
-    real t428 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t427 = V[4 * n + k] * gain[9 * k + 3];
-        t428 += t427;
-    }
-    const real t429 = S[22] - t428;
-    S_c[22] = t429;
-    real t431 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t430 = V[5 * n + k] * gain[9 * k + 3];
-        t431 += t430;
-    }
-    const real t432 = S[23] - t431;
-    S_c[23] = t432;
-    real t434 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t433 = V[k] * gain[9 * k + 4];
-        t434 += t433;
-    }
-    const real t435 = S[24] - t434;
-    S_c[24] = t435;
-    real t437 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t436 = V[n + k] * gain[9 * k + 4];
-        t437 += t436;
-    }
-    const real t438 = S[25] - t437;
-    S_c[25] = t438;
-    real t440 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t439 = V[2 * n + k] * gain[9 * k + 4];
-        t440 += t439;
-    }
-    const real t441 = S[26] - t440;
-    S_c[26] = t441;
-    real t443 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t442 = V[3 * n + k] * gain[9 * k + 4];
-        t443 += t442;
-    }
-    const real t444 = S[27] - t443;
-    S_c[27] = t444;
-    real t446 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t445 = V[4 * n + k] * gain[9 * k + 4];
-        t446 += t445;
-    }
-    const real t447 = S[28] - t446;
-    S_c[28] = t447;
-    real t449 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t448 = V[5 * n + k] * gain[9 * k + 4];
-        t449 += t448;
-    }
-    const real t450 = S[29] - t449;
-    S_c[29] = t450;
-    real t452 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t451 = V[k] * gain[9 * k + 5];
-        t452 += t451;
-    }
-    const real t453 = S[30] - t452;
-    S_c[30] = t453;
-    real t455 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t454 = V[n + k] * gain[9 * k + 5];
-        t455 += t454;
-    }
-    const real t456 = S[31] - t455;
-    S_c[31] = t456;
-    real t458 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t457 = V[2 * n + k] * gain[9 * k + 5];
-        t458 += t457;
-    }
-    const real t459 = S[32] - t458;
-    S_c[32] = t459;
-    real t461 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t460 = V[3 * n + k] * gain[9 * k + 5];
-        t461 += t460;
-    }
-    const real t462 = S[33] - t461;
-    S_c[33] = t462;
-    real t464 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t463 = V[4 * n + k] * gain[9 * k + 5];
-        t464 += t463;
-    }
-    const real t465 = S[34] - t464;
-    S_c[34] = t465;
-    real t467 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t466 = V[5 * n + k] * gain[9 * k + 5];
-        t467 += t466;
-    }
-    const real t468 = S[35] - t467;
-    S_c[35] = t468;
-    real t470 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t469 = V[k] * gain[9 * k + 6];
-        t470 += t469;
-    }
-    const real t471 = S[36] - t470;
-    S_c[36] = t471;
-    real t473 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t472 = V[n + k] * gain[9 * k + 6];
-        t473 += t472;
-    }
-    const real t474 = S[37] - t473;
-    S_c[37] = t474;
-    real t476 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t475 = V[2 * n + k] * gain[9 * k + 6];
-        t476 += t475;
-    }
-    const real t477 = S[38] - t476;
-    S_c[38] = t477;
-    real t479 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t478 = V[3 * n + k] * gain[9 * k + 6];
-        t479 += t478;
-    }
-    const real t480 = S[39] - t479;
-    S_c[39] = t480;
-    real t482 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t481 = V[4 * n + k] * gain[9 * k + 6];
-        t482 += t481;
-    }
-    const real t483 = S[40] - t482;
-    S_c[40] = t483;
-    real t485 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t484 = V[5 * n + k] * gain[9 * k + 6];
-        t485 += t484;
-    }
-    const real t486 = S[41] - t485;
-    S_c[41] = t486;
-    real t488 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t487 = V[k] * gain[9 * k + 7];
-        t488 += t487;
-    }
-    const real t489 = S[42] - t488;
-    S_c[42] = t489;
-    real t491 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t490 = V[n + k] * gain[9 * k + 7];
-        t491 += t490;
-    }
-    const real t492 = S[43] - t491;
-    S_c[43] = t492;
-    real t494 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t493 = V[2 * n + k] * gain[9 * k + 7];
-        t494 += t493;
-    }
-    const real t495 = S[44] - t494;
-    S_c[44] = t495;
-    real t497 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t496 = V[3 * n + k] * gain[9 * k + 7];
-        t497 += t496;
-    }
-    const real t498 = S[45] - t497;
-    S_c[45] = t498;
-    real t500 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t499 = V[4 * n + k] * gain[9 * k + 7];
-        t500 += t499;
-    }
-    const real t501 = S[46] - t500;
-    S_c[46] = t501;
-    real t503 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t502 = V[5 * n + k] * gain[9 * k + 7];
-        t503 += t502;
-    }
-    const real t504 = S[47] - t503;
-    S_c[47] = t504;
-    real t506 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t505 = V[k] * gain[9 * k + 8];
-        t506 += t505;
-    }
-    const real t507 = S[48] - t506;
-    S_c[48] = t507;
-    real t509 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t508 = V[n + k] * gain[9 * k + 8];
-        t509 += t508;
-    }
-    const real t510 = S[49] - t509;
-    S_c[49] = t510;
-    real t512 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t511 = V[2 * n + k] * gain[9 * k + 8];
-        t512 += t511;
-    }
-    const real t513 = S[50] - t512;
-    S_c[50] = t513;
-    real t515 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t514 = V[3 * n + k] * gain[9 * k + 8];
-        t515 += t514;
-    }
-    const real t516 = S[51] - t515;
-    S_c[51] = t516;
-    real t518 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t517 = V[4 * n + k] * gain[9 * k + 8];
-        t518 += t517;
-    }
-    const real t519 = S[52] - t518;
-    S_c[52] = t519;
-    real t521 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t520 = V[5 * n + k] * gain[9 * k + 8];
-        t521 += t520;
-    }
-    const real t522 = S[53] - t521;
-    S_c[53] = t522;
-    if (found_gain) return 2; /* a negative determinant */
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    V[k] = S[0] * B[9 * k] + S[6] * B[9 * k + 1] + S[12] * B[9 * k + 2] + S[18] * B[9 * k + 3] +
+      S[24] * B[9 * k + 4] + S[30] * B[9 * k + 5] + S[36] * B[9 * k + 6] + S[42] * B[9 * k + 7] +
+      S[48] * B[9 * k + 8] + K[6 * k] + G[6 * k];
+  }
+  for (int k = 0; k < n; ++k) {
+    V[n + k] = S[1] * B[9 * k] + S[7] * B[9 * k + 1] + S[13] * B[9 * k + 2] + S[19] * B[9 * k + 3] +
+      S[25] * B[9 * k + 4] + S[31] * B[9 * k + 5] + S[37] * B[9 * k + 6] + S[43] * B[9 * k + 7] +
+      S[49] * B[9 * k + 8] + K[6 * k + 1] + G[6 * k + 1];
+  }
+  for (int k = 0; k < n; ++k) {
+    V[2 * n + k] = S[2] * B[9 * k] + S[8] * B[9 * k + 1] + S[14] * B[9 * k + 2] + S[20] * B[9 * k +
+      3] + S[26] * B[9 * k + 4] + S[32] * B[9 * k + 5] + S[38] * B[9 * k + 6] + S[44] * B[9 * k + 7]
+      + S[50] * B[9 * k + 8] + K[6 * k + 2] + G[6 * k + 2];
+  }
+  for (int k = 0; k < n; ++k) {
+    V[3 * n + k] = S[3] * B[9 * k] + S[9] * B[9 * k + 1] + S[15] * B[9 * k + 2] + S[21] * B[9 * k +
+      3] + S[27] * B[9 * k + 4] + S[33] * B[9 * k + 5] + S[39] * B[9 * k + 6] + S[45] * B[9 * k + 7]
+      + S[51] * B[9 * k + 8] + K[6 * k + 3] + G[6 * k + 3];
+  }
+  for (int k = 0; k < n; ++k) {
+    V[4 * n + k] = S[4] * B[9 * k] + S[10] * B[9 * k + 1] + S[16] * B[9 * k + 2] + S[22] * B[9 * k +
+      3] + S[28] * B[9 * k + 4] + S[34] * B[9 * k + 5] + S[40] * B[9 * k + 6] + S[46] * B[9 * k + 7]
+      + S[52] * B[9 * k + 8] + K[6 * k + 4] + G[6 * k + 4];
+  }
+  for (int k = 0; k < n; ++k) {
+    V[5 * n + k] = S[5] * B[9 * k] + S[11] * B[9 * k + 1] + S[17] * B[9 * k + 2] + S[23] * B[9 * k +
+      3] + S[29] * B[9 * k + 4] + S[35] * B[9 * k + 5] + S[41] * B[9 * k + 6] + S[47] * B[9 * k + 7]
+      + S[53] * B[9 * k + 8] + K[6 * k + 5] + G[6 * k + 5];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      D[n * k + l] = Z_x[n * l + k] + (W[n * l + k] + (H[k] * (S[0] * B[9 * l] + S[6] * B[9 * l + 1]
+        + S[12] * B[9 * l + 2] + S[18] * B[9 * l + 3] + S[24] * B[9 * l + 4] + S[30] * B[9 * l + 5]
+        + S[36] * B[9 * l + 6] + S[42] * B[9 * l + 7] + S[48] * B[9 * l + 8] + K[6 * l]) + H[n + k]
+        * (S[1] * B[9 * l] + S[7] * B[9 * l + 1] + S[13] * B[9 * l + 2] + S[19] * B[9 * l + 3] +
+        S[25] * B[9 * l + 4] + S[31] * B[9 * l + 5] + S[37] * B[9 * l + 6] + S[43] * B[9 * l + 7] +
+        S[49] * B[9 * l + 8] + K[6 * l + 1]) + H[2 * n + k] * (S[2] * B[9 * l] + S[8] * B[9 * l + 1]
+        + S[14] * B[9 * l + 2] + S[20] * B[9 * l + 3] + S[26] * B[9 * l + 4] + S[32] * B[9 * l + 5]
+        + S[38] * B[9 * l + 6] + S[44] * B[9 * l + 7] + S[50] * B[9 * l + 8] + K[6 * l + 2]) + H[3 *
+        n + k] * (S[3] * B[9 * l] + S[9] * B[9 * l + 1] + S[15] * B[9 * l + 2] + S[21] * B[9 * l +
+        3] + S[27] * B[9 * l + 4] + S[33] * B[9 * l + 5] + S[39] * B[9 * l + 6] + S[45] * B[9 * l +
+        7] + S[51] * B[9 * l + 8] + K[6 * l + 3]) + H[4 * n + k] * (S[4] * B[9 * l] + S[10] * B[9 *
+        l + 1] + S[16] * B[9 * l + 2] + S[22] * B[9 * l + 3] + S[28] * B[9 * l + 4] + S[34] * B[9 *
+        l + 5] + S[40] * B[9 * l + 6] + S[46] * B[9 * l + 7] + S[52] * B[9 * l + 8] + K[6 * l + 4])
+        + H[5 * n + k] * (S[5] * B[9 * l] + S[11] * B[9 * l + 1] + S[17] * B[9 * l + 2] + S[23] *
+        B[9 * l + 3] + S[29] * B[9 * l + 4] + S[35] * B[9 * l + 5] + S[41] * B[9 * l + 6] + S[47] *
+        B[9 * l + 7] + S[53] * B[9 * l + 8] + K[6 * l + 5]) + (B[9 * l] * Z_z[k] + B[9 * l + 1] *
+        Z_z[n + k] + B[9 * l + 2] * Z_z[2 * n + k] + B[9 * l + 3] * Z_z[3 * n + k] + B[9 * l + 4] *
+        Z_z[4 * n + k] + B[9 * l + 5] * Z_z[5 * n + k] + B[9 * l + 6] * Z_z[6 * n + k] + B[9 * l +
+        7] * Z_z[7 * n + k] + B[9 * l + 8] * Z_z[8 * n + k])));
+    }
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k] = Z_z[k] + (S[0] * H[k] + S[1] * H[n + k] + S[2] * H[2 * n + k] + S[3] * H[3 * n +
+      k] + S[4] * H[4 * n + k] + S[5] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 1] = Z_z[n + k] + (S[6] * H[k] + S[7] * H[n + k] + S[8] * H[2 * n + k] + S[9] *
+      H[3 * n + k] + S[10] * H[4 * n + k] + S[11] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 2] = Z_z[2 * n + k] + (S[12] * H[k] + S[13] * H[n + k] + S[14] * H[2 * n + k] +
+      S[15] * H[3 * n + k] + S[16] * H[4 * n + k] + S[17] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 3] = Z_z[3 * n + k] + (S[18] * H[k] + S[19] * H[n + k] + S[20] * H[2 * n + k] +
+      S[21] * H[3 * n + k] + S[22] * H[4 * n + k] + S[23] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 4] = Z_z[4 * n + k] + (S[24] * H[k] + S[25] * H[n + k] + S[26] * H[2 * n + k] +
+      S[27] * H[3 * n + k] + S[28] * H[4 * n + k] + S[29] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 5] = Z_z[5 * n + k] + (S[30] * H[k] + S[31] * H[n + k] + S[32] * H[2 * n + k] +
+      S[33] * H[3 * n + k] + S[34] * H[4 * n + k] + S[35] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 6] = Z_z[6 * n + k] + (S[36] * H[k] + S[37] * H[n + k] + S[38] * H[2 * n + k] +
+      S[39] * H[3 * n + k] + S[40] * H[4 * n + k] + S[41] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 7] = Z_z[7 * n + k] + (S[42] * H[k] + S[43] * H[n + k] + S[44] * H[2 * n + k] +
+      S[45] * H[3 * n + k] + S[46] * H[4 * n + k] + S[47] * H[5 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 8] = Z_z[8 * n + k] + (S[48] * H[k] + S[49] * H[n + k] + S[50] * H[2 * n + k] +
+      S[51] * H[3 * n + k] + S[52] * H[4 * n + k] + S[53] * H[5 * n + k]);
+  }
+  /* a pivot of D vanishes: a motion is undetermined */
+  const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
+  if (found_gain == 1) return 1;
+  real t362 = 0;
+  for (int k = 0; k < n; ++k) {
+    t362 += gain[9 * k] * V[k];
+  }
+  S_c[0] = S[0] - t362;
+  real t365 = 0;
+  for (int k = 0; k < n; ++k) {
+    t365 += gain[9 * k] * V[n + k];
+  }
+  S_c[1] = S[1] - t365;
+  real t368 = 0;
+  for (int k = 0; k < n; ++k) {
+    t368 += gain[9 * k] * V[2 * n + k];
+  }
+  S_c[2] = S[2] - t368;
+  real t371 = 0;
+  for (int k = 0; k < n; ++k) {
+    t371 += gain[9 * k] * V[3 * n + k];
+  }
+  S_c[3] = S[3] - t371;
+  real t374 = 0;
+  for (int k = 0; k < n; ++k) {
+    t374 += gain[9 * k] * V[4 * n + k];
+  }
+  S_c[4] = S[4] - t374;
+  real t377 = 0;
+  for (int k = 0; k < n; ++k) {
+    t377 += gain[9 * k] * V[5 * n + k];
+  }
+  S_c[5] = S[5] - t377;
+  real t380 = 0;
+  for (int k = 0; k < n; ++k) {
+    t380 += V[k] * gain[9 * k + 1];
+  }
+  S_c[6] = S[6] - t380;
+  real t383 = 0;
+  for (int k = 0; k < n; ++k) {
+    t383 += V[n + k] * gain[9 * k + 1];
+  }
+  S_c[7] = S[7] - t383;
+  real t386 = 0;
+  for (int k = 0; k < n; ++k) {
+    t386 += V[2 * n + k] * gain[9 * k + 1];
+  }
+  S_c[8] = S[8] - t386;
+  real t389 = 0;
+  for (int k = 0; k < n; ++k) {
+    t389 += V[3 * n + k] * gain[9 * k + 1];
+  }
+  S_c[9] = S[9] - t389;
+  real t392 = 0;
+  for (int k = 0; k < n; ++k) {
+    t392 += V[4 * n + k] * gain[9 * k + 1];
+  }
+  S_c[10] = S[10] - t392;
+  real t395 = 0;
+  for (int k = 0; k < n; ++k) {
+    t395 += V[5 * n + k] * gain[9 * k + 1];
+  }
+  S_c[11] = S[11] - t395;
+  real t398 = 0;
+  for (int k = 0; k < n; ++k) {
+    t398 += V[k] * gain[9 * k + 2];
+  }
+  S_c[12] = S[12] - t398;
+  real t401 = 0;
+  for (int k = 0; k < n; ++k) {
+    t401 += V[n + k] * gain[9 * k + 2];
+  }
+  S_c[13] = S[13] - t401;
+  real t404 = 0;
+  for (int k = 0; k < n; ++k) {
+    t404 += V[2 * n + k] * gain[9 * k + 2];
+  }
+  S_c[14] = S[14] - t404;
+  real t407 = 0;
+  for (int k = 0; k < n; ++k) {
+    t407 += V[3 * n + k] * gain[9 * k + 2];
+  }
+  S_c[15] = S[15] - t407;
+  real t410 = 0;
+  for (int k = 0; k < n; ++k) {
+    t410 += V[4 * n + k] * gain[9 * k + 2];
+  }
+  S_c[16] = S[16] - t410;
+  real t413 = 0;
+  for (int k = 0; k < n; ++k) {
+    t413 += V[5 * n + k] * gain[9 * k + 2];
+  }
+  S_c[17] = S[17] - t413;
+  real t416 = 0;
+  for (int k = 0; k < n; ++k) {
+    t416 += V[k] * gain[9 * k + 3];
+  }
+  S_c[18] = S[18] - t416;
+  real t419 = 0;
+  for (int k = 0; k < n; ++k) {
+    t419 += V[n + k] * gain[9 * k + 3];
+  }
+  S_c[19] = S[19] - t419;
+  real t422 = 0;
+  for (int k = 0; k < n; ++k) {
+    t422 += V[2 * n + k] * gain[9 * k + 3];
+  }
+  S_c[20] = S[20] - t422;
+  real t425 = 0;
+  for (int k = 0; k < n; ++k) {
+    t425 += V[3 * n + k] * gain[9 * k + 3];
+  }
+  S_c[21] = S[21] - t425;
+  real t428 = 0;
+  for (int k = 0; k < n; ++k) {
+    t428 += V[4 * n + k] * gain[9 * k + 3];
+  }
+  S_c[22] = S[22] - t428;
+  real t431 = 0;
+  for (int k = 0; k < n; ++k) {
+    t431 += V[5 * n + k] * gain[9 * k + 3];
+  }
+  S_c[23] = S[23] - t431;
+  real t434 = 0;
+  for (int k = 0; k < n; ++k) {
+    t434 += V[k] * gain[9 * k + 4];
+  }
+  S_c[24] = S[24] - t434;
+  real t437 = 0;
+  for (int k = 0; k < n; ++k) {
+    t437 += V[n + k] * gain[9 * k + 4];
+  }
+  S_c[25] = S[25] - t437;
+  real t440 = 0;
+  for (int k = 0; k < n; ++k) {
+    t440 += V[2 * n + k] * gain[9 * k + 4];
+  }
+  S_c[26] = S[26] - t440;
+  real t443 = 0;
+  for (int k = 0; k < n; ++k) {
+    t443 += V[3 * n + k] * gain[9 * k + 4];
+  }
+  S_c[27] = S[27] - t443;
+  real t446 = 0;
+  for (int k = 0; k < n; ++k) {
+    t446 += V[4 * n + k] * gain[9 * k + 4];
+  }
+  S_c[28] = S[28] - t446;
+  real t449 = 0;
+  for (int k = 0; k < n; ++k) {
+    t449 += V[5 * n + k] * gain[9 * k + 4];
+  }
+  S_c[29] = S[29] - t449;
+  real t452 = 0;
+  for (int k = 0; k < n; ++k) {
+    t452 += V[k] * gain[9 * k + 5];
+  }
+  S_c[30] = S[30] - t452;
+  real t455 = 0;
+  for (int k = 0; k < n; ++k) {
+    t455 += V[n + k] * gain[9 * k + 5];
+  }
+  S_c[31] = S[31] - t455;
+  real t458 = 0;
+  for (int k = 0; k < n; ++k) {
+    t458 += V[2 * n + k] * gain[9 * k + 5];
+  }
+  S_c[32] = S[32] - t458;
+  real t461 = 0;
+  for (int k = 0; k < n; ++k) {
+    t461 += V[3 * n + k] * gain[9 * k + 5];
+  }
+  S_c[33] = S[33] - t461;
+  real t464 = 0;
+  for (int k = 0; k < n; ++k) {
+    t464 += V[4 * n + k] * gain[9 * k + 5];
+  }
+  S_c[34] = S[34] - t464;
+  real t467 = 0;
+  for (int k = 0; k < n; ++k) {
+    t467 += V[5 * n + k] * gain[9 * k + 5];
+  }
+  S_c[35] = S[35] - t467;
+  real t470 = 0;
+  for (int k = 0; k < n; ++k) {
+    t470 += V[k] * gain[9 * k + 6];
+  }
+  S_c[36] = S[36] - t470;
+  real t473 = 0;
+  for (int k = 0; k < n; ++k) {
+    t473 += V[n + k] * gain[9 * k + 6];
+  }
+  S_c[37] = S[37] - t473;
+  real t476 = 0;
+  for (int k = 0; k < n; ++k) {
+    t476 += V[2 * n + k] * gain[9 * k + 6];
+  }
+  S_c[38] = S[38] - t476;
+  real t479 = 0;
+  for (int k = 0; k < n; ++k) {
+    t479 += V[3 * n + k] * gain[9 * k + 6];
+  }
+  S_c[39] = S[39] - t479;
+  real t482 = 0;
+  for (int k = 0; k < n; ++k) {
+    t482 += V[4 * n + k] * gain[9 * k + 6];
+  }
+  S_c[40] = S[40] - t482;
+  real t485 = 0;
+  for (int k = 0; k < n; ++k) {
+    t485 += V[5 * n + k] * gain[9 * k + 6];
+  }
+  S_c[41] = S[41] - t485;
+  real t488 = 0;
+  for (int k = 0; k < n; ++k) {
+    t488 += V[k] * gain[9 * k + 7];
+  }
+  S_c[42] = S[42] - t488;
+  real t491 = 0;
+  for (int k = 0; k < n; ++k) {
+    t491 += V[n + k] * gain[9 * k + 7];
+  }
+  S_c[43] = S[43] - t491;
+  real t494 = 0;
+  for (int k = 0; k < n; ++k) {
+    t494 += V[2 * n + k] * gain[9 * k + 7];
+  }
+  S_c[44] = S[44] - t494;
+  real t497 = 0;
+  for (int k = 0; k < n; ++k) {
+    t497 += V[3 * n + k] * gain[9 * k + 7];
+  }
+  S_c[45] = S[45] - t497;
+  real t500 = 0;
+  for (int k = 0; k < n; ++k) {
+    t500 += V[4 * n + k] * gain[9 * k + 7];
+  }
+  S_c[46] = S[46] - t500;
+  real t503 = 0;
+  for (int k = 0; k < n; ++k) {
+    t503 += V[5 * n + k] * gain[9 * k + 7];
+  }
+  S_c[47] = S[47] - t503;
+  real t506 = 0;
+  for (int k = 0; k < n; ++k) {
+    t506 += V[k] * gain[9 * k + 8];
+  }
+  S_c[48] = S[48] - t506;
+  real t509 = 0;
+  for (int k = 0; k < n; ++k) {
+    t509 += V[n + k] * gain[9 * k + 8];
+  }
+  S_c[49] = S[49] - t509;
+  real t512 = 0;
+  for (int k = 0; k < n; ++k) {
+    t512 += V[2 * n + k] * gain[9 * k + 8];
+  }
+  S_c[50] = S[50] - t512;
+  real t515 = 0;
+  for (int k = 0; k < n; ++k) {
+    t515 += V[3 * n + k] * gain[9 * k + 8];
+  }
+  S_c[51] = S[51] - t515;
+  real t518 = 0;
+  for (int k = 0; k < n; ++k) {
+    t518 += V[4 * n + k] * gain[9 * k + 8];
+  }
+  S_c[52] = S[52] - t518;
+  real t521 = 0;
+  for (int k = 0; k < n; ++k) {
+    t521 += V[5 * n + k] * gain[9 * k + 8];
+  }
+  S_c[53] = S[53] - t521;
+  if (found_gain) return 2; /* a negative determinant */
+  return 0;
 }
 
-int mstmm_sweep_tangent_node(int n, const real *restrict H, const real *restrict B,
-    const real *restrict G, const real *restrict W, const real *restrict S, const real *restrict K,
-    const real *restrict Z_z, const real *restrict Z_x, real *restrict V, real *restrict D,
-    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
+int mstmm_sweep_tangent_node(int n, in_t H, in_t B, in_t G, in_t W, in_t S, in_t K, in_t Z_z,
+    in_t Z_x, out_t V, out_t D, out_t right, out_t gain, out_t S_c, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_node_sized(1, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    case 2: return mstmm_sweep_tangent_node_sized(2, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    case 3: return mstmm_sweep_tangent_node_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    case 4: return mstmm_sweep_tangent_node_sized(4, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    default: return mstmm_sweep_tangent_node_sized(n, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_node_sized(1, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+  case 2: return mstmm_sweep_tangent_node_sized(2, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+  case 3: return mstmm_sweep_tangent_node_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+  case 4: return mstmm_sweep_tangent_node_sized(4, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+  default: return mstmm_sweep_tangent_node_sized(n, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+  }
 }
 
-static int mstmm_sweep_tangent_node_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_node(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3], out[4], out[5]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_node_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"B", 9, "", 0, 1},
-    {"G", 6, "", 0, 1},
-    {"W", 1, "", 0, 2},
-    {"S", 54, "", 0, 0},
-    {"K", 6, "", 0, 1},
-    {"Z_z", 9, "", 0, 1},
-    {"Z_x", 1, "", 0, 2},
-};
-
-static const mstmm_port mstmm_sweep_tangent_node_outputs[] = {
-    {"V", 6, "", 0, 1},
-    {"D", 1, "", 0, 2},
-    {"right", 9, "", 0, 1},
-    {"gain", 9, "", 0, 1},
-    {"S_c", 54, "", 0, 0},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
-    {1, "a pivot of D vanishes: a motion is undetermined"},
-    {2, "the determinant is negative; all results are there"},
-};
+MSTMM_CALL(mstmm_sweep_tangent_node, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7],
+  out[0], out[1], out[2], out[3], out[4], out[5]))
 
 /* part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1035,433 +516,135 @@ static const mstmm_guard mstmm_sweep_tangent_node_guards[] = {
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_assemble_port_sized(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
-    const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
-    real *restrict Z_z, real *restrict Z_x)
+int mstmm_sweep_tangent_assemble_port_sized(int n, in_t Rc, in_t r, in_t H, in_t B, in_t G, in_t W,
+    in_t S, in_t T, out_t K_x, out_t K, out_t Z_z, out_t Z_x)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S[0] * B[9 * k];
-        const real t1 = S[6] * B[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = S[12] * B[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = S[18] * B[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = S[24] * B[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = S[30] * B[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = S[36] * B[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = S[42] * B[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = S[48] * B[9 * k + 8];
-        const real t16 = t14 + t15;
-        K_x[k] = t16;
+  for (int k = 0; k < n; ++k) {
+    K_x[k] = S[0] * B[9 * k] + S[6] * B[9 * k + 1] + S[12] * B[9 * k + 2] + S[18] * B[9 * k + 3] +
+      S[24] * B[9 * k + 4] + S[30] * B[9 * k + 5] + S[36] * B[9 * k + 6] + S[42] * B[9 * k + 7] +
+      S[48] * B[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K_x[n + k] = S[1] * B[9 * k] + S[7] * B[9 * k + 1] + S[13] * B[9 * k + 2] + S[19] * B[9 * k + 3]
+      + S[25] * B[9 * k + 4] + S[31] * B[9 * k + 5] + S[37] * B[9 * k + 6] + S[43] * B[9 * k + 7] +
+      S[49] * B[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K_x[2 * n + k] = S[2] * B[9 * k] + S[8] * B[9 * k + 1] + S[14] * B[9 * k + 2] + S[20] * B[9 * k
+      + 3] + S[26] * B[9 * k + 4] + S[32] * B[9 * k + 5] + S[38] * B[9 * k + 6] + S[44] * B[9 * k +
+      7] + S[50] * B[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K_x[3 * n + k] = S[3] * B[9 * k] + S[9] * B[9 * k + 1] + S[15] * B[9 * k + 2] + S[21] * B[9 * k
+      + 3] + S[27] * B[9 * k + 4] + S[33] * B[9 * k + 5] + S[39] * B[9 * k + 6] + S[45] * B[9 * k +
+      7] + S[51] * B[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K_x[4 * n + k] = S[4] * B[9 * k] + S[10] * B[9 * k + 1] + S[16] * B[9 * k + 2] + S[22] * B[9 * k
+      + 3] + S[28] * B[9 * k + 4] + S[34] * B[9 * k + 5] + S[40] * B[9 * k + 6] + S[46] * B[9 * k +
+      7] + S[52] * B[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K_x[5 * n + k] = S[5] * B[9 * k] + S[11] * B[9 * k + 1] + S[17] * B[9 * k + 2] + S[23] * B[9 * k
+      + 3] + S[29] * B[9 * k + 4] + S[35] * B[9 * k + 5] + S[41] * B[9 * k + 6] + S[47] * B[9 * k +
+      7] + S[53] * B[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k] += Rc[0] * (K_x[k] + G[6 * k]) + Rc[1] * (K_x[n + k] + G[6 * k + 1]) + Rc[2] * (K_x[2 *
+      n + k] + G[6 * k + 2]);
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 1] += Rc[3] * (K_x[k] + G[6 * k]) + Rc[4] * (K_x[n + k] + G[6 * k + 1]) + Rc[5] *
+      (K_x[2 * n + k] + G[6 * k + 2]);
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 2] += Rc[6] * (K_x[k] + G[6 * k]) + Rc[7] * (K_x[n + k] + G[6 * k + 1]) + Rc[8] *
+      (K_x[2 * n + k] + G[6 * k + 2]);
+  }
+  real t137 = Rc[6] * r[1] - Rc[3] * r[2];
+  real t142 = Rc[7] * r[1] - Rc[4] * r[2];
+  real t148 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 3] += Rc[0] * (K_x[3 * n + k] + G[6 * k + 3]) + Rc[1] * (K_x[4 * n + k] + G[6 * k +
+      4]) + Rc[2] * (K_x[5 * n + k] + G[6 * k + 5]) + ((K_x[k] + G[6 * k]) * t137 + (K_x[n + k] +
+      G[6 * k + 1]) * t142 + (K_x[2 * n + k] + G[6 * k + 2]) * t148);
+  }
+  real t163 = Rc[0] * r[2] - Rc[6] * r[0];
+  real t168 = Rc[1] * r[2] - Rc[7] * r[0];
+  real t174 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 4] += Rc[3] * (K_x[3 * n + k] + G[6 * k + 3]) + Rc[4] * (K_x[4 * n + k] + G[6 * k +
+      4]) + Rc[5] * (K_x[5 * n + k] + G[6 * k + 5]) + ((K_x[k] + G[6 * k]) * t163 + (K_x[n + k] +
+      G[6 * k + 1]) * t168 + (K_x[2 * n + k] + G[6 * k + 2]) * t174);
+  }
+  real t189 = Rc[3] * r[0] - Rc[0] * r[1];
+  real t194 = Rc[4] * r[0] - Rc[1] * r[1];
+  real t200 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 5] += Rc[6] * (K_x[3 * n + k] + G[6 * k + 3]) + Rc[7] * (K_x[4 * n + k] + G[6 * k +
+      4]) + Rc[8] * (K_x[5 * n + k] + G[6 * k + 5]) + ((K_x[k] + G[6 * k]) * t189 + (K_x[n + k] +
+      G[6 * k + 1]) * t194 + (K_x[2 * n + k] + G[6 * k + 2]) * t200);
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[k] += T[0] * H[k] + T[1] * H[n + k] + T[2] * H[2 * n + k] + T[3] * H[3 * n + k] + T[4] * H[4
+      * n + k] + T[5] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[n + k] += T[6] * H[k] + T[7] * H[n + k] + T[8] * H[2 * n + k] + T[9] * H[3 * n + k] + T[10]
+      * H[4 * n + k] + T[11] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[2 * n + k] += T[12] * H[k] + T[13] * H[n + k] + T[14] * H[2 * n + k] + T[15] * H[3 * n + k]
+      + T[16] * H[4 * n + k] + T[17] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[3 * n + k] += T[18] * H[k] + T[19] * H[n + k] + T[20] * H[2 * n + k] + T[21] * H[3 * n + k]
+      + T[22] * H[4 * n + k] + T[23] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[4 * n + k] += T[24] * H[k] + T[25] * H[n + k] + T[26] * H[2 * n + k] + T[27] * H[3 * n + k]
+      + T[28] * H[4 * n + k] + T[29] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[5 * n + k] += T[30] * H[k] + T[31] * H[n + k] + T[32] * H[2 * n + k] + T[33] * H[3 * n + k]
+      + T[34] * H[4 * n + k] + T[35] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[6 * n + k] += T[36] * H[k] + T[37] * H[n + k] + T[38] * H[2 * n + k] + T[39] * H[3 * n + k]
+      + T[40] * H[4 * n + k] + T[41] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[7 * n + k] += T[42] * H[k] + T[43] * H[n + k] + T[44] * H[2 * n + k] + T[45] * H[3 * n + k]
+      + T[46] * H[4 * n + k] + T[47] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[8 * n + k] += T[48] * H[k] + T[49] * H[n + k] + T[50] * H[2 * n + k] + T[51] * H[3 * n + k]
+      + T[52] * H[4 * n + k] + T[53] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] += K_x[k] * H[l] + K_x[n + k] * H[n + l] + K_x[2 * n + k] * H[2 * n + l] +
+        K_x[3 * n + k] * H[3 * n + l] + K_x[4 * n + k] * H[4 * n + l] + K_x[5 * n + k] * H[5 * n +
+        l] + W[n * k + l];
     }
-    for (int k = 0; k < n; ++k) {
-        const real t17 = S[1] * B[9 * k];
-        const real t18 = S[7] * B[9 * k + 1];
-        const real t19 = t17 + t18;
-        const real t20 = S[13] * B[9 * k + 2];
-        const real t21 = t19 + t20;
-        const real t22 = S[19] * B[9 * k + 3];
-        const real t23 = t21 + t22;
-        const real t24 = S[25] * B[9 * k + 4];
-        const real t25 = t23 + t24;
-        const real t26 = S[31] * B[9 * k + 5];
-        const real t27 = t25 + t26;
-        const real t28 = S[37] * B[9 * k + 6];
-        const real t29 = t27 + t28;
-        const real t30 = S[43] * B[9 * k + 7];
-        const real t31 = t29 + t30;
-        const real t32 = S[49] * B[9 * k + 8];
-        const real t33 = t31 + t32;
-        K_x[n + k] = t33;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t34 = S[2] * B[9 * k];
-        const real t35 = S[8] * B[9 * k + 1];
-        const real t36 = t34 + t35;
-        const real t37 = S[14] * B[9 * k + 2];
-        const real t38 = t36 + t37;
-        const real t39 = S[20] * B[9 * k + 3];
-        const real t40 = t38 + t39;
-        const real t41 = S[26] * B[9 * k + 4];
-        const real t42 = t40 + t41;
-        const real t43 = S[32] * B[9 * k + 5];
-        const real t44 = t42 + t43;
-        const real t45 = S[38] * B[9 * k + 6];
-        const real t46 = t44 + t45;
-        const real t47 = S[44] * B[9 * k + 7];
-        const real t48 = t46 + t47;
-        const real t49 = S[50] * B[9 * k + 8];
-        const real t50 = t48 + t49;
-        K_x[2 * n + k] = t50;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t51 = S[3] * B[9 * k];
-        const real t52 = S[9] * B[9 * k + 1];
-        const real t53 = t51 + t52;
-        const real t54 = S[15] * B[9 * k + 2];
-        const real t55 = t53 + t54;
-        const real t56 = S[21] * B[9 * k + 3];
-        const real t57 = t55 + t56;
-        const real t58 = S[27] * B[9 * k + 4];
-        const real t59 = t57 + t58;
-        const real t60 = S[33] * B[9 * k + 5];
-        const real t61 = t59 + t60;
-        const real t62 = S[39] * B[9 * k + 6];
-        const real t63 = t61 + t62;
-        const real t64 = S[45] * B[9 * k + 7];
-        const real t65 = t63 + t64;
-        const real t66 = S[51] * B[9 * k + 8];
-        const real t67 = t65 + t66;
-        K_x[3 * n + k] = t67;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t68 = S[4] * B[9 * k];
-        const real t69 = S[10] * B[9 * k + 1];
-        const real t70 = t68 + t69;
-        const real t71 = S[16] * B[9 * k + 2];
-        const real t72 = t70 + t71;
-        const real t73 = S[22] * B[9 * k + 3];
-        const real t74 = t72 + t73;
-        const real t75 = S[28] * B[9 * k + 4];
-        const real t76 = t74 + t75;
-        const real t77 = S[34] * B[9 * k + 5];
-        const real t78 = t76 + t77;
-        const real t79 = S[40] * B[9 * k + 6];
-        const real t80 = t78 + t79;
-        const real t81 = S[46] * B[9 * k + 7];
-        const real t82 = t80 + t81;
-        const real t83 = S[52] * B[9 * k + 8];
-        const real t84 = t82 + t83;
-        K_x[4 * n + k] = t84;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t85 = S[5] * B[9 * k];
-        const real t86 = S[11] * B[9 * k + 1];
-        const real t87 = t85 + t86;
-        const real t88 = S[17] * B[9 * k + 2];
-        const real t89 = t87 + t88;
-        const real t90 = S[23] * B[9 * k + 3];
-        const real t91 = t89 + t90;
-        const real t92 = S[29] * B[9 * k + 4];
-        const real t93 = t91 + t92;
-        const real t94 = S[35] * B[9 * k + 5];
-        const real t95 = t93 + t94;
-        const real t96 = S[41] * B[9 * k + 6];
-        const real t97 = t95 + t96;
-        const real t98 = S[47] * B[9 * k + 7];
-        const real t99 = t97 + t98;
-        const real t100 = S[53] * B[9 * k + 8];
-        const real t101 = t99 + t100;
-        K_x[5 * n + k] = t101;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t102 = K_x[k] + G[6 * k];
-        const real t103 = Rc[0] * t102;
-        const real t104 = K_x[n + k] + G[6 * k + 1];
-        const real t105 = Rc[1] * t104;
-        const real t106 = t103 + t105;
-        const real t107 = K_x[2 * n + k] + G[6 * k + 2];
-        const real t108 = Rc[2] * t107;
-        const real t109 = t106 + t108;
-        K[6 * k] += t109;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t110 = K_x[k] + G[6 * k];
-        const real t111 = Rc[3] * t110;
-        const real t112 = K_x[n + k] + G[6 * k + 1];
-        const real t113 = Rc[4] * t112;
-        const real t114 = t111 + t113;
-        const real t115 = K_x[2 * n + k] + G[6 * k + 2];
-        const real t116 = Rc[5] * t115;
-        const real t117 = t114 + t116;
-        K[6 * k + 1] += t117;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t118 = K_x[k] + G[6 * k];
-        const real t119 = Rc[6] * t118;
-        const real t120 = K_x[n + k] + G[6 * k + 1];
-        const real t121 = Rc[7] * t120;
-        const real t122 = t119 + t121;
-        const real t123 = K_x[2 * n + k] + G[6 * k + 2];
-        const real t124 = Rc[8] * t123;
-        const real t125 = t122 + t124;
-        K[6 * k + 2] += t125;
-    }
-    const real t135 = Rc[6] * r[1];
-    const real t136 = Rc[3] * r[2];
-    const real t137 = t135 - t136;
-    const real t140 = Rc[7] * r[1];
-    const real t141 = Rc[4] * r[2];
-    const real t142 = t140 - t141;
-    const real t146 = Rc[8] * r[1];
-    const real t147 = Rc[5] * r[2];
-    const real t148 = t146 - t147;
-    for (int k = 0; k < n; ++k) {
-        const real t126 = K_x[3 * n + k] + G[6 * k + 3];
-        const real t127 = Rc[0] * t126;
-        const real t128 = K_x[4 * n + k] + G[6 * k + 4];
-        const real t129 = Rc[1] * t128;
-        const real t130 = t127 + t129;
-        const real t131 = K_x[5 * n + k] + G[6 * k + 5];
-        const real t132 = Rc[2] * t131;
-        const real t133 = t130 + t132;
-        const real t134 = K_x[k] + G[6 * k];
-        const real t138 = t134 * t137;
-        const real t139 = K_x[n + k] + G[6 * k + 1];
-        const real t143 = t139 * t142;
-        const real t144 = t138 + t143;
-        const real t145 = K_x[2 * n + k] + G[6 * k + 2];
-        const real t149 = t145 * t148;
-        const real t150 = t144 + t149;
-        const real t151 = t133 + t150;
-        K[6 * k + 3] += t151;
-    }
-    const real t161 = Rc[0] * r[2];
-    const real t162 = Rc[6] * r[0];
-    const real t163 = t161 - t162;
-    const real t166 = Rc[1] * r[2];
-    const real t167 = Rc[7] * r[0];
-    const real t168 = t166 - t167;
-    const real t172 = Rc[2] * r[2];
-    const real t173 = Rc[8] * r[0];
-    const real t174 = t172 - t173;
-    for (int k = 0; k < n; ++k) {
-        const real t152 = K_x[3 * n + k] + G[6 * k + 3];
-        const real t153 = Rc[3] * t152;
-        const real t154 = K_x[4 * n + k] + G[6 * k + 4];
-        const real t155 = Rc[4] * t154;
-        const real t156 = t153 + t155;
-        const real t157 = K_x[5 * n + k] + G[6 * k + 5];
-        const real t158 = Rc[5] * t157;
-        const real t159 = t156 + t158;
-        const real t160 = K_x[k] + G[6 * k];
-        const real t164 = t160 * t163;
-        const real t165 = K_x[n + k] + G[6 * k + 1];
-        const real t169 = t165 * t168;
-        const real t170 = t164 + t169;
-        const real t171 = K_x[2 * n + k] + G[6 * k + 2];
-        const real t175 = t171 * t174;
-        const real t176 = t170 + t175;
-        const real t177 = t159 + t176;
-        K[6 * k + 4] += t177;
-    }
-    const real t187 = Rc[3] * r[0];
-    const real t188 = Rc[0] * r[1];
-    const real t189 = t187 - t188;
-    const real t192 = Rc[4] * r[0];
-    const real t193 = Rc[1] * r[1];
-    const real t194 = t192 - t193;
-    const real t198 = Rc[5] * r[0];
-    const real t199 = Rc[2] * r[1];
-    const real t200 = t198 - t199;
-    for (int k = 0; k < n; ++k) {
-        const real t178 = K_x[3 * n + k] + G[6 * k + 3];
-        const real t179 = Rc[6] * t178;
-        const real t180 = K_x[4 * n + k] + G[6 * k + 4];
-        const real t181 = Rc[7] * t180;
-        const real t182 = t179 + t181;
-        const real t183 = K_x[5 * n + k] + G[6 * k + 5];
-        const real t184 = Rc[8] * t183;
-        const real t185 = t182 + t184;
-        const real t186 = K_x[k] + G[6 * k];
-        const real t190 = t186 * t189;
-        const real t191 = K_x[n + k] + G[6 * k + 1];
-        const real t195 = t191 * t194;
-        const real t196 = t190 + t195;
-        const real t197 = K_x[2 * n + k] + G[6 * k + 2];
-        const real t201 = t197 * t200;
-        const real t202 = t196 + t201;
-        const real t203 = t185 + t202;
-        K[6 * k + 5] += t203;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t204 = T[0] * H[k];
-        const real t205 = T[1] * H[n + k];
-        const real t206 = t204 + t205;
-        const real t207 = T[2] * H[2 * n + k];
-        const real t208 = t206 + t207;
-        const real t209 = T[3] * H[3 * n + k];
-        const real t210 = t208 + t209;
-        const real t211 = T[4] * H[4 * n + k];
-        const real t212 = t210 + t211;
-        const real t213 = T[5] * H[5 * n + k];
-        const real t214 = t212 + t213;
-        Z_z[k] += t214;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t215 = T[6] * H[k];
-        const real t216 = T[7] * H[n + k];
-        const real t217 = t215 + t216;
-        const real t218 = T[8] * H[2 * n + k];
-        const real t219 = t217 + t218;
-        const real t220 = T[9] * H[3 * n + k];
-        const real t221 = t219 + t220;
-        const real t222 = T[10] * H[4 * n + k];
-        const real t223 = t221 + t222;
-        const real t224 = T[11] * H[5 * n + k];
-        const real t225 = t223 + t224;
-        Z_z[n + k] += t225;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t226 = T[12] * H[k];
-        const real t227 = T[13] * H[n + k];
-        const real t228 = t226 + t227;
-        const real t229 = T[14] * H[2 * n + k];
-        const real t230 = t228 + t229;
-        const real t231 = T[15] * H[3 * n + k];
-        const real t232 = t230 + t231;
-        const real t233 = T[16] * H[4 * n + k];
-        const real t234 = t232 + t233;
-        const real t235 = T[17] * H[5 * n + k];
-        const real t236 = t234 + t235;
-        Z_z[2 * n + k] += t236;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t237 = T[18] * H[k];
-        const real t238 = T[19] * H[n + k];
-        const real t239 = t237 + t238;
-        const real t240 = T[20] * H[2 * n + k];
-        const real t241 = t239 + t240;
-        const real t242 = T[21] * H[3 * n + k];
-        const real t243 = t241 + t242;
-        const real t244 = T[22] * H[4 * n + k];
-        const real t245 = t243 + t244;
-        const real t246 = T[23] * H[5 * n + k];
-        const real t247 = t245 + t246;
-        Z_z[3 * n + k] += t247;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t248 = T[24] * H[k];
-        const real t249 = T[25] * H[n + k];
-        const real t250 = t248 + t249;
-        const real t251 = T[26] * H[2 * n + k];
-        const real t252 = t250 + t251;
-        const real t253 = T[27] * H[3 * n + k];
-        const real t254 = t252 + t253;
-        const real t255 = T[28] * H[4 * n + k];
-        const real t256 = t254 + t255;
-        const real t257 = T[29] * H[5 * n + k];
-        const real t258 = t256 + t257;
-        Z_z[4 * n + k] += t258;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t259 = T[30] * H[k];
-        const real t260 = T[31] * H[n + k];
-        const real t261 = t259 + t260;
-        const real t262 = T[32] * H[2 * n + k];
-        const real t263 = t261 + t262;
-        const real t264 = T[33] * H[3 * n + k];
-        const real t265 = t263 + t264;
-        const real t266 = T[34] * H[4 * n + k];
-        const real t267 = t265 + t266;
-        const real t268 = T[35] * H[5 * n + k];
-        const real t269 = t267 + t268;
-        Z_z[5 * n + k] += t269;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t270 = T[36] * H[k];
-        const real t271 = T[37] * H[n + k];
-        const real t272 = t270 + t271;
-        const real t273 = T[38] * H[2 * n + k];
-        const real t274 = t272 + t273;
-        const real t275 = T[39] * H[3 * n + k];
-        const real t276 = t274 + t275;
-        const real t277 = T[40] * H[4 * n + k];
-        const real t278 = t276 + t277;
-        const real t279 = T[41] * H[5 * n + k];
-        const real t280 = t278 + t279;
-        Z_z[6 * n + k] += t280;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t281 = T[42] * H[k];
-        const real t282 = T[43] * H[n + k];
-        const real t283 = t281 + t282;
-        const real t284 = T[44] * H[2 * n + k];
-        const real t285 = t283 + t284;
-        const real t286 = T[45] * H[3 * n + k];
-        const real t287 = t285 + t286;
-        const real t288 = T[46] * H[4 * n + k];
-        const real t289 = t287 + t288;
-        const real t290 = T[47] * H[5 * n + k];
-        const real t291 = t289 + t290;
-        Z_z[7 * n + k] += t291;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t292 = T[48] * H[k];
-        const real t293 = T[49] * H[n + k];
-        const real t294 = t292 + t293;
-        const real t295 = T[50] * H[2 * n + k];
-        const real t296 = t294 + t295;
-        const real t297 = T[51] * H[3 * n + k];
-        const real t298 = t296 + t297;
-        const real t299 = T[52] * H[4 * n + k];
-        const real t300 = t298 + t299;
-        const real t301 = T[53] * H[5 * n + k];
-        const real t302 = t300 + t301;
-        Z_z[8 * n + k] += t302;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t303 = K_x[k] * H[l];
-            const real t304 = K_x[n + k] * H[n + l];
-            const real t305 = t303 + t304;
-            const real t306 = K_x[2 * n + k] * H[2 * n + l];
-            const real t307 = t305 + t306;
-            const real t308 = K_x[3 * n + k] * H[3 * n + l];
-            const real t309 = t307 + t308;
-            const real t310 = K_x[4 * n + k] * H[4 * n + l];
-            const real t311 = t309 + t310;
-            const real t312 = K_x[5 * n + k] * H[5 * n + l];
-            const real t313 = t311 + t312;
-            const real t314 = t313 + W[n * k + l];
-            Z_x[n * k + l] += t314;
-        }
-    }
-    return 0;
+  }
+  return 0;
 }
 
-int mstmm_sweep_tangent_assemble_port(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict B, const real *restrict G, const real *restrict W,
-    const real *restrict S, const real *restrict T, real *restrict K_x, real *restrict K,
-    real *restrict Z_z, real *restrict Z_x)
+int mstmm_sweep_tangent_assemble_port(int n, in_t Rc, in_t r, in_t H, in_t B, in_t G, in_t W,
+    in_t S, in_t T, out_t K_x, out_t K, out_t Z_z, out_t Z_x)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_assemble_port_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 2: return mstmm_sweep_tangent_assemble_port_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 3: return mstmm_sweep_tangent_assemble_port_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    case 4: return mstmm_sweep_tangent_assemble_port_sized(4, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    default: return mstmm_sweep_tangent_assemble_port_sized(n, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_assemble_port_sized(1, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+  case 2: return mstmm_sweep_tangent_assemble_port_sized(2, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+  case 3: return mstmm_sweep_tangent_assemble_port_sized(3, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+  case 4: return mstmm_sweep_tangent_assemble_port_sized(4, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+  default: return mstmm_sweep_tangent_assemble_port_sized(n, Rc, r, H, B, G, W, S, T, K_x, K, Z_z, Z_x);
+  }
 }
 
-static int mstmm_sweep_tangent_assemble_port_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_assemble_port(n, in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_assemble_port_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 1},
-    {"B", 9, "", 0, 1},
-    {"G", 6, "", 0, 1},
-    {"W", 1, "", 0, 2},
-    {"S", 54, "", 0, 0},
-    {"T", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_tangent_assemble_port_outputs[] = {
-    {"K_x", 6, "", 0, 1},
-    {"K", 6, "", 1, 1},
-    {"Z_z", 9, "", 1, 1},
-    {"Z_x", 1, "", 1, 2},
-};
+MSTMM_CALL(mstmm_sweep_tangent_assemble_port, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], out[0], out[1], out[2], out[3]))
 
 /* unknowns eliminated from a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1477,112 +660,64 @@ static const mstmm_port mstmm_sweep_tangent_assemble_port_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_column_load_sized(int n, const real *restrict H, const real *restrict V,
-    const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
-    real *restrict y, real *restrict e_c, real *restrict work)
+int mstmm_sweep_tangent_column_load_sized(int n, in_t H, in_t V, in_t D, in_t e, in_t e_f,
+    out_t rest, out_t y, out_t e_c, out_t work)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = e[0] * H[k];
-        const real t1 = e[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = e[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = e[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = e[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = e[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        const real t11 = e_f[k] + t10;
-        const real t12 = -t11;
-        rest[k] = t12;
-    }
-    /* a pivot of D vanishes: a motion is undetermined */
-    const int found_y = mstmm_solve_lu(n, 1, D, rest, y, work, 1e-13);
-    if (found_y == 1) return 1;
-    real t14 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t13 = V[k] * y[k];
-        t14 += t13;
-    }
-    const real t15 = e[0] + t14;
-    e_c[0] = t15;
-    real t17 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t16 = y[k] * V[n + k];
-        t17 += t16;
-    }
-    const real t18 = e[1] + t17;
-    e_c[1] = t18;
-    real t20 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t19 = y[k] * V[2 * n + k];
-        t20 += t19;
-    }
-    const real t21 = e[2] + t20;
-    e_c[2] = t21;
-    real t23 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t22 = y[k] * V[3 * n + k];
-        t23 += t22;
-    }
-    const real t24 = e[3] + t23;
-    e_c[3] = t24;
-    real t26 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t25 = y[k] * V[4 * n + k];
-        t26 += t25;
-    }
-    const real t27 = e[4] + t26;
-    e_c[4] = t27;
-    real t29 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t28 = y[k] * V[5 * n + k];
-        t29 += t28;
-    }
-    const real t30 = e[5] + t29;
-    e_c[5] = t30;
-    if (found_y) return 2; /* a negative determinant */
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    rest[k] = -(e_f[k] + (e[0] * H[k] + e[1] * H[n + k] + e[2] * H[2 * n + k] + e[3] * H[3 * n + k]
+      + e[4] * H[4 * n + k] + e[5] * H[5 * n + k]));
+  }
+  /* a pivot of D vanishes: a motion is undetermined */
+  const int found_y = mstmm_solve_lu(n, 1, D, rest, y, work, 1e-13);
+  if (found_y == 1) return 1;
+  real t14 = 0;
+  for (int k = 0; k < n; ++k) {
+    t14 += V[k] * y[k];
+  }
+  e_c[0] = e[0] + t14;
+  real t17 = 0;
+  for (int k = 0; k < n; ++k) {
+    t17 += y[k] * V[n + k];
+  }
+  e_c[1] = e[1] + t17;
+  real t20 = 0;
+  for (int k = 0; k < n; ++k) {
+    t20 += y[k] * V[2 * n + k];
+  }
+  e_c[2] = e[2] + t20;
+  real t23 = 0;
+  for (int k = 0; k < n; ++k) {
+    t23 += y[k] * V[3 * n + k];
+  }
+  e_c[3] = e[3] + t23;
+  real t26 = 0;
+  for (int k = 0; k < n; ++k) {
+    t26 += y[k] * V[4 * n + k];
+  }
+  e_c[4] = e[4] + t26;
+  real t29 = 0;
+  for (int k = 0; k < n; ++k) {
+    t29 += y[k] * V[5 * n + k];
+  }
+  e_c[5] = e[5] + t29;
+  if (found_y) return 2; /* a negative determinant */
+  return 0;
 }
 
-int mstmm_sweep_tangent_column_load(int n, const real *restrict H, const real *restrict V,
-    const real *restrict D, const real *restrict e, const real *restrict e_f, real *restrict rest,
-    real *restrict y, real *restrict e_c, real *restrict work)
+int mstmm_sweep_tangent_column_load(int n, in_t H, in_t V, in_t D, in_t e, in_t e_f, out_t rest,
+    out_t y, out_t e_c, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_column_load_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
-    case 2: return mstmm_sweep_tangent_column_load_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
-    case 3: return mstmm_sweep_tangent_column_load_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
-    case 4: return mstmm_sweep_tangent_column_load_sized(4, H, V, D, e, e_f, rest, y, e_c, work);
-    default: return mstmm_sweep_tangent_column_load_sized(n, H, V, D, e, e_f, rest, y, e_c, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_column_load_sized(1, H, V, D, e, e_f, rest, y, e_c, work);
+  case 2: return mstmm_sweep_tangent_column_load_sized(2, H, V, D, e, e_f, rest, y, e_c, work);
+  case 3: return mstmm_sweep_tangent_column_load_sized(3, H, V, D, e, e_f, rest, y, e_c, work);
+  case 4: return mstmm_sweep_tangent_column_load_sized(4, H, V, D, e, e_f, rest, y, e_c, work);
+  default: return mstmm_sweep_tangent_column_load_sized(n, H, V, D, e, e_f, rest, y, e_c, work);
+  }
 }
 
-static int mstmm_sweep_tangent_column_load_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_column_load(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_column_load_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"V", 6, "", 0, 1},
-    {"D", 1, "", 0, 2},
-    {"e", 6, "N, N*m", 0, 0},
-    {"e_f", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_tangent_column_load_outputs[] = {
-    {"rest", 1, "", 0, 1},
-    {"y", 1, "", 0, 1},
-    {"e_c", 6, "N, N*m", 0, 0},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_tangent_column_load_guards[] = {
-    {1, "a pivot of D vanishes: a motion is undetermined"},
-    {2, "the determinant is negative; all results are there"},
-};
+MSTMM_CALL(mstmm_sweep_tangent_column_load, (n, in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3]))
 
 /* solution for a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1595,125 +730,75 @@ static const mstmm_guard mstmm_sweep_tangent_column_load_guards[] = {
  * out z[9] change of the body's motion, own axes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_column_solution_sized(int n, const real *restrict B,
-    const real *restrict gain, const real *restrict y, const real *restrict z_c, real *restrict x,
-    real *restrict z)
+int mstmm_sweep_tangent_column_solution_sized(int n, in_t B, in_t gain, in_t y, in_t z_c, out_t x,
+    out_t z)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = z_c[0] * gain[9 * k];
-        const real t1 = z_c[1] * gain[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = z_c[2] * gain[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = z_c[3] * gain[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = z_c[4] * gain[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = z_c[5] * gain[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = z_c[6] * gain[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = z_c[7] * gain[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = z_c[8] * gain[9 * k + 8];
-        const real t16 = t14 + t15;
-        const real t17 = y[k] - t16;
-        x[k] = t17;
-    }
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = B[9 * k] * x[k];
-        t19 += t18;
-    }
-    const real t20 = z_c[0] + t19;
-    z[0] = t20;
-    real t22 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t21 = x[k] * B[9 * k + 1];
-        t22 += t21;
-    }
-    const real t23 = z_c[1] + t22;
-    z[1] = t23;
-    real t25 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t24 = x[k] * B[9 * k + 2];
-        t25 += t24;
-    }
-    const real t26 = z_c[2] + t25;
-    z[2] = t26;
-    real t28 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t27 = x[k] * B[9 * k + 3];
-        t28 += t27;
-    }
-    const real t29 = z_c[3] + t28;
-    z[3] = t29;
-    real t31 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t30 = x[k] * B[9 * k + 4];
-        t31 += t30;
-    }
-    const real t32 = z_c[4] + t31;
-    z[4] = t32;
-    real t34 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t33 = x[k] * B[9 * k + 5];
-        t34 += t33;
-    }
-    const real t35 = z_c[5] + t34;
-    z[5] = t35;
-    real t37 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t36 = x[k] * B[9 * k + 6];
-        t37 += t36;
-    }
-    const real t38 = z_c[6] + t37;
-    z[6] = t38;
-    real t40 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t39 = x[k] * B[9 * k + 7];
-        t40 += t39;
-    }
-    const real t41 = z_c[7] + t40;
-    z[7] = t41;
-    real t43 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t42 = x[k] * B[9 * k + 8];
-        t43 += t42;
-    }
-    const real t44 = z_c[8] + t43;
-    z[8] = t44;
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    x[k] = y[k] - (z_c[0] * gain[9 * k] + z_c[1] * gain[9 * k + 1] + z_c[2] * gain[9 * k + 2] +
+      z_c[3] * gain[9 * k + 3] + z_c[4] * gain[9 * k + 4] + z_c[5] * gain[9 * k + 5] + z_c[6] *
+      gain[9 * k + 6] + z_c[7] * gain[9 * k + 7] + z_c[8] * gain[9 * k + 8]);
+  }
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += B[9 * k] * x[k];
+  }
+  z[0] = z_c[0] + t19;
+  real t22 = 0;
+  for (int k = 0; k < n; ++k) {
+    t22 += x[k] * B[9 * k + 1];
+  }
+  z[1] = z_c[1] + t22;
+  real t25 = 0;
+  for (int k = 0; k < n; ++k) {
+    t25 += x[k] * B[9 * k + 2];
+  }
+  z[2] = z_c[2] + t25;
+  real t28 = 0;
+  for (int k = 0; k < n; ++k) {
+    t28 += x[k] * B[9 * k + 3];
+  }
+  z[3] = z_c[3] + t28;
+  real t31 = 0;
+  for (int k = 0; k < n; ++k) {
+    t31 += x[k] * B[9 * k + 4];
+  }
+  z[4] = z_c[4] + t31;
+  real t34 = 0;
+  for (int k = 0; k < n; ++k) {
+    t34 += x[k] * B[9 * k + 5];
+  }
+  z[5] = z_c[5] + t34;
+  real t37 = 0;
+  for (int k = 0; k < n; ++k) {
+    t37 += x[k] * B[9 * k + 6];
+  }
+  z[6] = z_c[6] + t37;
+  real t40 = 0;
+  for (int k = 0; k < n; ++k) {
+    t40 += x[k] * B[9 * k + 7];
+  }
+  z[7] = z_c[7] + t40;
+  real t43 = 0;
+  for (int k = 0; k < n; ++k) {
+    t43 += x[k] * B[9 * k + 8];
+  }
+  z[8] = z_c[8] + t43;
+  return 0;
 }
 
-int mstmm_sweep_tangent_column_solution(int n, const real *restrict B, const real *restrict gain,
-    const real *restrict y, const real *restrict z_c, real *restrict x, real *restrict z)
+int mstmm_sweep_tangent_column_solution(int n, in_t B, in_t gain, in_t y, in_t z_c, out_t x,
+    out_t z)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_column_solution_sized(1, B, gain, y, z_c, x, z);
-    case 2: return mstmm_sweep_tangent_column_solution_sized(2, B, gain, y, z_c, x, z);
-    case 3: return mstmm_sweep_tangent_column_solution_sized(3, B, gain, y, z_c, x, z);
-    case 4: return mstmm_sweep_tangent_column_solution_sized(4, B, gain, y, z_c, x, z);
-    default: return mstmm_sweep_tangent_column_solution_sized(n, B, gain, y, z_c, x, z);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_column_solution_sized(1, B, gain, y, z_c, x, z);
+  case 2: return mstmm_sweep_tangent_column_solution_sized(2, B, gain, y, z_c, x, z);
+  case 3: return mstmm_sweep_tangent_column_solution_sized(3, B, gain, y, z_c, x, z);
+  case 4: return mstmm_sweep_tangent_column_solution_sized(4, B, gain, y, z_c, x, z);
+  default: return mstmm_sweep_tangent_column_solution_sized(n, B, gain, y, z_c, x, z);
+  }
 }
 
-static int mstmm_sweep_tangent_column_solution_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_column_solution(n, in[0], in[1], in[2], in[3], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_column_solution_inputs[] = {
-    {"B", 9, "", 0, 1},
-    {"gain", 9, "", 0, 1},
-    {"y", 1, "", 0, 1},
-    {"z_c", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_tangent_column_solution_outputs[] = {
-    {"x", 1, "", 0, 1},
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_tangent_column_solution, (n, in[0], in[1], in[2], in[3], out[0], out[1]))
 
 /* change of motion with the unknowns' part
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1724,101 +809,68 @@ static const mstmm_port mstmm_sweep_tangent_column_solution_outputs[] = {
  * out z[9] change of the body's motion, own axes
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_port_motion_sized(int n, const real *restrict B, const real *restrict x,
-    const real *restrict z_c, real *restrict z)
+int mstmm_sweep_tangent_port_motion_sized(int n, in_t B, in_t x, in_t z_c, out_t z)
 {
-    real t1 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t0 = B[9 * k] * x[k];
-        t1 += t0;
-    }
-    const real t2 = z_c[0] + t1;
-    z[0] = t2;
-    real t4 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t3 = x[k] * B[9 * k + 1];
-        t4 += t3;
-    }
-    const real t5 = z_c[1] + t4;
-    z[1] = t5;
-    real t7 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t6 = x[k] * B[9 * k + 2];
-        t7 += t6;
-    }
-    const real t8 = z_c[2] + t7;
-    z[2] = t8;
-    real t10 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t9 = x[k] * B[9 * k + 3];
-        t10 += t9;
-    }
-    const real t11 = z_c[3] + t10;
-    z[3] = t11;
-    real t13 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t12 = x[k] * B[9 * k + 4];
-        t13 += t12;
-    }
-    const real t14 = z_c[4] + t13;
-    z[4] = t14;
-    real t16 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t15 = x[k] * B[9 * k + 5];
-        t16 += t15;
-    }
-    const real t17 = z_c[5] + t16;
-    z[5] = t17;
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = x[k] * B[9 * k + 6];
-        t19 += t18;
-    }
-    const real t20 = z_c[6] + t19;
-    z[6] = t20;
-    real t22 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t21 = x[k] * B[9 * k + 7];
-        t22 += t21;
-    }
-    const real t23 = z_c[7] + t22;
-    z[7] = t23;
-    real t25 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t24 = x[k] * B[9 * k + 8];
-        t25 += t24;
-    }
-    const real t26 = z_c[8] + t25;
-    z[8] = t26;
-    return 0;
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += B[9 * k] * x[k];
+  }
+  z[0] = z_c[0] + t1;
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += x[k] * B[9 * k + 1];
+  }
+  z[1] = z_c[1] + t4;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += x[k] * B[9 * k + 2];
+  }
+  z[2] = z_c[2] + t7;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += x[k] * B[9 * k + 3];
+  }
+  z[3] = z_c[3] + t10;
+  real t13 = 0;
+  for (int k = 0; k < n; ++k) {
+    t13 += x[k] * B[9 * k + 4];
+  }
+  z[4] = z_c[4] + t13;
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += x[k] * B[9 * k + 5];
+  }
+  z[5] = z_c[5] + t16;
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += x[k] * B[9 * k + 6];
+  }
+  z[6] = z_c[6] + t19;
+  real t22 = 0;
+  for (int k = 0; k < n; ++k) {
+    t22 += x[k] * B[9 * k + 7];
+  }
+  z[7] = z_c[7] + t22;
+  real t25 = 0;
+  for (int k = 0; k < n; ++k) {
+    t25 += x[k] * B[9 * k + 8];
+  }
+  z[8] = z_c[8] + t25;
+  return 0;
 }
 
-int mstmm_sweep_tangent_port_motion(int n, const real *restrict B, const real *restrict x,
-    const real *restrict z_c, real *restrict z)
+int mstmm_sweep_tangent_port_motion(int n, in_t B, in_t x, in_t z_c, out_t z)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_port_motion_sized(1, B, x, z_c, z);
-    case 2: return mstmm_sweep_tangent_port_motion_sized(2, B, x, z_c, z);
-    case 3: return mstmm_sweep_tangent_port_motion_sized(3, B, x, z_c, z);
-    case 4: return mstmm_sweep_tangent_port_motion_sized(4, B, x, z_c, z);
-    default: return mstmm_sweep_tangent_port_motion_sized(n, B, x, z_c, z);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_port_motion_sized(1, B, x, z_c, z);
+  case 2: return mstmm_sweep_tangent_port_motion_sized(2, B, x, z_c, z);
+  case 3: return mstmm_sweep_tangent_port_motion_sized(3, B, x, z_c, z);
+  case 4: return mstmm_sweep_tangent_port_motion_sized(4, B, x, z_c, z);
+  default: return mstmm_sweep_tangent_port_motion_sized(n, B, x, z_c, z);
+  }
 }
 
-static int mstmm_sweep_tangent_port_motion_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_port_motion(n, in[0], in[1], in[2], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_port_motion_inputs[] = {
-    {"B", 9, "", 0, 1},
-    {"x", 1, "", 0, 1},
-    {"z_c", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_tangent_port_motion_outputs[] = {
-    {"z", 9, "", 0, 0},
-};
+MSTMM_CALL(mstmm_sweep_tangent_port_motion, (n, in[0], in[1], in[2], out[0]))
 
 /* change of coordinates by that of their rates
  * in  sq[1] (1/s) inverse time of the step
@@ -1830,60 +882,35 @@ static const mstmm_port mstmm_sweep_tangent_port_motion_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_increment_matrix_sized(int n, const real *restrict sq,
-    const real *restrict kappa, const real *restrict one, const real *restrict g_q,
-    real *restrict A, real *restrict Q, real *restrict work)
+int mstmm_sweep_tangent_increment_matrix_sized(int n, in_t sq, in_t kappa, in_t one, in_t g_q,
+    out_t A, out_t Q, out_t work)
 {
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t0 = sq[0] * one[n * k + l];
-            const real t1 = kappa[0] * g_q[n * l + k];
-            const real t2 = t0 - t1;
-            A[n * k + l] = t2;
-        }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      A[n * k + l] = sq[0] * one[n * k + l] - kappa[0] * g_q[n * l + k];
     }
-    /* a pivot of A vanishes: a motion is undetermined */
-    const int found_Q = mstmm_solve_lu(n, n, A, one, Q, work, 1e-13);
-    if (found_Q == 1) return 1;
-    if (found_Q) return 2; /* a negative determinant */
-    return 0;
+  }
+  /* a pivot of A vanishes: a motion is undetermined */
+  const int found_Q = mstmm_solve_lu(n, n, A, one, Q, work, 1e-13);
+  if (found_Q == 1) return 1;
+  if (found_Q) return 2; /* a negative determinant */
+  return 0;
 }
 
-int mstmm_sweep_tangent_increment_matrix(int n, const real *restrict sq, const real *restrict kappa,
-    const real *restrict one, const real *restrict g_q, real *restrict A, real *restrict Q,
-    real *restrict work)
+int mstmm_sweep_tangent_increment_matrix(int n, in_t sq, in_t kappa, in_t one, in_t g_q, out_t A,
+    out_t Q, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_increment_matrix_sized(1, sq, kappa, one, g_q, A, Q, work);
-    case 2: return mstmm_sweep_tangent_increment_matrix_sized(2, sq, kappa, one, g_q, A, Q, work);
-    case 3: return mstmm_sweep_tangent_increment_matrix_sized(3, sq, kappa, one, g_q, A, Q, work);
-    case 4: return mstmm_sweep_tangent_increment_matrix_sized(4, sq, kappa, one, g_q, A, Q, work);
-    default: return mstmm_sweep_tangent_increment_matrix_sized(n, sq, kappa, one, g_q, A, Q, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_increment_matrix_sized(1, sq, kappa, one, g_q, A, Q, work);
+  case 2: return mstmm_sweep_tangent_increment_matrix_sized(2, sq, kappa, one, g_q, A, Q, work);
+  case 3: return mstmm_sweep_tangent_increment_matrix_sized(3, sq, kappa, one, g_q, A, Q, work);
+  case 4: return mstmm_sweep_tangent_increment_matrix_sized(4, sq, kappa, one, g_q, A, Q, work);
+  default: return mstmm_sweep_tangent_increment_matrix_sized(n, sq, kappa, one, g_q, A, Q, work);
+  }
 }
 
-static int mstmm_sweep_tangent_increment_matrix_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_increment_matrix(n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_increment_matrix_inputs[] = {
-    {"sq", 1, "1/s", 0, 0},
-    {"kappa", 1, "", 0, 0},
-    {"one", 1, "", 0, 2},
-    {"g_q", 1, "", 0, 2},
-};
-
-static const mstmm_port mstmm_sweep_tangent_increment_matrix_outputs[] = {
-    {"A", 1, "", 0, 2},
-    {"Q", 1, "", 0, 2},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_tangent_increment_matrix_guards[] = {
-    {1, "a pivot of A vanishes: a motion is undetermined"},
-    {2, "the determinant is negative; all results are there"},
-};
+MSTMM_CALL(mstmm_sweep_tangent_increment_matrix, (n, in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
 
 /* change of coordinates
  * in  Q[n][n] (sq 1 - kappa g_q)^-1
@@ -1891,45 +918,30 @@ static const mstmm_guard mstmm_sweep_tangent_increment_matrix_guards[] = {
  * out dq[n] change of the coordinates
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_coordinate_increment_sized(int n, const real *restrict Q,
-    const real *restrict rate, real *restrict dq)
+int mstmm_sweep_tangent_coordinate_increment_sized(int n, in_t Q, in_t rate, out_t dq)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = Q[n * k + l] * rate[l];
-            t1 += t0;
-        }
-        dq[k] = t1;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += Q[n * k + l] * rate[l];
     }
-    return 0;
+    dq[k] = t1;
+  }
+  return 0;
 }
 
-int mstmm_sweep_tangent_coordinate_increment(int n, const real *restrict Q,
-    const real *restrict rate, real *restrict dq)
+int mstmm_sweep_tangent_coordinate_increment(int n, in_t Q, in_t rate, out_t dq)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_coordinate_increment_sized(1, Q, rate, dq);
-    case 2: return mstmm_sweep_tangent_coordinate_increment_sized(2, Q, rate, dq);
-    case 3: return mstmm_sweep_tangent_coordinate_increment_sized(3, Q, rate, dq);
-    case 4: return mstmm_sweep_tangent_coordinate_increment_sized(4, Q, rate, dq);
-    default: return mstmm_sweep_tangent_coordinate_increment_sized(n, Q, rate, dq);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_coordinate_increment_sized(1, Q, rate, dq);
+  case 2: return mstmm_sweep_tangent_coordinate_increment_sized(2, Q, rate, dq);
+  case 3: return mstmm_sweep_tangent_coordinate_increment_sized(3, Q, rate, dq);
+  case 4: return mstmm_sweep_tangent_coordinate_increment_sized(4, Q, rate, dq);
+  default: return mstmm_sweep_tangent_coordinate_increment_sized(n, Q, rate, dq);
+  }
 }
 
-static int mstmm_sweep_tangent_coordinate_increment_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_coordinate_increment(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_coordinate_increment_inputs[] = {
-    {"Q", 1, "", 0, 2},
-    {"rate", 1, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_tangent_coordinate_increment_outputs[] = {
-    {"dq", 1, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_tangent_coordinate_increment, (n, in[0], in[1], out[0]))
 
 /* rows of a hinge by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -1939,163 +951,59 @@ static const mstmm_port mstmm_sweep_tangent_coordinate_increment_outputs[] = {
  * out Z_p[9][n] rows by the pose, one row per entry
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_rows_sized(int n, const real *restrict H, const real *restrict S_p,
-    real *restrict Z_p)
+int mstmm_sweep_tangent_placed_rows_sized(int n, in_t H, in_t S_p, out_t Z_p)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S_p[0] * H[k];
-        const real t1 = S_p[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = S_p[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = S_p[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = S_p[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = S_p[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        Z_p[k] = t10;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t11 = S_p[6] * H[k];
-        const real t12 = S_p[7] * H[n + k];
-        const real t13 = t11 + t12;
-        const real t14 = S_p[8] * H[2 * n + k];
-        const real t15 = t13 + t14;
-        const real t16 = S_p[9] * H[3 * n + k];
-        const real t17 = t15 + t16;
-        const real t18 = S_p[10] * H[4 * n + k];
-        const real t19 = t17 + t18;
-        const real t20 = S_p[11] * H[5 * n + k];
-        const real t21 = t19 + t20;
-        Z_p[n + k] = t21;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t22 = S_p[12] * H[k];
-        const real t23 = S_p[13] * H[n + k];
-        const real t24 = t22 + t23;
-        const real t25 = S_p[14] * H[2 * n + k];
-        const real t26 = t24 + t25;
-        const real t27 = S_p[15] * H[3 * n + k];
-        const real t28 = t26 + t27;
-        const real t29 = S_p[16] * H[4 * n + k];
-        const real t30 = t28 + t29;
-        const real t31 = S_p[17] * H[5 * n + k];
-        const real t32 = t30 + t31;
-        Z_p[2 * n + k] = t32;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t33 = S_p[18] * H[k];
-        const real t34 = S_p[19] * H[n + k];
-        const real t35 = t33 + t34;
-        const real t36 = S_p[20] * H[2 * n + k];
-        const real t37 = t35 + t36;
-        const real t38 = S_p[21] * H[3 * n + k];
-        const real t39 = t37 + t38;
-        const real t40 = S_p[22] * H[4 * n + k];
-        const real t41 = t39 + t40;
-        const real t42 = S_p[23] * H[5 * n + k];
-        const real t43 = t41 + t42;
-        Z_p[3 * n + k] = t43;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t44 = S_p[24] * H[k];
-        const real t45 = S_p[25] * H[n + k];
-        const real t46 = t44 + t45;
-        const real t47 = S_p[26] * H[2 * n + k];
-        const real t48 = t46 + t47;
-        const real t49 = S_p[27] * H[3 * n + k];
-        const real t50 = t48 + t49;
-        const real t51 = S_p[28] * H[4 * n + k];
-        const real t52 = t50 + t51;
-        const real t53 = S_p[29] * H[5 * n + k];
-        const real t54 = t52 + t53;
-        Z_p[4 * n + k] = t54;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t55 = S_p[30] * H[k];
-        const real t56 = S_p[31] * H[n + k];
-        const real t57 = t55 + t56;
-        const real t58 = S_p[32] * H[2 * n + k];
-        const real t59 = t57 + t58;
-        const real t60 = S_p[33] * H[3 * n + k];
-        const real t61 = t59 + t60;
-        const real t62 = S_p[34] * H[4 * n + k];
-        const real t63 = t61 + t62;
-        const real t64 = S_p[35] * H[5 * n + k];
-        const real t65 = t63 + t64;
-        Z_p[5 * n + k] = t65;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t66 = S_p[36] * H[k];
-        const real t67 = S_p[37] * H[n + k];
-        const real t68 = t66 + t67;
-        const real t69 = S_p[38] * H[2 * n + k];
-        const real t70 = t68 + t69;
-        const real t71 = S_p[39] * H[3 * n + k];
-        const real t72 = t70 + t71;
-        const real t73 = S_p[40] * H[4 * n + k];
-        const real t74 = t72 + t73;
-        const real t75 = S_p[41] * H[5 * n + k];
-        const real t76 = t74 + t75;
-        Z_p[6 * n + k] = t76;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t77 = S_p[42] * H[k];
-        const real t78 = S_p[43] * H[n + k];
-        const real t79 = t77 + t78;
-        const real t80 = S_p[44] * H[2 * n + k];
-        const real t81 = t79 + t80;
-        const real t82 = S_p[45] * H[3 * n + k];
-        const real t83 = t81 + t82;
-        const real t84 = S_p[46] * H[4 * n + k];
-        const real t85 = t83 + t84;
-        const real t86 = S_p[47] * H[5 * n + k];
-        const real t87 = t85 + t86;
-        Z_p[7 * n + k] = t87;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t88 = S_p[48] * H[k];
-        const real t89 = S_p[49] * H[n + k];
-        const real t90 = t88 + t89;
-        const real t91 = S_p[50] * H[2 * n + k];
-        const real t92 = t90 + t91;
-        const real t93 = S_p[51] * H[3 * n + k];
-        const real t94 = t92 + t93;
-        const real t95 = S_p[52] * H[4 * n + k];
-        const real t96 = t94 + t95;
-        const real t97 = S_p[53] * H[5 * n + k];
-        const real t98 = t96 + t97;
-        Z_p[8 * n + k] = t98;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    Z_p[k] = S_p[0] * H[k] + S_p[1] * H[n + k] + S_p[2] * H[2 * n + k] + S_p[3] * H[3 * n + k] +
+      S_p[4] * H[4 * n + k] + S_p[5] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[n + k] = S_p[6] * H[k] + S_p[7] * H[n + k] + S_p[8] * H[2 * n + k] + S_p[9] * H[3 * n + k] +
+      S_p[10] * H[4 * n + k] + S_p[11] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[2 * n + k] = S_p[12] * H[k] + S_p[13] * H[n + k] + S_p[14] * H[2 * n + k] + S_p[15] * H[3 *
+      n + k] + S_p[16] * H[4 * n + k] + S_p[17] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[3 * n + k] = S_p[18] * H[k] + S_p[19] * H[n + k] + S_p[20] * H[2 * n + k] + S_p[21] * H[3 *
+      n + k] + S_p[22] * H[4 * n + k] + S_p[23] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[4 * n + k] = S_p[24] * H[k] + S_p[25] * H[n + k] + S_p[26] * H[2 * n + k] + S_p[27] * H[3 *
+      n + k] + S_p[28] * H[4 * n + k] + S_p[29] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[5 * n + k] = S_p[30] * H[k] + S_p[31] * H[n + k] + S_p[32] * H[2 * n + k] + S_p[33] * H[3 *
+      n + k] + S_p[34] * H[4 * n + k] + S_p[35] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[6 * n + k] = S_p[36] * H[k] + S_p[37] * H[n + k] + S_p[38] * H[2 * n + k] + S_p[39] * H[3 *
+      n + k] + S_p[40] * H[4 * n + k] + S_p[41] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[7 * n + k] = S_p[42] * H[k] + S_p[43] * H[n + k] + S_p[44] * H[2 * n + k] + S_p[45] * H[3 *
+      n + k] + S_p[46] * H[4 * n + k] + S_p[47] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[8 * n + k] = S_p[48] * H[k] + S_p[49] * H[n + k] + S_p[50] * H[2 * n + k] + S_p[51] * H[3 *
+      n + k] + S_p[52] * H[4 * n + k] + S_p[53] * H[5 * n + k];
+  }
+  return 0;
 }
 
-int mstmm_sweep_tangent_placed_rows(int n, const real *restrict H, const real *restrict S_p,
-    real *restrict Z_p)
+int mstmm_sweep_tangent_placed_rows(int n, in_t H, in_t S_p, out_t Z_p)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_rows_sized(1, H, S_p, Z_p);
-    case 2: return mstmm_sweep_tangent_placed_rows_sized(2, H, S_p, Z_p);
-    case 3: return mstmm_sweep_tangent_placed_rows_sized(3, H, S_p, Z_p);
-    case 4: return mstmm_sweep_tangent_placed_rows_sized(4, H, S_p, Z_p);
-    default: return mstmm_sweep_tangent_placed_rows_sized(n, H, S_p, Z_p);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_rows_sized(1, H, S_p, Z_p);
+  case 2: return mstmm_sweep_tangent_placed_rows_sized(2, H, S_p, Z_p);
+  case 3: return mstmm_sweep_tangent_placed_rows_sized(3, H, S_p, Z_p);
+  case 4: return mstmm_sweep_tangent_placed_rows_sized(4, H, S_p, Z_p);
+  default: return mstmm_sweep_tangent_placed_rows_sized(n, H, S_p, Z_p);
+  }
 }
 
-static int mstmm_sweep_tangent_placed_rows_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_placed_rows(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_placed_rows_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"S_p", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_tangent_placed_rows_outputs[] = {
-    {"Z_p", 9, "", 0, 1},
-};
+MSTMM_CALL(mstmm_sweep_tangent_placed_rows, (n, in[0], in[1], out[0]))
 
 /* load and rows along the unknowns by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2107,181 +1015,61 @@ static const mstmm_port mstmm_sweep_tangent_placed_rows_outputs[] = {
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_own_sized(int n, const real *restrict B_p, const real *restrict S_p,
-    const real *restrict Z_p, real *restrict K, real *restrict Z_x)
+int mstmm_sweep_tangent_placed_own_sized(int n, in_t B_p, in_t S_p, in_t Z_p, out_t K, out_t Z_x)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S_p[0] * B_p[9 * k];
-        const real t1 = S_p[6] * B_p[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = S_p[12] * B_p[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = S_p[18] * B_p[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = S_p[24] * B_p[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = S_p[30] * B_p[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = S_p[36] * B_p[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = S_p[42] * B_p[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = S_p[48] * B_p[9 * k + 8];
-        const real t16 = t14 + t15;
-        K[6 * k] += t16;
+  for (int k = 0; k < n; ++k) {
+    K[6 * k] += S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k + 2] + S_p[18] *
+      B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36] * B_p[9 * k +
+      6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 1] += S_p[1] * B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] +
+      S_p[19] * B_p[9 * k + 3] + S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] *
+      B_p[9 * k + 6] + S_p[43] * B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 2] += S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k + 1] + S_p[14] * B_p[9 * k + 2] +
+      S_p[20] * B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] + S_p[32] * B_p[9 * k + 5] + S_p[38] *
+      B_p[9 * k + 6] + S_p[44] * B_p[9 * k + 7] + S_p[50] * B_p[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 3] += S_p[3] * B_p[9 * k] + S_p[9] * B_p[9 * k + 1] + S_p[15] * B_p[9 * k + 2] +
+      S_p[21] * B_p[9 * k + 3] + S_p[27] * B_p[9 * k + 4] + S_p[33] * B_p[9 * k + 5] + S_p[39] *
+      B_p[9 * k + 6] + S_p[45] * B_p[9 * k + 7] + S_p[51] * B_p[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 4] += S_p[4] * B_p[9 * k] + S_p[10] * B_p[9 * k + 1] + S_p[16] * B_p[9 * k + 2] +
+      S_p[22] * B_p[9 * k + 3] + S_p[28] * B_p[9 * k + 4] + S_p[34] * B_p[9 * k + 5] + S_p[40] *
+      B_p[9 * k + 6] + S_p[46] * B_p[9 * k + 7] + S_p[52] * B_p[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 5] += S_p[5] * B_p[9 * k] + S_p[11] * B_p[9 * k + 1] + S_p[17] * B_p[9 * k + 2] +
+      S_p[23] * B_p[9 * k + 3] + S_p[29] * B_p[9 * k + 4] + S_p[35] * B_p[9 * k + 5] + S_p[41] *
+      B_p[9 * k + 6] + S_p[47] * B_p[9 * k + 7] + S_p[53] * B_p[9 * k + 8];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] += B_p[9 * k] * Z_p[l] + B_p[9 * k + 1] * Z_p[n + l] + B_p[9 * k + 2] * Z_p[2 *
+        n + l] + B_p[9 * k + 3] * Z_p[3 * n + l] + B_p[9 * k + 4] * Z_p[4 * n + l] + B_p[9 * k + 5]
+        * Z_p[5 * n + l] + B_p[9 * k + 6] * Z_p[6 * n + l] + B_p[9 * k + 7] * Z_p[7 * n + l] + B_p[9
+        * k + 8] * Z_p[8 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        const real t17 = S_p[1] * B_p[9 * k];
-        const real t18 = S_p[7] * B_p[9 * k + 1];
-        const real t19 = t17 + t18;
-        const real t20 = S_p[13] * B_p[9 * k + 2];
-        const real t21 = t19 + t20;
-        const real t22 = S_p[19] * B_p[9 * k + 3];
-        const real t23 = t21 + t22;
-        const real t24 = S_p[25] * B_p[9 * k + 4];
-        const real t25 = t23 + t24;
-        const real t26 = S_p[31] * B_p[9 * k + 5];
-        const real t27 = t25 + t26;
-        const real t28 = S_p[37] * B_p[9 * k + 6];
-        const real t29 = t27 + t28;
-        const real t30 = S_p[43] * B_p[9 * k + 7];
-        const real t31 = t29 + t30;
-        const real t32 = S_p[49] * B_p[9 * k + 8];
-        const real t33 = t31 + t32;
-        K[6 * k + 1] += t33;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t34 = S_p[2] * B_p[9 * k];
-        const real t35 = S_p[8] * B_p[9 * k + 1];
-        const real t36 = t34 + t35;
-        const real t37 = S_p[14] * B_p[9 * k + 2];
-        const real t38 = t36 + t37;
-        const real t39 = S_p[20] * B_p[9 * k + 3];
-        const real t40 = t38 + t39;
-        const real t41 = S_p[26] * B_p[9 * k + 4];
-        const real t42 = t40 + t41;
-        const real t43 = S_p[32] * B_p[9 * k + 5];
-        const real t44 = t42 + t43;
-        const real t45 = S_p[38] * B_p[9 * k + 6];
-        const real t46 = t44 + t45;
-        const real t47 = S_p[44] * B_p[9 * k + 7];
-        const real t48 = t46 + t47;
-        const real t49 = S_p[50] * B_p[9 * k + 8];
-        const real t50 = t48 + t49;
-        K[6 * k + 2] += t50;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t51 = S_p[3] * B_p[9 * k];
-        const real t52 = S_p[9] * B_p[9 * k + 1];
-        const real t53 = t51 + t52;
-        const real t54 = S_p[15] * B_p[9 * k + 2];
-        const real t55 = t53 + t54;
-        const real t56 = S_p[21] * B_p[9 * k + 3];
-        const real t57 = t55 + t56;
-        const real t58 = S_p[27] * B_p[9 * k + 4];
-        const real t59 = t57 + t58;
-        const real t60 = S_p[33] * B_p[9 * k + 5];
-        const real t61 = t59 + t60;
-        const real t62 = S_p[39] * B_p[9 * k + 6];
-        const real t63 = t61 + t62;
-        const real t64 = S_p[45] * B_p[9 * k + 7];
-        const real t65 = t63 + t64;
-        const real t66 = S_p[51] * B_p[9 * k + 8];
-        const real t67 = t65 + t66;
-        K[6 * k + 3] += t67;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t68 = S_p[4] * B_p[9 * k];
-        const real t69 = S_p[10] * B_p[9 * k + 1];
-        const real t70 = t68 + t69;
-        const real t71 = S_p[16] * B_p[9 * k + 2];
-        const real t72 = t70 + t71;
-        const real t73 = S_p[22] * B_p[9 * k + 3];
-        const real t74 = t72 + t73;
-        const real t75 = S_p[28] * B_p[9 * k + 4];
-        const real t76 = t74 + t75;
-        const real t77 = S_p[34] * B_p[9 * k + 5];
-        const real t78 = t76 + t77;
-        const real t79 = S_p[40] * B_p[9 * k + 6];
-        const real t80 = t78 + t79;
-        const real t81 = S_p[46] * B_p[9 * k + 7];
-        const real t82 = t80 + t81;
-        const real t83 = S_p[52] * B_p[9 * k + 8];
-        const real t84 = t82 + t83;
-        K[6 * k + 4] += t84;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t85 = S_p[5] * B_p[9 * k];
-        const real t86 = S_p[11] * B_p[9 * k + 1];
-        const real t87 = t85 + t86;
-        const real t88 = S_p[17] * B_p[9 * k + 2];
-        const real t89 = t87 + t88;
-        const real t90 = S_p[23] * B_p[9 * k + 3];
-        const real t91 = t89 + t90;
-        const real t92 = S_p[29] * B_p[9 * k + 4];
-        const real t93 = t91 + t92;
-        const real t94 = S_p[35] * B_p[9 * k + 5];
-        const real t95 = t93 + t94;
-        const real t96 = S_p[41] * B_p[9 * k + 6];
-        const real t97 = t95 + t96;
-        const real t98 = S_p[47] * B_p[9 * k + 7];
-        const real t99 = t97 + t98;
-        const real t100 = S_p[53] * B_p[9 * k + 8];
-        const real t101 = t99 + t100;
-        K[6 * k + 5] += t101;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t102 = B_p[9 * k] * Z_p[l];
-            const real t103 = B_p[9 * k + 1] * Z_p[n + l];
-            const real t104 = t102 + t103;
-            const real t105 = B_p[9 * k + 2] * Z_p[2 * n + l];
-            const real t106 = t104 + t105;
-            const real t107 = B_p[9 * k + 3] * Z_p[3 * n + l];
-            const real t108 = t106 + t107;
-            const real t109 = B_p[9 * k + 4] * Z_p[4 * n + l];
-            const real t110 = t108 + t109;
-            const real t111 = B_p[9 * k + 5] * Z_p[5 * n + l];
-            const real t112 = t110 + t111;
-            const real t113 = B_p[9 * k + 6] * Z_p[6 * n + l];
-            const real t114 = t112 + t113;
-            const real t115 = B_p[9 * k + 7] * Z_p[7 * n + l];
-            const real t116 = t114 + t115;
-            const real t117 = B_p[9 * k + 8] * Z_p[8 * n + l];
-            const real t118 = t116 + t117;
-            Z_x[n * k + l] += t118;
-        }
-    }
-    return 0;
+  }
+  return 0;
 }
 
-int mstmm_sweep_tangent_placed_own(int n, const real *restrict B_p, const real *restrict S_p,
-    const real *restrict Z_p, real *restrict K, real *restrict Z_x)
+int mstmm_sweep_tangent_placed_own(int n, in_t B_p, in_t S_p, in_t Z_p, out_t K, out_t Z_x)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
-    case 2: return mstmm_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
-    case 3: return mstmm_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
-    case 4: return mstmm_sweep_tangent_placed_own_sized(4, B_p, S_p, Z_p, K, Z_x);
-    default: return mstmm_sweep_tangent_placed_own_sized(n, B_p, S_p, Z_p, K, Z_x);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_own_sized(1, B_p, S_p, Z_p, K, Z_x);
+  case 2: return mstmm_sweep_tangent_placed_own_sized(2, B_p, S_p, Z_p, K, Z_x);
+  case 3: return mstmm_sweep_tangent_placed_own_sized(3, B_p, S_p, Z_p, K, Z_x);
+  case 4: return mstmm_sweep_tangent_placed_own_sized(4, B_p, S_p, Z_p, K, Z_x);
+  default: return mstmm_sweep_tangent_placed_own_sized(n, B_p, S_p, Z_p, K, Z_x);
+  }
 }
 
-static int mstmm_sweep_tangent_placed_own_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_placed_own(n, in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_placed_own_inputs[] = {
-    {"B_p", 9, "", 0, 1},
-    {"S_p", 54, "", 0, 0},
-    {"Z_p", 9, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_tangent_placed_own_outputs[] = {
-    {"K", 6, "", 1, 1},
-    {"Z_x", 1, "", 1, 2},
-};
+MSTMM_CALL(mstmm_sweep_tangent_placed_own, (n, in[0], in[1], in[2], out[0], out[1]))
 
 /* unknowns of a hinge eliminated from loads by the pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2293,489 +1081,357 @@ static const mstmm_port mstmm_sweep_tangent_placed_own_outputs[] = {
  * out S_p[9][6] change of the load by the pose, one row per entry, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_reduce_sized(int n, const real *restrict inverse,
-    const real *restrict Z_p, const real *restrict V, real *restrict gain, real *restrict S_p)
+int mstmm_sweep_tangent_placed_reduce_sized(int n, in_t inverse, in_t Z_p, in_t V, out_t gain,
+    out_t S_p)
 {
-    for (int k = 0; k < n; ++k) {
-        real t1 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t0 = inverse[n * k + l] * Z_p[l];
-            t1 += t0;
-        }
-        gain[9 * k] = t1;
+  for (int k = 0; k < n; ++k) {
+    real t1 = 0;
+    for (int l = 0; l < n; ++l) {
+      t1 += inverse[n * k + l] * Z_p[l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t3 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t2 = inverse[n * k + l] * Z_p[n + l];
-            t3 += t2;
-        }
-        gain[9 * k + 1] = t3;
+    gain[9 * k] = t1;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t3 = 0;
+    for (int l = 0; l < n; ++l) {
+      t3 += inverse[n * k + l] * Z_p[n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t5 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t4 = inverse[n * k + l] * Z_p[2 * n + l];
-            t5 += t4;
-        }
-        gain[9 * k + 2] = t5;
+    gain[9 * k + 1] = t3;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t5 = 0;
+    for (int l = 0; l < n; ++l) {
+      t5 += inverse[n * k + l] * Z_p[2 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t7 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t6 = inverse[n * k + l] * Z_p[3 * n + l];
-            t7 += t6;
-        }
-        gain[9 * k + 3] = t7;
+    gain[9 * k + 2] = t5;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t7 = 0;
+    for (int l = 0; l < n; ++l) {
+      t7 += inverse[n * k + l] * Z_p[3 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t9 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t8 = inverse[n * k + l] * Z_p[4 * n + l];
-            t9 += t8;
-        }
-        gain[9 * k + 4] = t9;
+    gain[9 * k + 3] = t7;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t9 = 0;
+    for (int l = 0; l < n; ++l) {
+      t9 += inverse[n * k + l] * Z_p[4 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t11 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t10 = inverse[n * k + l] * Z_p[5 * n + l];
-            t11 += t10;
-        }
-        gain[9 * k + 5] = t11;
+    gain[9 * k + 4] = t9;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t11 = 0;
+    for (int l = 0; l < n; ++l) {
+      t11 += inverse[n * k + l] * Z_p[5 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t13 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t12 = inverse[n * k + l] * Z_p[6 * n + l];
-            t13 += t12;
-        }
-        gain[9 * k + 6] = t13;
+    gain[9 * k + 5] = t11;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t13 = 0;
+    for (int l = 0; l < n; ++l) {
+      t13 += inverse[n * k + l] * Z_p[6 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t15 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t14 = inverse[n * k + l] * Z_p[7 * n + l];
-            t15 += t14;
-        }
-        gain[9 * k + 7] = t15;
+    gain[9 * k + 6] = t13;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t15 = 0;
+    for (int l = 0; l < n; ++l) {
+      t15 += inverse[n * k + l] * Z_p[7 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        real t17 = 0;
-        for (int l = 0; l < n; ++l) {
-            const real t16 = inverse[n * k + l] * Z_p[8 * n + l];
-            t17 += t16;
-        }
-        gain[9 * k + 8] = t17;
+    gain[9 * k + 7] = t15;
+  }
+  for (int k = 0; k < n; ++k) {
+    real t17 = 0;
+    for (int l = 0; l < n; ++l) {
+      t17 += inverse[n * k + l] * Z_p[8 * n + l];
     }
-    real t19 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t18 = gain[9 * k] * V[6 * k];
-        t19 += t18;
-    }
-    const real t20 = -t19;
-    S_p[0] += t20;
-    real t22 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t21 = gain[9 * k] * V[6 * k + 1];
-        t22 += t21;
-    }
-    const real t23 = -t22;
-    S_p[1] += t23;
-    real t25 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t24 = gain[9 * k] * V[6 * k + 2];
-        t25 += t24;
-    }
-    const real t26 = -t25;
-    S_p[2] += t26;
-    real t28 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t27 = gain[9 * k] * V[6 * k + 3];
-        t28 += t27;
-    }
-    const real t29 = -t28;
-    S_p[3] += t29;
-    real t31 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t30 = gain[9 * k] * V[6 * k + 4];
-        t31 += t30;
-    }
-    const real t32 = -t31;
-    S_p[4] += t32;
-    real t34 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t33 = gain[9 * k] * V[6 * k + 5];
-        t34 += t33;
-    }
-    const real t35 = -t34;
-    S_p[5] += t35;
-    real t37 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t36 = V[6 * k] * gain[9 * k + 1];
-        t37 += t36;
-    }
-    const real t38 = -t37;
-    S_p[6] += t38;
-    real t40 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t39 = V[6 * k + 1] * gain[9 * k + 1];
-        t40 += t39;
-    }
-    const real t41 = -t40;
-    S_p[7] += t41;
-    real t43 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t42 = V[6 * k + 2] * gain[9 * k + 1];
-        t43 += t42;
-    }
-    const real t44 = -t43;
-    S_p[8] += t44;
-    real t46 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t45 = V[6 * k + 3] * gain[9 * k + 1];
-        t46 += t45;
-    }
-    const real t47 = -t46;
-    S_p[9] += t47;
-    real t49 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t48 = V[6 * k + 4] * gain[9 * k + 1];
-        t49 += t48;
-    }
-    const real t50 = -t49;
-    S_p[10] += t50;
-    real t52 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t51 = V[6 * k + 5] * gain[9 * k + 1];
-        t52 += t51;
-    }
-    const real t53 = -t52;
-    S_p[11] += t53;
-    real t55 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t54 = V[6 * k] * gain[9 * k + 2];
-        t55 += t54;
-    }
-    const real t56 = -t55;
-    S_p[12] += t56;
-    real t58 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t57 = V[6 * k + 1] * gain[9 * k + 2];
-        t58 += t57;
-    }
-    const real t59 = -t58;
-    S_p[13] += t59;
-    real t61 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t60 = V[6 * k + 2] * gain[9 * k + 2];
-        t61 += t60;
-    }
-    const real t62 = -t61;
-    S_p[14] += t62;
-    real t64 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t63 = V[6 * k + 3] * gain[9 * k + 2];
-        t64 += t63;
-    }
-    const real t65 = -t64;
-    S_p[15] += t65;
-    real t67 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t66 = V[6 * k + 4] * gain[9 * k + 2];
-        t67 += t66;
-    }
-    const real t68 = -t67;
-    S_p[16] += t68;
-    real t70 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t69 = V[6 * k + 5] * gain[9 * k + 2];
-        t70 += t69;
-    }
-    const real t71 = -t70;
-    S_p[17] += t71;
-    real t73 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t72 = V[6 * k] * gain[9 * k + 3];
-        t73 += t72;
-    }
-    const real t74 = -t73;
-    S_p[18] += t74;
-    real t76 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t75 = V[6 * k + 1] * gain[9 * k + 3];
-        t76 += t75;
-    }
-    const real t77 = -t76;
-    S_p[19] += t77;
-    real t79 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t78 = V[6 * k + 2] * gain[9 * k + 3];
-        t79 += t78;
-    }
-    const real t80 = -t79;
-    S_p[20] += t80;
-    real t82 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t81 = V[6 * k + 3] * gain[9 * k + 3];
-        t82 += t81;
-    }
-    const real t83 = -t82;
-    S_p[21] += t83;
-    real t85 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t84 = V[6 * k + 4] * gain[9 * k + 3];
-        t85 += t84;
-    }
-    const real t86 = -t85;
-    S_p[22] += t86;
-    real t88 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t87 = V[6 * k + 5] * gain[9 * k + 3];
-        t88 += t87;
-    }
-    const real t89 = -t88;
-    S_p[23] += t89;
-    real t91 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t90 = V[6 * k] * gain[9 * k + 4];
-        t91 += t90;
-    }
-    const real t92 = -t91;
-    S_p[24] += t92;
-    real t94 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t93 = V[6 * k + 1] * gain[9 * k + 4];
-        t94 += t93;
-    }
-    const real t95 = -t94;
-    S_p[25] += t95;
-    real t97 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t96 = V[6 * k + 2] * gain[9 * k + 4];
-        t97 += t96;
-    }
-    const real t98 = -t97;
-    S_p[26] += t98;
-    real t100 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t99 = V[6 * k + 3] * gain[9 * k + 4];
-        t100 += t99;
-    }
-    const real t101 = -t100;
-    S_p[27] += t101;
-    real t103 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t102 = V[6 * k + 4] * gain[9 * k + 4];
-        t103 += t102;
-    }
-    const real t104 = -t103;
-    S_p[28] += t104;
-    real t106 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t105 = V[6 * k + 5] * gain[9 * k + 4];
-        t106 += t105;
-    }
-    const real t107 = -t106;
-    S_p[29] += t107;
-    real t109 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t108 = V[6 * k] * gain[9 * k + 5];
-        t109 += t108;
-    }
-    const real t110 = -t109;
-    S_p[30] += t110;
-    real t112 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t111 = V[6 * k + 1] * gain[9 * k + 5];
-        t112 += t111;
-    }
-    const real t113 = -t112;
-    S_p[31] += t113;
-    real t115 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t114 = V[6 * k + 2] * gain[9 * k + 5];
-        t115 += t114;
-    }
-    const real t116 = -t115;
-    S_p[32] += t116;
-    real t118 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t117 = V[6 * k + 3] * gain[9 * k + 5];
-        t118 += t117;
-    }
-    const real t119 = -t118;
-    S_p[33] += t119;
-    real t121 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t120 = V[6 * k + 4] * gain[9 * k + 5];
-        t121 += t120;
-    }
-    const real t122 = -t121;
-    S_p[34] += t122;
-    real t124 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t123 = V[6 * k + 5] * gain[9 * k + 5];
-        t124 += t123;
-    }
-    const real t125 = -t124;
-    S_p[35] += t125;
-    real t127 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t126 = V[6 * k] * gain[9 * k + 6];
-        t127 += t126;
-    }
-    const real t128 = -t127;
-    S_p[36] += t128;
-    real t130 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t129 = V[6 * k + 1] * gain[9 * k + 6];
-        t130 += t129;
-    }
-    const real t131 = -t130;
-    S_p[37] += t131;
-    real t133 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t132 = V[6 * k + 2] * gain[9 * k + 6];
-        t133 += t132;
-    }
-    const real t134 = -t133;
-    S_p[38] += t134;
-    real t136 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t135 = V[6 * k + 3] * gain[9 * k + 6];
-        t136 += t135;
-    }
-    const real t137 = -t136;
-    S_p[39] += t137;
-    real t139 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t138 = V[6 * k + 4] * gain[9 * k + 6];
-        t139 += t138;
-    }
-    const real t140 = -t139;
-    S_p[40] += t140;
-    real t142 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t141 = V[6 * k + 5] * gain[9 * k + 6];
-        t142 += t141;
-    }
-    const real t143 = -t142;
-    S_p[41] += t143;
-    real t145 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t144 = V[6 * k] * gain[9 * k + 7];
-        t145 += t144;
-    }
-    const real t146 = -t145;
-    S_p[42] += t146;
-    real t148 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t147 = V[6 * k + 1] * gain[9 * k + 7];
-        t148 += t147;
-    }
-    const real t149 = -t148;
-    S_p[43] += t149;
-    real t151 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t150 = V[6 * k + 2] * gain[9 * k + 7];
-        t151 += t150;
-    }
-    const real t152 = -t151;
-    S_p[44] += t152;
-    real t154 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t153 = V[6 * k + 3] * gain[9 * k + 7];
-        t154 += t153;
-    }
-    const real t155 = -t154;
-    S_p[45] += t155;
-    real t157 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t156 = V[6 * k + 4] * gain[9 * k + 7];
-        t157 += t156;
-    }
-    const real t158 = -t157;
-    S_p[46] += t158;
-    real t160 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t159 = V[6 * k + 5] * gain[9 * k + 7];
-        t160 += t159;
-    }
-    const real t161 = -t160;
-    S_p[47] += t161;
-    real t163 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t162 = V[6 * k] * gain[9 * k + 8];
-        t163 += t162;
-    }
-    const real t164 = -t163;
-    S_p[48] += t164;
-    real t166 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t165 = V[6 * k + 1] * gain[9 * k + 8];
-        t166 += t165;
-    }
-    const real t167 = -t166;
-    S_p[49] += t167;
-    real t169 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t168 = V[6 * k + 2] * gain[9 * k + 8];
-        t169 += t168;
-    }
-    const real t170 = -t169;
-    S_p[50] += t170;
-    real t172 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t171 = V[6 * k + 3] * gain[9 * k + 8];
-        t172 += t171;
-    }
-    const real t173 = -t172;
-    S_p[51] += t173;
-    real t175 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t174 = V[6 * k + 4] * gain[9 * k + 8];
-        t175 += t174;
-    }
-    const real t176 = -t175;
-    S_p[52] += t176;
-    real t178 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t177 = V[6 * k + 5] * gain[9 * k + 8];
-        t178 += t177;
-    }
-    const real t179 = -t178;
-    S_p[53] += t179;
-    return 0;
+    gain[9 * k + 8] = t17;
+  }
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += gain[9 * k] * V[6 * k];
+  }
+  S_p[0] += -t19;
+  real t22 = 0;
+  for (int k = 0; k < n; ++k) {
+    t22 += gain[9 * k] * V[6 * k + 1];
+  }
+  S_p[1] += -t22;
+  real t25 = 0;
+  for (int k = 0; k < n; ++k) {
+    t25 += gain[9 * k] * V[6 * k + 2];
+  }
+  S_p[2] += -t25;
+  real t28 = 0;
+  for (int k = 0; k < n; ++k) {
+    t28 += gain[9 * k] * V[6 * k + 3];
+  }
+  S_p[3] += -t28;
+  real t31 = 0;
+  for (int k = 0; k < n; ++k) {
+    t31 += gain[9 * k] * V[6 * k + 4];
+  }
+  S_p[4] += -t31;
+  real t34 = 0;
+  for (int k = 0; k < n; ++k) {
+    t34 += gain[9 * k] * V[6 * k + 5];
+  }
+  S_p[5] += -t34;
+  real t37 = 0;
+  for (int k = 0; k < n; ++k) {
+    t37 += V[6 * k] * gain[9 * k + 1];
+  }
+  S_p[6] += -t37;
+  real t40 = 0;
+  for (int k = 0; k < n; ++k) {
+    t40 += V[6 * k + 1] * gain[9 * k + 1];
+  }
+  S_p[7] += -t40;
+  real t43 = 0;
+  for (int k = 0; k < n; ++k) {
+    t43 += V[6 * k + 2] * gain[9 * k + 1];
+  }
+  S_p[8] += -t43;
+  real t46 = 0;
+  for (int k = 0; k < n; ++k) {
+    t46 += V[6 * k + 3] * gain[9 * k + 1];
+  }
+  S_p[9] += -t46;
+  real t49 = 0;
+  for (int k = 0; k < n; ++k) {
+    t49 += V[6 * k + 4] * gain[9 * k + 1];
+  }
+  S_p[10] += -t49;
+  real t52 = 0;
+  for (int k = 0; k < n; ++k) {
+    t52 += V[6 * k + 5] * gain[9 * k + 1];
+  }
+  S_p[11] += -t52;
+  real t55 = 0;
+  for (int k = 0; k < n; ++k) {
+    t55 += V[6 * k] * gain[9 * k + 2];
+  }
+  S_p[12] += -t55;
+  real t58 = 0;
+  for (int k = 0; k < n; ++k) {
+    t58 += V[6 * k + 1] * gain[9 * k + 2];
+  }
+  S_p[13] += -t58;
+  real t61 = 0;
+  for (int k = 0; k < n; ++k) {
+    t61 += V[6 * k + 2] * gain[9 * k + 2];
+  }
+  S_p[14] += -t61;
+  real t64 = 0;
+  for (int k = 0; k < n; ++k) {
+    t64 += V[6 * k + 3] * gain[9 * k + 2];
+  }
+  S_p[15] += -t64;
+  real t67 = 0;
+  for (int k = 0; k < n; ++k) {
+    t67 += V[6 * k + 4] * gain[9 * k + 2];
+  }
+  S_p[16] += -t67;
+  real t70 = 0;
+  for (int k = 0; k < n; ++k) {
+    t70 += V[6 * k + 5] * gain[9 * k + 2];
+  }
+  S_p[17] += -t70;
+  real t73 = 0;
+  for (int k = 0; k < n; ++k) {
+    t73 += V[6 * k] * gain[9 * k + 3];
+  }
+  S_p[18] += -t73;
+  real t76 = 0;
+  for (int k = 0; k < n; ++k) {
+    t76 += V[6 * k + 1] * gain[9 * k + 3];
+  }
+  S_p[19] += -t76;
+  real t79 = 0;
+  for (int k = 0; k < n; ++k) {
+    t79 += V[6 * k + 2] * gain[9 * k + 3];
+  }
+  S_p[20] += -t79;
+  real t82 = 0;
+  for (int k = 0; k < n; ++k) {
+    t82 += V[6 * k + 3] * gain[9 * k + 3];
+  }
+  S_p[21] += -t82;
+  real t85 = 0;
+  for (int k = 0; k < n; ++k) {
+    t85 += V[6 * k + 4] * gain[9 * k + 3];
+  }
+  S_p[22] += -t85;
+  real t88 = 0;
+  for (int k = 0; k < n; ++k) {
+    t88 += V[6 * k + 5] * gain[9 * k + 3];
+  }
+  S_p[23] += -t88;
+  real t91 = 0;
+  for (int k = 0; k < n; ++k) {
+    t91 += V[6 * k] * gain[9 * k + 4];
+  }
+  S_p[24] += -t91;
+  real t94 = 0;
+  for (int k = 0; k < n; ++k) {
+    t94 += V[6 * k + 1] * gain[9 * k + 4];
+  }
+  S_p[25] += -t94;
+  real t97 = 0;
+  for (int k = 0; k < n; ++k) {
+    t97 += V[6 * k + 2] * gain[9 * k + 4];
+  }
+  S_p[26] += -t97;
+  real t100 = 0;
+  for (int k = 0; k < n; ++k) {
+    t100 += V[6 * k + 3] * gain[9 * k + 4];
+  }
+  S_p[27] += -t100;
+  real t103 = 0;
+  for (int k = 0; k < n; ++k) {
+    t103 += V[6 * k + 4] * gain[9 * k + 4];
+  }
+  S_p[28] += -t103;
+  real t106 = 0;
+  for (int k = 0; k < n; ++k) {
+    t106 += V[6 * k + 5] * gain[9 * k + 4];
+  }
+  S_p[29] += -t106;
+  real t109 = 0;
+  for (int k = 0; k < n; ++k) {
+    t109 += V[6 * k] * gain[9 * k + 5];
+  }
+  S_p[30] += -t109;
+  real t112 = 0;
+  for (int k = 0; k < n; ++k) {
+    t112 += V[6 * k + 1] * gain[9 * k + 5];
+  }
+  S_p[31] += -t112;
+  real t115 = 0;
+  for (int k = 0; k < n; ++k) {
+    t115 += V[6 * k + 2] * gain[9 * k + 5];
+  }
+  S_p[32] += -t115;
+  real t118 = 0;
+  for (int k = 0; k < n; ++k) {
+    t118 += V[6 * k + 3] * gain[9 * k + 5];
+  }
+  S_p[33] += -t118;
+  real t121 = 0;
+  for (int k = 0; k < n; ++k) {
+    t121 += V[6 * k + 4] * gain[9 * k + 5];
+  }
+  S_p[34] += -t121;
+  real t124 = 0;
+  for (int k = 0; k < n; ++k) {
+    t124 += V[6 * k + 5] * gain[9 * k + 5];
+  }
+  S_p[35] += -t124;
+  real t127 = 0;
+  for (int k = 0; k < n; ++k) {
+    t127 += V[6 * k] * gain[9 * k + 6];
+  }
+  S_p[36] += -t127;
+  real t130 = 0;
+  for (int k = 0; k < n; ++k) {
+    t130 += V[6 * k + 1] * gain[9 * k + 6];
+  }
+  S_p[37] += -t130;
+  real t133 = 0;
+  for (int k = 0; k < n; ++k) {
+    t133 += V[6 * k + 2] * gain[9 * k + 6];
+  }
+  S_p[38] += -t133;
+  real t136 = 0;
+  for (int k = 0; k < n; ++k) {
+    t136 += V[6 * k + 3] * gain[9 * k + 6];
+  }
+  S_p[39] += -t136;
+  real t139 = 0;
+  for (int k = 0; k < n; ++k) {
+    t139 += V[6 * k + 4] * gain[9 * k + 6];
+  }
+  S_p[40] += -t139;
+  real t142 = 0;
+  for (int k = 0; k < n; ++k) {
+    t142 += V[6 * k + 5] * gain[9 * k + 6];
+  }
+  S_p[41] += -t142;
+  real t145 = 0;
+  for (int k = 0; k < n; ++k) {
+    t145 += V[6 * k] * gain[9 * k + 7];
+  }
+  S_p[42] += -t145;
+  real t148 = 0;
+  for (int k = 0; k < n; ++k) {
+    t148 += V[6 * k + 1] * gain[9 * k + 7];
+  }
+  S_p[43] += -t148;
+  real t151 = 0;
+  for (int k = 0; k < n; ++k) {
+    t151 += V[6 * k + 2] * gain[9 * k + 7];
+  }
+  S_p[44] += -t151;
+  real t154 = 0;
+  for (int k = 0; k < n; ++k) {
+    t154 += V[6 * k + 3] * gain[9 * k + 7];
+  }
+  S_p[45] += -t154;
+  real t157 = 0;
+  for (int k = 0; k < n; ++k) {
+    t157 += V[6 * k + 4] * gain[9 * k + 7];
+  }
+  S_p[46] += -t157;
+  real t160 = 0;
+  for (int k = 0; k < n; ++k) {
+    t160 += V[6 * k + 5] * gain[9 * k + 7];
+  }
+  S_p[47] += -t160;
+  real t163 = 0;
+  for (int k = 0; k < n; ++k) {
+    t163 += V[6 * k] * gain[9 * k + 8];
+  }
+  S_p[48] += -t163;
+  real t166 = 0;
+  for (int k = 0; k < n; ++k) {
+    t166 += V[6 * k + 1] * gain[9 * k + 8];
+  }
+  S_p[49] += -t166;
+  real t169 = 0;
+  for (int k = 0; k < n; ++k) {
+    t169 += V[6 * k + 2] * gain[9 * k + 8];
+  }
+  S_p[50] += -t169;
+  real t172 = 0;
+  for (int k = 0; k < n; ++k) {
+    t172 += V[6 * k + 3] * gain[9 * k + 8];
+  }
+  S_p[51] += -t172;
+  real t175 = 0;
+  for (int k = 0; k < n; ++k) {
+    t175 += V[6 * k + 4] * gain[9 * k + 8];
+  }
+  S_p[52] += -t175;
+  real t178 = 0;
+  for (int k = 0; k < n; ++k) {
+    t178 += V[6 * k + 5] * gain[9 * k + 8];
+  }
+  S_p[53] += -t178;
+  return 0;
 }
 
-int mstmm_sweep_tangent_placed_reduce(int n, const real *restrict inverse, const real *restrict Z_p,
-    const real *restrict V, real *restrict gain, real *restrict S_p)
+int mstmm_sweep_tangent_placed_reduce(int n, in_t inverse, in_t Z_p, in_t V, out_t gain, out_t S_p)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_reduce_sized(1, inverse, Z_p, V, gain, S_p);
-    case 2: return mstmm_sweep_tangent_placed_reduce_sized(2, inverse, Z_p, V, gain, S_p);
-    case 3: return mstmm_sweep_tangent_placed_reduce_sized(3, inverse, Z_p, V, gain, S_p);
-    case 4: return mstmm_sweep_tangent_placed_reduce_sized(4, inverse, Z_p, V, gain, S_p);
-    default: return mstmm_sweep_tangent_placed_reduce_sized(n, inverse, Z_p, V, gain, S_p);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_reduce_sized(1, inverse, Z_p, V, gain, S_p);
+  case 2: return mstmm_sweep_tangent_placed_reduce_sized(2, inverse, Z_p, V, gain, S_p);
+  case 3: return mstmm_sweep_tangent_placed_reduce_sized(3, inverse, Z_p, V, gain, S_p);
+  case 4: return mstmm_sweep_tangent_placed_reduce_sized(4, inverse, Z_p, V, gain, S_p);
+  default: return mstmm_sweep_tangent_placed_reduce_sized(n, inverse, Z_p, V, gain, S_p);
+  }
 }
 
-static int mstmm_sweep_tangent_placed_reduce_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_placed_reduce(n, in[0], in[1], in[2], out[0], out[1]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_placed_reduce_inputs[] = {
-    {"inverse", 1, "", 0, 2},
-    {"Z_p", 9, "", 0, 1},
-    {"V", 6, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_tangent_placed_reduce_outputs[] = {
-    {"gain", 9, "", 0, 1},
-    {"S_p", 54, "", 1, 0},
-};
+MSTMM_CALL(mstmm_sweep_tangent_placed_reduce, (n, in[0], in[1], in[2], out[0], out[1]))
 
 /* unknowns of a flexible body eliminated from loads by the pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -2791,567 +1447,336 @@ static const mstmm_port mstmm_sweep_tangent_placed_reduce_outputs[] = {
  * out work[n][n] factor L, D of solve
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_node_sized(int n, const real *restrict H, const real *restrict V,
-    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
-    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
+int mstmm_sweep_tangent_placed_node_sized(int n, in_t H, in_t V, in_t D, in_t S_p, in_t Z_p,
+    out_t right, out_t gain, out_t S_c, out_t work)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S_p[0] * H[k];
-        const real t1 = S_p[1] * H[n + k];
-        const real t2 = t0 + t1;
-        const real t3 = S_p[2] * H[2 * n + k];
-        const real t4 = t2 + t3;
-        const real t5 = S_p[3] * H[3 * n + k];
-        const real t6 = t4 + t5;
-        const real t7 = S_p[4] * H[4 * n + k];
-        const real t8 = t6 + t7;
-        const real t9 = S_p[5] * H[5 * n + k];
-        const real t10 = t8 + t9;
-        const real t11 = t10 + Z_p[k];
-        right[9 * k] = t11;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t12 = S_p[6] * H[k];
-        const real t13 = S_p[7] * H[n + k];
-        const real t14 = t12 + t13;
-        const real t15 = S_p[8] * H[2 * n + k];
-        const real t16 = t14 + t15;
-        const real t17 = S_p[9] * H[3 * n + k];
-        const real t18 = t16 + t17;
-        const real t19 = S_p[10] * H[4 * n + k];
-        const real t20 = t18 + t19;
-        const real t21 = S_p[11] * H[5 * n + k];
-        const real t22 = t20 + t21;
-        const real t23 = t22 + Z_p[n + k];
-        right[9 * k + 1] = t23;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t24 = S_p[12] * H[k];
-        const real t25 = S_p[13] * H[n + k];
-        const real t26 = t24 + t25;
-        const real t27 = S_p[14] * H[2 * n + k];
-        const real t28 = t26 + t27;
-        const real t29 = S_p[15] * H[3 * n + k];
-        const real t30 = t28 + t29;
-        const real t31 = S_p[16] * H[4 * n + k];
-        const real t32 = t30 + t31;
-        const real t33 = S_p[17] * H[5 * n + k];
-        const real t34 = t32 + t33;
-        const real t35 = t34 + Z_p[2 * n + k];
-        right[9 * k + 2] = t35;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t36 = S_p[18] * H[k];
-        const real t37 = S_p[19] * H[n + k];
-        const real t38 = t36 + t37;
-        const real t39 = S_p[20] * H[2 * n + k];
-        const real t40 = t38 + t39;
-        const real t41 = S_p[21] * H[3 * n + k];
-        const real t42 = t40 + t41;
-        const real t43 = S_p[22] * H[4 * n + k];
-        const real t44 = t42 + t43;
-        const real t45 = S_p[23] * H[5 * n + k];
-        const real t46 = t44 + t45;
-        const real t47 = t46 + Z_p[3 * n + k];
-        right[9 * k + 3] = t47;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t48 = S_p[24] * H[k];
-        const real t49 = S_p[25] * H[n + k];
-        const real t50 = t48 + t49;
-        const real t51 = S_p[26] * H[2 * n + k];
-        const real t52 = t50 + t51;
-        const real t53 = S_p[27] * H[3 * n + k];
-        const real t54 = t52 + t53;
-        const real t55 = S_p[28] * H[4 * n + k];
-        const real t56 = t54 + t55;
-        const real t57 = S_p[29] * H[5 * n + k];
-        const real t58 = t56 + t57;
-        const real t59 = t58 + Z_p[4 * n + k];
-        right[9 * k + 4] = t59;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t60 = S_p[30] * H[k];
-        const real t61 = S_p[31] * H[n + k];
-        const real t62 = t60 + t61;
-        const real t63 = S_p[32] * H[2 * n + k];
-        const real t64 = t62 + t63;
-        const real t65 = S_p[33] * H[3 * n + k];
-        const real t66 = t64 + t65;
-        const real t67 = S_p[34] * H[4 * n + k];
-        const real t68 = t66 + t67;
-        const real t69 = S_p[35] * H[5 * n + k];
-        const real t70 = t68 + t69;
-        const real t71 = t70 + Z_p[5 * n + k];
-        right[9 * k + 5] = t71;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t72 = S_p[36] * H[k];
-        const real t73 = S_p[37] * H[n + k];
-        const real t74 = t72 + t73;
-        const real t75 = S_p[38] * H[2 * n + k];
-        const real t76 = t74 + t75;
-        const real t77 = S_p[39] * H[3 * n + k];
-        const real t78 = t76 + t77;
-        const real t79 = S_p[40] * H[4 * n + k];
-        const real t80 = t78 + t79;
-        const real t81 = S_p[41] * H[5 * n + k];
-        const real t82 = t80 + t81;
-        const real t83 = t82 + Z_p[6 * n + k];
-        right[9 * k + 6] = t83;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t84 = S_p[42] * H[k];
-        const real t85 = S_p[43] * H[n + k];
-        const real t86 = t84 + t85;
-        const real t87 = S_p[44] * H[2 * n + k];
-        const real t88 = t86 + t87;
-        const real t89 = S_p[45] * H[3 * n + k];
-        const real t90 = t88 + t89;
-        const real t91 = S_p[46] * H[4 * n + k];
-        const real t92 = t90 + t91;
-        const real t93 = S_p[47] * H[5 * n + k];
-        const real t94 = t92 + t93;
-        const real t95 = t94 + Z_p[7 * n + k];
-        right[9 * k + 7] = t95;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t96 = S_p[48] * H[k];
-        const real t97 = S_p[49] * H[n + k];
-        const real t98 = t96 + t97;
-        const real t99 = S_p[50] * H[2 * n + k];
-        const real t100 = t98 + t99;
-        const real t101 = S_p[51] * H[3 * n + k];
-        const real t102 = t100 + t101;
-        const real t103 = S_p[52] * H[4 * n + k];
-        const real t104 = t102 + t103;
-        const real t105 = S_p[53] * H[5 * n + k];
-        const real t106 = t104 + t105;
-        const real t107 = t106 + Z_p[8 * n + k];
-        right[9 * k + 8] = t107;
-    }
-    /* a pivot of D vanishes: a motion is undetermined */
-    const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
-    if (found_gain == 1) return 1;
-    real t109 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t108 = gain[9 * k] * V[k];
-        t109 += t108;
-    }
-    const real t110 = S_p[0] - t109;
-    S_c[0] = t110;
-    real t112 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t111 = gain[9 * k] * V[n + k];
-        t112 += t111;
-    }
-    const real t113 = S_p[1] - t112;
-    S_c[1] = t113;
-    real t115 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t114 = gain[9 * k] * V[2 * n + k];
-        t115 += t114;
-    }
-    const real t116 = S_p[2] - t115;
-    S_c[2] = t116;
-    real t118 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t117 = gain[9 * k] * V[3 * n + k];
-        t118 += t117;
-    }
-    const real t119 = S_p[3] - t118;
-    S_c[3] = t119;
-    real t121 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t120 = gain[9 * k] * V[4 * n + k];
-        t121 += t120;
-    }
-    const real t122 = S_p[4] - t121;
-    S_c[4] = t122;
-    real t124 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t123 = gain[9 * k] * V[5 * n + k];
-        t124 += t123;
-    }
-    const real t125 = S_p[5] - t124;
-    S_c[5] = t125;
-    real t127 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t126 = V[k] * gain[9 * k + 1];
-        t127 += t126;
-    }
-    const real t128 = S_p[6] - t127;
-    S_c[6] = t128;
-    real t130 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t129 = V[n + k] * gain[9 * k + 1];
-        t130 += t129;
-    }
-    const real t131 = S_p[7] - t130;
-    S_c[7] = t131;
-    real t133 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t132 = V[2 * n + k] * gain[9 * k + 1];
-        t133 += t132;
-    }
-    const real t134 = S_p[8] - t133;
-    S_c[8] = t134;
-    real t136 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t135 = V[3 * n + k] * gain[9 * k + 1];
-        t136 += t135;
-    }
-    const real t137 = S_p[9] - t136;
-    S_c[9] = t137;
-    real t139 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t138 = V[4 * n + k] * gain[9 * k + 1];
-        t139 += t138;
-    }
-    const real t140 = S_p[10] - t139;
-    S_c[10] = t140;
-    real t142 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t141 = V[5 * n + k] * gain[9 * k + 1];
-        t142 += t141;
-    }
-    const real t143 = S_p[11] - t142;
-    S_c[11] = t143;
-    real t145 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t144 = V[k] * gain[9 * k + 2];
-        t145 += t144;
-    }
-    const real t146 = S_p[12] - t145;
-    S_c[12] = t146;
-    real t148 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t147 = V[n + k] * gain[9 * k + 2];
-        t148 += t147;
-    }
-    const real t149 = S_p[13] - t148;
-    S_c[13] = t149;
-    real t151 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t150 = V[2 * n + k] * gain[9 * k + 2];
-        t151 += t150;
-    }
-    const real t152 = S_p[14] - t151;
-    S_c[14] = t152;
-    real t154 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t153 = V[3 * n + k] * gain[9 * k + 2];
-        t154 += t153;
-    }
-    const real t155 = S_p[15] - t154;
-    S_c[15] = t155;
-    real t157 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t156 = V[4 * n + k] * gain[9 * k + 2];
-        t157 += t156;
-    }
-    const real t158 = S_p[16] - t157;
-    S_c[16] = t158;
-    real t160 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t159 = V[5 * n + k] * gain[9 * k + 2];
-        t160 += t159;
-    }
-    const real t161 = S_p[17] - t160;
-    S_c[17] = t161;
-    real t163 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t162 = V[k] * gain[9 * k + 3];
-        t163 += t162;
-    }
-    const real t164 = S_p[18] - t163;
-    S_c[18] = t164;
-    real t166 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t165 = V[n + k] * gain[9 * k + 3];
-        t166 += t165;
-    }
-    const real t167 = S_p[19] - t166;
-    S_c[19] = t167;
-    real t169 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t168 = V[2 * n + k] * gain[9 * k + 3];
-        t169 += t168;
-    }
-    const real t170 = S_p[20] - t169;
-    S_c[20] = t170;
-    real t172 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t171 = V[3 * n + k] * gain[9 * k + 3];
-        t172 += t171;
-    }
-    const real t173 = S_p[21] - t172;
-    S_c[21] = t173;
-    real t175 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t174 = V[4 * n + k] * gain[9 * k + 3];
-        t175 += t174;
-    }
-    const real t176 = S_p[22] - t175;
-    S_c[22] = t176;
-    real t178 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t177 = V[5 * n + k] * gain[9 * k + 3];
-        t178 += t177;
-    }
-    const real t179 = S_p[23] - t178;
-    S_c[23] = t179;
-    real t181 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t180 = V[k] * gain[9 * k + 4];
-        t181 += t180;
-    }
-    const real t182 = S_p[24] - t181;
-    S_c[24] = t182;
-    real t184 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t183 = V[n + k] * gain[9 * k + 4];
-        t184 += t183;
-    }
-    const real t185 = S_p[25] - t184;
-    S_c[25] = t185;
-    real t187 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t186 = V[2 * n + k] * gain[9 * k + 4];
-        t187 += t186;
-    }
-    const real t188 = S_p[26] - t187;
-    S_c[26] = t188;
-    real t190 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t189 = V[3 * n + k] * gain[9 * k + 4];
-        t190 += t189;
-    }
-    const real t191 = S_p[27] - t190;
-    S_c[27] = t191;
-    real t193 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t192 = V[4 * n + k] * gain[9 * k + 4];
-        t193 += t192;
-    }
-    const real t194 = S_p[28] - t193;
-    S_c[28] = t194;
-    real t196 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t195 = V[5 * n + k] * gain[9 * k + 4];
-        t196 += t195;
-    }
-    const real t197 = S_p[29] - t196;
-    S_c[29] = t197;
-    real t199 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t198 = V[k] * gain[9 * k + 5];
-        t199 += t198;
-    }
-    const real t200 = S_p[30] - t199;
-    S_c[30] = t200;
-    real t202 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t201 = V[n + k] * gain[9 * k + 5];
-        t202 += t201;
-    }
-    const real t203 = S_p[31] - t202;
-    S_c[31] = t203;
-    real t205 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t204 = V[2 * n + k] * gain[9 * k + 5];
-        t205 += t204;
-    }
-    const real t206 = S_p[32] - t205;
-    S_c[32] = t206;
-    real t208 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t207 = V[3 * n + k] * gain[9 * k + 5];
-        t208 += t207;
-    }
-    const real t209 = S_p[33] - t208;
-    S_c[33] = t209;
-    real t211 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t210 = V[4 * n + k] * gain[9 * k + 5];
-        t211 += t210;
-    }
-    const real t212 = S_p[34] - t211;
-    S_c[34] = t212;
-    real t214 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t213 = V[5 * n + k] * gain[9 * k + 5];
-        t214 += t213;
-    }
-    const real t215 = S_p[35] - t214;
-    S_c[35] = t215;
-    real t217 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t216 = V[k] * gain[9 * k + 6];
-        t217 += t216;
-    }
-    const real t218 = S_p[36] - t217;
-    S_c[36] = t218;
-    real t220 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t219 = V[n + k] * gain[9 * k + 6];
-        t220 += t219;
-    }
-    const real t221 = S_p[37] - t220;
-    S_c[37] = t221;
-    real t223 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t222 = V[2 * n + k] * gain[9 * k + 6];
-        t223 += t222;
-    }
-    const real t224 = S_p[38] - t223;
-    S_c[38] = t224;
-    real t226 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t225 = V[3 * n + k] * gain[9 * k + 6];
-        t226 += t225;
-    }
-    const real t227 = S_p[39] - t226;
-    S_c[39] = t227;
-    real t229 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t228 = V[4 * n + k] * gain[9 * k + 6];
-        t229 += t228;
-    }
-    const real t230 = S_p[40] - t229;
-    S_c[40] = t230;
-    real t232 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t231 = V[5 * n + k] * gain[9 * k + 6];
-        t232 += t231;
-    }
-    const real t233 = S_p[41] - t232;
-    S_c[41] = t233;
-    real t235 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t234 = V[k] * gain[9 * k + 7];
-        t235 += t234;
-    }
-    const real t236 = S_p[42] - t235;
-    S_c[42] = t236;
-    real t238 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t237 = V[n + k] * gain[9 * k + 7];
-        t238 += t237;
-    }
-    const real t239 = S_p[43] - t238;
-    S_c[43] = t239;
-    real t241 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t240 = V[2 * n + k] * gain[9 * k + 7];
-        t241 += t240;
-    }
-    const real t242 = S_p[44] - t241;
-    S_c[44] = t242;
-    real t244 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t243 = V[3 * n + k] * gain[9 * k + 7];
-        t244 += t243;
-    }
-    const real t245 = S_p[45] - t244;
-    S_c[45] = t245;
-    real t247 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t246 = V[4 * n + k] * gain[9 * k + 7];
-        t247 += t246;
-    }
-    const real t248 = S_p[46] - t247;
-    S_c[46] = t248;
-    real t250 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t249 = V[5 * n + k] * gain[9 * k + 7];
-        t250 += t249;
-    }
-    const real t251 = S_p[47] - t250;
-    S_c[47] = t251;
-    real t253 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t252 = V[k] * gain[9 * k + 8];
-        t253 += t252;
-    }
-    const real t254 = S_p[48] - t253;
-    S_c[48] = t254;
-    real t256 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t255 = V[n + k] * gain[9 * k + 8];
-        t256 += t255;
-    }
-    const real t257 = S_p[49] - t256;
-    S_c[49] = t257;
-    real t259 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t258 = V[2 * n + k] * gain[9 * k + 8];
-        t259 += t258;
-    }
-    const real t260 = S_p[50] - t259;
-    S_c[50] = t260;
-    real t262 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t261 = V[3 * n + k] * gain[9 * k + 8];
-        t262 += t261;
-    }
-    const real t263 = S_p[51] - t262;
-    S_c[51] = t263;
-    real t265 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t264 = V[4 * n + k] * gain[9 * k + 8];
-        t265 += t264;
-    }
-    const real t266 = S_p[52] - t265;
-    S_c[52] = t266;
-    real t268 = 0;
-    for (int k = 0; k < n; ++k) {
-        const real t267 = V[5 * n + k] * gain[9 * k + 8];
-        t268 += t267;
-    }
-    const real t269 = S_p[53] - t268;
-    S_c[53] = t269;
-    if (found_gain) return 2; /* a negative determinant */
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    right[9 * k] = S_p[0] * H[k] + S_p[1] * H[n + k] + S_p[2] * H[2 * n + k] + S_p[3] * H[3 * n + k]
+      + S_p[4] * H[4 * n + k] + S_p[5] * H[5 * n + k] + Z_p[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 1] = S_p[6] * H[k] + S_p[7] * H[n + k] + S_p[8] * H[2 * n + k] + S_p[9] * H[3 * n
+      + k] + S_p[10] * H[4 * n + k] + S_p[11] * H[5 * n + k] + Z_p[n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 2] = S_p[12] * H[k] + S_p[13] * H[n + k] + S_p[14] * H[2 * n + k] + S_p[15] * H[3
+      * n + k] + S_p[16] * H[4 * n + k] + S_p[17] * H[5 * n + k] + Z_p[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 3] = S_p[18] * H[k] + S_p[19] * H[n + k] + S_p[20] * H[2 * n + k] + S_p[21] * H[3
+      * n + k] + S_p[22] * H[4 * n + k] + S_p[23] * H[5 * n + k] + Z_p[3 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 4] = S_p[24] * H[k] + S_p[25] * H[n + k] + S_p[26] * H[2 * n + k] + S_p[27] * H[3
+      * n + k] + S_p[28] * H[4 * n + k] + S_p[29] * H[5 * n + k] + Z_p[4 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 5] = S_p[30] * H[k] + S_p[31] * H[n + k] + S_p[32] * H[2 * n + k] + S_p[33] * H[3
+      * n + k] + S_p[34] * H[4 * n + k] + S_p[35] * H[5 * n + k] + Z_p[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 6] = S_p[36] * H[k] + S_p[37] * H[n + k] + S_p[38] * H[2 * n + k] + S_p[39] * H[3
+      * n + k] + S_p[40] * H[4 * n + k] + S_p[41] * H[5 * n + k] + Z_p[6 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 7] = S_p[42] * H[k] + S_p[43] * H[n + k] + S_p[44] * H[2 * n + k] + S_p[45] * H[3
+      * n + k] + S_p[46] * H[4 * n + k] + S_p[47] * H[5 * n + k] + Z_p[7 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    right[9 * k + 8] = S_p[48] * H[k] + S_p[49] * H[n + k] + S_p[50] * H[2 * n + k] + S_p[51] * H[3
+      * n + k] + S_p[52] * H[4 * n + k] + S_p[53] * H[5 * n + k] + Z_p[8 * n + k];
+  }
+  /* a pivot of D vanishes: a motion is undetermined */
+  const int found_gain = mstmm_solve_lu(n, 9, D, right, gain, work, 1e-13);
+  if (found_gain == 1) return 1;
+  real t109 = 0;
+  for (int k = 0; k < n; ++k) {
+    t109 += gain[9 * k] * V[k];
+  }
+  S_c[0] = S_p[0] - t109;
+  real t112 = 0;
+  for (int k = 0; k < n; ++k) {
+    t112 += gain[9 * k] * V[n + k];
+  }
+  S_c[1] = S_p[1] - t112;
+  real t115 = 0;
+  for (int k = 0; k < n; ++k) {
+    t115 += gain[9 * k] * V[2 * n + k];
+  }
+  S_c[2] = S_p[2] - t115;
+  real t118 = 0;
+  for (int k = 0; k < n; ++k) {
+    t118 += gain[9 * k] * V[3 * n + k];
+  }
+  S_c[3] = S_p[3] - t118;
+  real t121 = 0;
+  for (int k = 0; k < n; ++k) {
+    t121 += gain[9 * k] * V[4 * n + k];
+  }
+  S_c[4] = S_p[4] - t121;
+  real t124 = 0;
+  for (int k = 0; k < n; ++k) {
+    t124 += gain[9 * k] * V[5 * n + k];
+  }
+  S_c[5] = S_p[5] - t124;
+  real t127 = 0;
+  for (int k = 0; k < n; ++k) {
+    t127 += V[k] * gain[9 * k + 1];
+  }
+  S_c[6] = S_p[6] - t127;
+  real t130 = 0;
+  for (int k = 0; k < n; ++k) {
+    t130 += V[n + k] * gain[9 * k + 1];
+  }
+  S_c[7] = S_p[7] - t130;
+  real t133 = 0;
+  for (int k = 0; k < n; ++k) {
+    t133 += V[2 * n + k] * gain[9 * k + 1];
+  }
+  S_c[8] = S_p[8] - t133;
+  real t136 = 0;
+  for (int k = 0; k < n; ++k) {
+    t136 += V[3 * n + k] * gain[9 * k + 1];
+  }
+  S_c[9] = S_p[9] - t136;
+  real t139 = 0;
+  for (int k = 0; k < n; ++k) {
+    t139 += V[4 * n + k] * gain[9 * k + 1];
+  }
+  S_c[10] = S_p[10] - t139;
+  real t142 = 0;
+  for (int k = 0; k < n; ++k) {
+    t142 += V[5 * n + k] * gain[9 * k + 1];
+  }
+  S_c[11] = S_p[11] - t142;
+  real t145 = 0;
+  for (int k = 0; k < n; ++k) {
+    t145 += V[k] * gain[9 * k + 2];
+  }
+  S_c[12] = S_p[12] - t145;
+  real t148 = 0;
+  for (int k = 0; k < n; ++k) {
+    t148 += V[n + k] * gain[9 * k + 2];
+  }
+  S_c[13] = S_p[13] - t148;
+  real t151 = 0;
+  for (int k = 0; k < n; ++k) {
+    t151 += V[2 * n + k] * gain[9 * k + 2];
+  }
+  S_c[14] = S_p[14] - t151;
+  real t154 = 0;
+  for (int k = 0; k < n; ++k) {
+    t154 += V[3 * n + k] * gain[9 * k + 2];
+  }
+  S_c[15] = S_p[15] - t154;
+  real t157 = 0;
+  for (int k = 0; k < n; ++k) {
+    t157 += V[4 * n + k] * gain[9 * k + 2];
+  }
+  S_c[16] = S_p[16] - t157;
+  real t160 = 0;
+  for (int k = 0; k < n; ++k) {
+    t160 += V[5 * n + k] * gain[9 * k + 2];
+  }
+  S_c[17] = S_p[17] - t160;
+  real t163 = 0;
+  for (int k = 0; k < n; ++k) {
+    t163 += V[k] * gain[9 * k + 3];
+  }
+  S_c[18] = S_p[18] - t163;
+  real t166 = 0;
+  for (int k = 0; k < n; ++k) {
+    t166 += V[n + k] * gain[9 * k + 3];
+  }
+  S_c[19] = S_p[19] - t166;
+  real t169 = 0;
+  for (int k = 0; k < n; ++k) {
+    t169 += V[2 * n + k] * gain[9 * k + 3];
+  }
+  S_c[20] = S_p[20] - t169;
+  real t172 = 0;
+  for (int k = 0; k < n; ++k) {
+    t172 += V[3 * n + k] * gain[9 * k + 3];
+  }
+  S_c[21] = S_p[21] - t172;
+  real t175 = 0;
+  for (int k = 0; k < n; ++k) {
+    t175 += V[4 * n + k] * gain[9 * k + 3];
+  }
+  S_c[22] = S_p[22] - t175;
+  real t178 = 0;
+  for (int k = 0; k < n; ++k) {
+    t178 += V[5 * n + k] * gain[9 * k + 3];
+  }
+  S_c[23] = S_p[23] - t178;
+  real t181 = 0;
+  for (int k = 0; k < n; ++k) {
+    t181 += V[k] * gain[9 * k + 4];
+  }
+  S_c[24] = S_p[24] - t181;
+  real t184 = 0;
+  for (int k = 0; k < n; ++k) {
+    t184 += V[n + k] * gain[9 * k + 4];
+  }
+  S_c[25] = S_p[25] - t184;
+  real t187 = 0;
+  for (int k = 0; k < n; ++k) {
+    t187 += V[2 * n + k] * gain[9 * k + 4];
+  }
+  S_c[26] = S_p[26] - t187;
+  real t190 = 0;
+  for (int k = 0; k < n; ++k) {
+    t190 += V[3 * n + k] * gain[9 * k + 4];
+  }
+  S_c[27] = S_p[27] - t190;
+  real t193 = 0;
+  for (int k = 0; k < n; ++k) {
+    t193 += V[4 * n + k] * gain[9 * k + 4];
+  }
+  S_c[28] = S_p[28] - t193;
+  real t196 = 0;
+  for (int k = 0; k < n; ++k) {
+    t196 += V[5 * n + k] * gain[9 * k + 4];
+  }
+  S_c[29] = S_p[29] - t196;
+  real t199 = 0;
+  for (int k = 0; k < n; ++k) {
+    t199 += V[k] * gain[9 * k + 5];
+  }
+  S_c[30] = S_p[30] - t199;
+  real t202 = 0;
+  for (int k = 0; k < n; ++k) {
+    t202 += V[n + k] * gain[9 * k + 5];
+  }
+  S_c[31] = S_p[31] - t202;
+  real t205 = 0;
+  for (int k = 0; k < n; ++k) {
+    t205 += V[2 * n + k] * gain[9 * k + 5];
+  }
+  S_c[32] = S_p[32] - t205;
+  real t208 = 0;
+  for (int k = 0; k < n; ++k) {
+    t208 += V[3 * n + k] * gain[9 * k + 5];
+  }
+  S_c[33] = S_p[33] - t208;
+  real t211 = 0;
+  for (int k = 0; k < n; ++k) {
+    t211 += V[4 * n + k] * gain[9 * k + 5];
+  }
+  S_c[34] = S_p[34] - t211;
+  real t214 = 0;
+  for (int k = 0; k < n; ++k) {
+    t214 += V[5 * n + k] * gain[9 * k + 5];
+  }
+  S_c[35] = S_p[35] - t214;
+  real t217 = 0;
+  for (int k = 0; k < n; ++k) {
+    t217 += V[k] * gain[9 * k + 6];
+  }
+  S_c[36] = S_p[36] - t217;
+  real t220 = 0;
+  for (int k = 0; k < n; ++k) {
+    t220 += V[n + k] * gain[9 * k + 6];
+  }
+  S_c[37] = S_p[37] - t220;
+  real t223 = 0;
+  for (int k = 0; k < n; ++k) {
+    t223 += V[2 * n + k] * gain[9 * k + 6];
+  }
+  S_c[38] = S_p[38] - t223;
+  real t226 = 0;
+  for (int k = 0; k < n; ++k) {
+    t226 += V[3 * n + k] * gain[9 * k + 6];
+  }
+  S_c[39] = S_p[39] - t226;
+  real t229 = 0;
+  for (int k = 0; k < n; ++k) {
+    t229 += V[4 * n + k] * gain[9 * k + 6];
+  }
+  S_c[40] = S_p[40] - t229;
+  real t232 = 0;
+  for (int k = 0; k < n; ++k) {
+    t232 += V[5 * n + k] * gain[9 * k + 6];
+  }
+  S_c[41] = S_p[41] - t232;
+  real t235 = 0;
+  for (int k = 0; k < n; ++k) {
+    t235 += V[k] * gain[9 * k + 7];
+  }
+  S_c[42] = S_p[42] - t235;
+  real t238 = 0;
+  for (int k = 0; k < n; ++k) {
+    t238 += V[n + k] * gain[9 * k + 7];
+  }
+  S_c[43] = S_p[43] - t238;
+  real t241 = 0;
+  for (int k = 0; k < n; ++k) {
+    t241 += V[2 * n + k] * gain[9 * k + 7];
+  }
+  S_c[44] = S_p[44] - t241;
+  real t244 = 0;
+  for (int k = 0; k < n; ++k) {
+    t244 += V[3 * n + k] * gain[9 * k + 7];
+  }
+  S_c[45] = S_p[45] - t244;
+  real t247 = 0;
+  for (int k = 0; k < n; ++k) {
+    t247 += V[4 * n + k] * gain[9 * k + 7];
+  }
+  S_c[46] = S_p[46] - t247;
+  real t250 = 0;
+  for (int k = 0; k < n; ++k) {
+    t250 += V[5 * n + k] * gain[9 * k + 7];
+  }
+  S_c[47] = S_p[47] - t250;
+  real t253 = 0;
+  for (int k = 0; k < n; ++k) {
+    t253 += V[k] * gain[9 * k + 8];
+  }
+  S_c[48] = S_p[48] - t253;
+  real t256 = 0;
+  for (int k = 0; k < n; ++k) {
+    t256 += V[n + k] * gain[9 * k + 8];
+  }
+  S_c[49] = S_p[49] - t256;
+  real t259 = 0;
+  for (int k = 0; k < n; ++k) {
+    t259 += V[2 * n + k] * gain[9 * k + 8];
+  }
+  S_c[50] = S_p[50] - t259;
+  real t262 = 0;
+  for (int k = 0; k < n; ++k) {
+    t262 += V[3 * n + k] * gain[9 * k + 8];
+  }
+  S_c[51] = S_p[51] - t262;
+  real t265 = 0;
+  for (int k = 0; k < n; ++k) {
+    t265 += V[4 * n + k] * gain[9 * k + 8];
+  }
+  S_c[52] = S_p[52] - t265;
+  real t268 = 0;
+  for (int k = 0; k < n; ++k) {
+    t268 += V[5 * n + k] * gain[9 * k + 8];
+  }
+  S_c[53] = S_p[53] - t268;
+  if (found_gain) return 2; /* a negative determinant */
+  return 0;
 }
 
-int mstmm_sweep_tangent_placed_node(int n, const real *restrict H, const real *restrict V,
-    const real *restrict D, const real *restrict S_p, const real *restrict Z_p,
-    real *restrict right, real *restrict gain, real *restrict S_c, real *restrict work)
+int mstmm_sweep_tangent_placed_node(int n, in_t H, in_t V, in_t D, in_t S_p, in_t Z_p, out_t right,
+    out_t gain, out_t S_c, out_t work)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    case 2: return mstmm_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    case 3: return mstmm_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    case 4: return mstmm_sweep_tangent_placed_node_sized(4, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    default: return mstmm_sweep_tangent_placed_node_sized(n, H, V, D, S_p, Z_p, right, gain, S_c, work);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_node_sized(1, H, V, D, S_p, Z_p, right, gain, S_c, work);
+  case 2: return mstmm_sweep_tangent_placed_node_sized(2, H, V, D, S_p, Z_p, right, gain, S_c, work);
+  case 3: return mstmm_sweep_tangent_placed_node_sized(3, H, V, D, S_p, Z_p, right, gain, S_c, work);
+  case 4: return mstmm_sweep_tangent_placed_node_sized(4, H, V, D, S_p, Z_p, right, gain, S_c, work);
+  default: return mstmm_sweep_tangent_placed_node_sized(n, H, V, D, S_p, Z_p, right, gain, S_c, work);
+  }
 }
 
-static int mstmm_sweep_tangent_placed_node_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_placed_node(n, in[0], in[1], in[2], in[3], in[4], out[0], out[1], out[2], out[3]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_placed_node_inputs[] = {
-    {"H", 6, "", 0, 1},
-    {"V", 6, "", 0, 1},
-    {"D", 1, "", 0, 2},
-    {"S_p", 54, "", 0, 0},
-    {"Z_p", 9, "", 0, 1},
-};
-
-static const mstmm_port mstmm_sweep_tangent_placed_node_outputs[] = {
-    {"right", 9, "", 0, 1},
-    {"gain", 9, "", 0, 1},
-    {"S_c", 54, "", 0, 0},
-    {"work", 1, "", 0, 2},
-};
-
-static const mstmm_guard mstmm_sweep_tangent_placed_node_guards[] = {
-    {1, "a pivot of D vanishes: a motion is undetermined"},
-    {2, "the determinant is negative; all results are there"},
-};
+MSTMM_CALL(mstmm_sweep_tangent_placed_node, (n, in[0], in[1], in[2], in[3], in[4], out[0], out[1],
+  out[2], out[3]))
 
 /* loads by the pose of the part outboard of a port, along the unknowns of its body
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -3367,838 +1792,179 @@ static const mstmm_guard mstmm_sweep_tangent_placed_node_guards[] = {
  * out Z_x[n][n], added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_port_sized(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
-    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
+int mstmm_sweep_tangent_placed_port_sized(int n, in_t Rc, in_t r, in_t H, in_t B_p, in_t S_p,
+    in_t T_p, out_t K, out_t Z_p, out_t Z_x)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = S_p[0] * B_p[9 * k];
-        const real t1 = S_p[6] * B_p[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = S_p[12] * B_p[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = S_p[18] * B_p[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = S_p[24] * B_p[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = S_p[30] * B_p[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = S_p[36] * B_p[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = S_p[42] * B_p[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = S_p[48] * B_p[9 * k + 8];
-        const real t16 = t14 + t15;
-        const real t17 = Rc[0] * t16;
-        const real t18 = S_p[1] * B_p[9 * k];
-        const real t19 = S_p[7] * B_p[9 * k + 1];
-        const real t20 = t18 + t19;
-        const real t21 = S_p[13] * B_p[9 * k + 2];
-        const real t22 = t20 + t21;
-        const real t23 = S_p[19] * B_p[9 * k + 3];
-        const real t24 = t22 + t23;
-        const real t25 = S_p[25] * B_p[9 * k + 4];
-        const real t26 = t24 + t25;
-        const real t27 = S_p[31] * B_p[9 * k + 5];
-        const real t28 = t26 + t27;
-        const real t29 = S_p[37] * B_p[9 * k + 6];
-        const real t30 = t28 + t29;
-        const real t31 = S_p[43] * B_p[9 * k + 7];
-        const real t32 = t30 + t31;
-        const real t33 = S_p[49] * B_p[9 * k + 8];
-        const real t34 = t32 + t33;
-        const real t35 = Rc[1] * t34;
-        const real t36 = t17 + t35;
-        const real t37 = S_p[2] * B_p[9 * k];
-        const real t38 = S_p[8] * B_p[9 * k + 1];
-        const real t39 = t37 + t38;
-        const real t40 = S_p[14] * B_p[9 * k + 2];
-        const real t41 = t39 + t40;
-        const real t42 = S_p[20] * B_p[9 * k + 3];
-        const real t43 = t41 + t42;
-        const real t44 = S_p[26] * B_p[9 * k + 4];
-        const real t45 = t43 + t44;
-        const real t46 = S_p[32] * B_p[9 * k + 5];
-        const real t47 = t45 + t46;
-        const real t48 = S_p[38] * B_p[9 * k + 6];
-        const real t49 = t47 + t48;
-        const real t50 = S_p[44] * B_p[9 * k + 7];
-        const real t51 = t49 + t50;
-        const real t52 = S_p[50] * B_p[9 * k + 8];
-        const real t53 = t51 + t52;
-        const real t54 = Rc[2] * t53;
-        const real t55 = t36 + t54;
-        K[6 * k] += t55;
+  for (int k = 0; k < n; ++k) {
+    K[6 * k] += Rc[0] * (S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k + 2] +
+      S_p[18] * B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36] *
+      B_p[9 * k + 6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8]) + Rc[1] * (S_p[1] *
+      B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] * B_p[9 * k + 3] +
+      S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k + 6] + S_p[43] *
+      B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8]) + Rc[2] * (S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k
+      + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] * B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] +
+      S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k + 6] + S_p[44] * B_p[9 * k + 7] + S_p[50] *
+      B_p[9 * k + 8]);
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 1] += Rc[3] * (S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k +
+      2] + S_p[18] * B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36]
+      * B_p[9 * k + 6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8]) + Rc[4] * (S_p[1] *
+      B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] * B_p[9 * k + 3] +
+      S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k + 6] + S_p[43] *
+      B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8]) + Rc[5] * (S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k
+      + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] * B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] +
+      S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k + 6] + S_p[44] * B_p[9 * k + 7] + S_p[50] *
+      B_p[9 * k + 8]);
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 2] += Rc[6] * (S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k +
+      2] + S_p[18] * B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36]
+      * B_p[9 * k + 6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8]) + Rc[7] * (S_p[1] *
+      B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] * B_p[9 * k + 3] +
+      S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k + 6] + S_p[43] *
+      B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8]) + Rc[8] * (S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k
+      + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] * B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] +
+      S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k + 6] + S_p[44] * B_p[9 * k + 7] + S_p[50] *
+      B_p[9 * k + 8]);
+  }
+  for (int k = 0; k < n; ++k) {
+    real t240 = S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k + 2] + S_p[18] *
+      B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36] * B_p[9 * k +
+      6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8];
+    real t258 = S_p[1] * B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] *
+      B_p[9 * k + 3] + S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k +
+      6] + S_p[43] * B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8];
+    real t277 = S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] *
+      B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] + S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k +
+      6] + S_p[44] * B_p[9 * k + 7] + S_p[50] * B_p[9 * k + 8];
+    K[6 * k + 3] += Rc[0] * (S_p[3] * B_p[9 * k] + S_p[9] * B_p[9 * k + 1] + S_p[15] * B_p[9 * k +
+      2] + S_p[21] * B_p[9 * k + 3] + S_p[27] * B_p[9 * k + 4] + S_p[33] * B_p[9 * k + 5] + S_p[39]
+      * B_p[9 * k + 6] + S_p[45] * B_p[9 * k + 7] + S_p[51] * B_p[9 * k + 8]) + Rc[1] * (S_p[4] *
+      B_p[9 * k] + S_p[10] * B_p[9 * k + 1] + S_p[16] * B_p[9 * k + 2] + S_p[22] * B_p[9 * k + 3] +
+      S_p[28] * B_p[9 * k + 4] + S_p[34] * B_p[9 * k + 5] + S_p[40] * B_p[9 * k + 6] + S_p[46] *
+      B_p[9 * k + 7] + S_p[52] * B_p[9 * k + 8]) + Rc[2] * (S_p[5] * B_p[9 * k] + S_p[11] * B_p[9 *
+      k + 1] + S_p[17] * B_p[9 * k + 2] + S_p[23] * B_p[9 * k + 3] + S_p[29] * B_p[9 * k + 4] +
+      S_p[35] * B_p[9 * k + 5] + S_p[41] * B_p[9 * k + 6] + S_p[47] * B_p[9 * k + 7] + S_p[53] *
+      B_p[9 * k + 8]) + (r[1] * (Rc[6] * t240 + Rc[7] * t258 + Rc[8] * t277) - r[2] * (Rc[3] * t240
+      + Rc[4] * t258 + Rc[5] * t277));
+  }
+  for (int k = 0; k < n; ++k) {
+    real t361 = S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k + 2] + S_p[18] *
+      B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36] * B_p[9 * k +
+      6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8];
+    real t379 = S_p[1] * B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] *
+      B_p[9 * k + 3] + S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k +
+      6] + S_p[43] * B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8];
+    real t398 = S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] *
+      B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] + S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k +
+      6] + S_p[44] * B_p[9 * k + 7] + S_p[50] * B_p[9 * k + 8];
+    K[6 * k + 4] += Rc[3] * (S_p[3] * B_p[9 * k] + S_p[9] * B_p[9 * k + 1] + S_p[15] * B_p[9 * k +
+      2] + S_p[21] * B_p[9 * k + 3] + S_p[27] * B_p[9 * k + 4] + S_p[33] * B_p[9 * k + 5] + S_p[39]
+      * B_p[9 * k + 6] + S_p[45] * B_p[9 * k + 7] + S_p[51] * B_p[9 * k + 8]) + Rc[4] * (S_p[4] *
+      B_p[9 * k] + S_p[10] * B_p[9 * k + 1] + S_p[16] * B_p[9 * k + 2] + S_p[22] * B_p[9 * k + 3] +
+      S_p[28] * B_p[9 * k + 4] + S_p[34] * B_p[9 * k + 5] + S_p[40] * B_p[9 * k + 6] + S_p[46] *
+      B_p[9 * k + 7] + S_p[52] * B_p[9 * k + 8]) + Rc[5] * (S_p[5] * B_p[9 * k] + S_p[11] * B_p[9 *
+      k + 1] + S_p[17] * B_p[9 * k + 2] + S_p[23] * B_p[9 * k + 3] + S_p[29] * B_p[9 * k + 4] +
+      S_p[35] * B_p[9 * k + 5] + S_p[41] * B_p[9 * k + 6] + S_p[47] * B_p[9 * k + 7] + S_p[53] *
+      B_p[9 * k + 8]) + (r[2] * (Rc[0] * t361 + Rc[1] * t379 + Rc[2] * t398) - r[0] * (Rc[6] * t361
+      + Rc[7] * t379 + Rc[8] * t398));
+  }
+  for (int k = 0; k < n; ++k) {
+    real t482 = S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k + 2] + S_p[18] *
+      B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36] * B_p[9 * k +
+      6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8];
+    real t500 = S_p[1] * B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] *
+      B_p[9 * k + 3] + S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k +
+      6] + S_p[43] * B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8];
+    real t519 = S_p[2] * B_p[9 * k] + S_p[8] * B_p[9 * k + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] *
+      B_p[9 * k + 3] + S_p[26] * B_p[9 * k + 4] + S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k +
+      6] + S_p[44] * B_p[9 * k + 7] + S_p[50] * B_p[9 * k + 8];
+    K[6 * k + 5] += Rc[6] * (S_p[3] * B_p[9 * k] + S_p[9] * B_p[9 * k + 1] + S_p[15] * B_p[9 * k +
+      2] + S_p[21] * B_p[9 * k + 3] + S_p[27] * B_p[9 * k + 4] + S_p[33] * B_p[9 * k + 5] + S_p[39]
+      * B_p[9 * k + 6] + S_p[45] * B_p[9 * k + 7] + S_p[51] * B_p[9 * k + 8]) + Rc[7] * (S_p[4] *
+      B_p[9 * k] + S_p[10] * B_p[9 * k + 1] + S_p[16] * B_p[9 * k + 2] + S_p[22] * B_p[9 * k + 3] +
+      S_p[28] * B_p[9 * k + 4] + S_p[34] * B_p[9 * k + 5] + S_p[40] * B_p[9 * k + 6] + S_p[46] *
+      B_p[9 * k + 7] + S_p[52] * B_p[9 * k + 8]) + Rc[8] * (S_p[5] * B_p[9 * k] + S_p[11] * B_p[9 *
+      k + 1] + S_p[17] * B_p[9 * k + 2] + S_p[23] * B_p[9 * k + 3] + S_p[29] * B_p[9 * k + 4] +
+      S_p[35] * B_p[9 * k + 5] + S_p[41] * B_p[9 * k + 6] + S_p[47] * B_p[9 * k + 7] + S_p[53] *
+      B_p[9 * k + 8]) + (r[0] * (Rc[3] * t482 + Rc[4] * t500 + Rc[5] * t519) - r[1] * (Rc[0] * t482
+      + Rc[1] * t500 + Rc[2] * t519));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[k] += T_p[0] * H[k] + T_p[1] * H[n + k] + T_p[2] * H[2 * n + k] + T_p[3] * H[3 * n + k] +
+      T_p[4] * H[4 * n + k] + T_p[5] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[n + k] += T_p[6] * H[k] + T_p[7] * H[n + k] + T_p[8] * H[2 * n + k] + T_p[9] * H[3 * n + k]
+      + T_p[10] * H[4 * n + k] + T_p[11] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[2 * n + k] += T_p[12] * H[k] + T_p[13] * H[n + k] + T_p[14] * H[2 * n + k] + T_p[15] * H[3 *
+      n + k] + T_p[16] * H[4 * n + k] + T_p[17] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[3 * n + k] += T_p[18] * H[k] + T_p[19] * H[n + k] + T_p[20] * H[2 * n + k] + T_p[21] * H[3 *
+      n + k] + T_p[22] * H[4 * n + k] + T_p[23] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[4 * n + k] += T_p[24] * H[k] + T_p[25] * H[n + k] + T_p[26] * H[2 * n + k] + T_p[27] * H[3 *
+      n + k] + T_p[28] * H[4 * n + k] + T_p[29] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[5 * n + k] += T_p[30] * H[k] + T_p[31] * H[n + k] + T_p[32] * H[2 * n + k] + T_p[33] * H[3 *
+      n + k] + T_p[34] * H[4 * n + k] + T_p[35] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[6 * n + k] += T_p[36] * H[k] + T_p[37] * H[n + k] + T_p[38] * H[2 * n + k] + T_p[39] * H[3 *
+      n + k] + T_p[40] * H[4 * n + k] + T_p[41] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[7 * n + k] += T_p[42] * H[k] + T_p[43] * H[n + k] + T_p[44] * H[2 * n + k] + T_p[45] * H[3 *
+      n + k] + T_p[46] * H[4 * n + k] + T_p[47] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[8 * n + k] += T_p[48] * H[k] + T_p[49] * H[n + k] + T_p[50] * H[2 * n + k] + T_p[51] * H[3 *
+      n + k] + T_p[52] * H[4 * n + k] + T_p[53] * H[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] += (S_p[0] * B_p[9 * k] + S_p[6] * B_p[9 * k + 1] + S_p[12] * B_p[9 * k + 2] +
+        S_p[18] * B_p[9 * k + 3] + S_p[24] * B_p[9 * k + 4] + S_p[30] * B_p[9 * k + 5] + S_p[36] *
+        B_p[9 * k + 6] + S_p[42] * B_p[9 * k + 7] + S_p[48] * B_p[9 * k + 8]) * H[l] + (S_p[1] *
+        B_p[9 * k] + S_p[7] * B_p[9 * k + 1] + S_p[13] * B_p[9 * k + 2] + S_p[19] * B_p[9 * k + 3] +
+        S_p[25] * B_p[9 * k + 4] + S_p[31] * B_p[9 * k + 5] + S_p[37] * B_p[9 * k + 6] + S_p[43] *
+        B_p[9 * k + 7] + S_p[49] * B_p[9 * k + 8]) * H[n + l] + (S_p[2] * B_p[9 * k] + S_p[8] *
+        B_p[9 * k + 1] + S_p[14] * B_p[9 * k + 2] + S_p[20] * B_p[9 * k + 3] + S_p[26] * B_p[9 * k +
+        4] + S_p[32] * B_p[9 * k + 5] + S_p[38] * B_p[9 * k + 6] + S_p[44] * B_p[9 * k + 7] +
+        S_p[50] * B_p[9 * k + 8]) * H[2 * n + l] + (S_p[3] * B_p[9 * k] + S_p[9] * B_p[9 * k + 1] +
+        S_p[15] * B_p[9 * k + 2] + S_p[21] * B_p[9 * k + 3] + S_p[27] * B_p[9 * k + 4] + S_p[33] *
+        B_p[9 * k + 5] + S_p[39] * B_p[9 * k + 6] + S_p[45] * B_p[9 * k + 7] + S_p[51] * B_p[9 * k +
+        8]) * H[3 * n + l] + (S_p[4] * B_p[9 * k] + S_p[10] * B_p[9 * k + 1] + S_p[16] * B_p[9 * k +
+        2] + S_p[22] * B_p[9 * k + 3] + S_p[28] * B_p[9 * k + 4] + S_p[34] * B_p[9 * k + 5] +
+        S_p[40] * B_p[9 * k + 6] + S_p[46] * B_p[9 * k + 7] + S_p[52] * B_p[9 * k + 8]) * H[4 * n +
+        l] + (S_p[5] * B_p[9 * k] + S_p[11] * B_p[9 * k + 1] + S_p[17] * B_p[9 * k + 2] + S_p[23] *
+        B_p[9 * k + 3] + S_p[29] * B_p[9 * k + 4] + S_p[35] * B_p[9 * k + 5] + S_p[41] * B_p[9 * k +
+        6] + S_p[47] * B_p[9 * k + 7] + S_p[53] * B_p[9 * k + 8]) * H[5 * n + l];
     }
-    for (int k = 0; k < n; ++k) {
-        const real t56 = S_p[0] * B_p[9 * k];
-        const real t57 = S_p[6] * B_p[9 * k + 1];
-        const real t58 = t56 + t57;
-        const real t59 = S_p[12] * B_p[9 * k + 2];
-        const real t60 = t58 + t59;
-        const real t61 = S_p[18] * B_p[9 * k + 3];
-        const real t62 = t60 + t61;
-        const real t63 = S_p[24] * B_p[9 * k + 4];
-        const real t64 = t62 + t63;
-        const real t65 = S_p[30] * B_p[9 * k + 5];
-        const real t66 = t64 + t65;
-        const real t67 = S_p[36] * B_p[9 * k + 6];
-        const real t68 = t66 + t67;
-        const real t69 = S_p[42] * B_p[9 * k + 7];
-        const real t70 = t68 + t69;
-        const real t71 = S_p[48] * B_p[9 * k + 8];
-        const real t72 = t70 + t71;
-        const real t73 = Rc[3] * t72;
-        const real t74 = S_p[1] * B_p[9 * k];
-        const real t75 = S_p[7] * B_p[9 * k + 1];
-        const real t76 = t74 + t75;
-        const real t77 = S_p[13] * B_p[9 * k + 2];
-        const real t78 = t76 + t77;
-        const real t79 = S_p[19] * B_p[9 * k + 3];
-        const real t80 = t78 + t79;
-        const real t81 = S_p[25] * B_p[9 * k + 4];
-        const real t82 = t80 + t81;
-        const real t83 = S_p[31] * B_p[9 * k + 5];
-        const real t84 = t82 + t83;
-        const real t85 = S_p[37] * B_p[9 * k + 6];
-        const real t86 = t84 + t85;
-        const real t87 = S_p[43] * B_p[9 * k + 7];
-        const real t88 = t86 + t87;
-        const real t89 = S_p[49] * B_p[9 * k + 8];
-        const real t90 = t88 + t89;
-        const real t91 = Rc[4] * t90;
-        const real t92 = t73 + t91;
-        const real t93 = S_p[2] * B_p[9 * k];
-        const real t94 = S_p[8] * B_p[9 * k + 1];
-        const real t95 = t93 + t94;
-        const real t96 = S_p[14] * B_p[9 * k + 2];
-        const real t97 = t95 + t96;
-        const real t98 = S_p[20] * B_p[9 * k + 3];
-        const real t99 = t97 + t98;
-        const real t100 = S_p[26] * B_p[9 * k + 4];
-        const real t101 = t99 + t100;
-        const real t102 = S_p[32] * B_p[9 * k + 5];
-        const real t103 = t101 + t102;
-        const real t104 = S_p[38] * B_p[9 * k + 6];
-        const real t105 = t103 + t104;
-        const real t106 = S_p[44] * B_p[9 * k + 7];
-        const real t107 = t105 + t106;
-        const real t108 = S_p[50] * B_p[9 * k + 8];
-        const real t109 = t107 + t108;
-        const real t110 = Rc[5] * t109;
-        const real t111 = t92 + t110;
-        K[6 * k + 1] += t111;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t112 = S_p[0] * B_p[9 * k];
-        const real t113 = S_p[6] * B_p[9 * k + 1];
-        const real t114 = t112 + t113;
-        const real t115 = S_p[12] * B_p[9 * k + 2];
-        const real t116 = t114 + t115;
-        const real t117 = S_p[18] * B_p[9 * k + 3];
-        const real t118 = t116 + t117;
-        const real t119 = S_p[24] * B_p[9 * k + 4];
-        const real t120 = t118 + t119;
-        const real t121 = S_p[30] * B_p[9 * k + 5];
-        const real t122 = t120 + t121;
-        const real t123 = S_p[36] * B_p[9 * k + 6];
-        const real t124 = t122 + t123;
-        const real t125 = S_p[42] * B_p[9 * k + 7];
-        const real t126 = t124 + t125;
-        const real t127 = S_p[48] * B_p[9 * k + 8];
-        const real t128 = t126 + t127;
-        const real t129 = Rc[6] * t128;
-        const real t130 = S_p[1] * B_p[9 * k];
-        const real t131 = S_p[7] * B_p[9 * k + 1];
-        const real t132 = t130 + t131;
-        const real t133 = S_p[13] * B_p[9 * k + 2];
-        const real t134 = t132 + t133;
-        const real t135 = S_p[19] * B_p[9 * k + 3];
-        const real t136 = t134 + t135;
-        const real t137 = S_p[25] * B_p[9 * k + 4];
-        const real t138 = t136 + t137;
-        const real t139 = S_p[31] * B_p[9 * k + 5];
-        const real t140 = t138 + t139;
-        const real t141 = S_p[37] * B_p[9 * k + 6];
-        const real t142 = t140 + t141;
-        const real t143 = S_p[43] * B_p[9 * k + 7];
-        const real t144 = t142 + t143;
-        const real t145 = S_p[49] * B_p[9 * k + 8];
-        const real t146 = t144 + t145;
-        const real t147 = Rc[7] * t146;
-        const real t148 = t129 + t147;
-        const real t149 = S_p[2] * B_p[9 * k];
-        const real t150 = S_p[8] * B_p[9 * k + 1];
-        const real t151 = t149 + t150;
-        const real t152 = S_p[14] * B_p[9 * k + 2];
-        const real t153 = t151 + t152;
-        const real t154 = S_p[20] * B_p[9 * k + 3];
-        const real t155 = t153 + t154;
-        const real t156 = S_p[26] * B_p[9 * k + 4];
-        const real t157 = t155 + t156;
-        const real t158 = S_p[32] * B_p[9 * k + 5];
-        const real t159 = t157 + t158;
-        const real t160 = S_p[38] * B_p[9 * k + 6];
-        const real t161 = t159 + t160;
-        const real t162 = S_p[44] * B_p[9 * k + 7];
-        const real t163 = t161 + t162;
-        const real t164 = S_p[50] * B_p[9 * k + 8];
-        const real t165 = t163 + t164;
-        const real t166 = Rc[8] * t165;
-        const real t167 = t148 + t166;
-        K[6 * k + 2] += t167;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t168 = S_p[3] * B_p[9 * k];
-        const real t169 = S_p[9] * B_p[9 * k + 1];
-        const real t170 = t168 + t169;
-        const real t171 = S_p[15] * B_p[9 * k + 2];
-        const real t172 = t170 + t171;
-        const real t173 = S_p[21] * B_p[9 * k + 3];
-        const real t174 = t172 + t173;
-        const real t175 = S_p[27] * B_p[9 * k + 4];
-        const real t176 = t174 + t175;
-        const real t177 = S_p[33] * B_p[9 * k + 5];
-        const real t178 = t176 + t177;
-        const real t179 = S_p[39] * B_p[9 * k + 6];
-        const real t180 = t178 + t179;
-        const real t181 = S_p[45] * B_p[9 * k + 7];
-        const real t182 = t180 + t181;
-        const real t183 = S_p[51] * B_p[9 * k + 8];
-        const real t184 = t182 + t183;
-        const real t185 = Rc[0] * t184;
-        const real t186 = S_p[4] * B_p[9 * k];
-        const real t187 = S_p[10] * B_p[9 * k + 1];
-        const real t188 = t186 + t187;
-        const real t189 = S_p[16] * B_p[9 * k + 2];
-        const real t190 = t188 + t189;
-        const real t191 = S_p[22] * B_p[9 * k + 3];
-        const real t192 = t190 + t191;
-        const real t193 = S_p[28] * B_p[9 * k + 4];
-        const real t194 = t192 + t193;
-        const real t195 = S_p[34] * B_p[9 * k + 5];
-        const real t196 = t194 + t195;
-        const real t197 = S_p[40] * B_p[9 * k + 6];
-        const real t198 = t196 + t197;
-        const real t199 = S_p[46] * B_p[9 * k + 7];
-        const real t200 = t198 + t199;
-        const real t201 = S_p[52] * B_p[9 * k + 8];
-        const real t202 = t200 + t201;
-        const real t203 = Rc[1] * t202;
-        const real t204 = t185 + t203;
-        const real t205 = S_p[5] * B_p[9 * k];
-        const real t206 = S_p[11] * B_p[9 * k + 1];
-        const real t207 = t205 + t206;
-        const real t208 = S_p[17] * B_p[9 * k + 2];
-        const real t209 = t207 + t208;
-        const real t210 = S_p[23] * B_p[9 * k + 3];
-        const real t211 = t209 + t210;
-        const real t212 = S_p[29] * B_p[9 * k + 4];
-        const real t213 = t211 + t212;
-        const real t214 = S_p[35] * B_p[9 * k + 5];
-        const real t215 = t213 + t214;
-        const real t216 = S_p[41] * B_p[9 * k + 6];
-        const real t217 = t215 + t216;
-        const real t218 = S_p[47] * B_p[9 * k + 7];
-        const real t219 = t217 + t218;
-        const real t220 = S_p[53] * B_p[9 * k + 8];
-        const real t221 = t219 + t220;
-        const real t222 = Rc[2] * t221;
-        const real t223 = t204 + t222;
-        const real t224 = S_p[0] * B_p[9 * k];
-        const real t225 = S_p[6] * B_p[9 * k + 1];
-        const real t226 = t224 + t225;
-        const real t227 = S_p[12] * B_p[9 * k + 2];
-        const real t228 = t226 + t227;
-        const real t229 = S_p[18] * B_p[9 * k + 3];
-        const real t230 = t228 + t229;
-        const real t231 = S_p[24] * B_p[9 * k + 4];
-        const real t232 = t230 + t231;
-        const real t233 = S_p[30] * B_p[9 * k + 5];
-        const real t234 = t232 + t233;
-        const real t235 = S_p[36] * B_p[9 * k + 6];
-        const real t236 = t234 + t235;
-        const real t237 = S_p[42] * B_p[9 * k + 7];
-        const real t238 = t236 + t237;
-        const real t239 = S_p[48] * B_p[9 * k + 8];
-        const real t240 = t238 + t239;
-        const real t241 = Rc[6] * t240;
-        const real t242 = S_p[1] * B_p[9 * k];
-        const real t243 = S_p[7] * B_p[9 * k + 1];
-        const real t244 = t242 + t243;
-        const real t245 = S_p[13] * B_p[9 * k + 2];
-        const real t246 = t244 + t245;
-        const real t247 = S_p[19] * B_p[9 * k + 3];
-        const real t248 = t246 + t247;
-        const real t249 = S_p[25] * B_p[9 * k + 4];
-        const real t250 = t248 + t249;
-        const real t251 = S_p[31] * B_p[9 * k + 5];
-        const real t252 = t250 + t251;
-        const real t253 = S_p[37] * B_p[9 * k + 6];
-        const real t254 = t252 + t253;
-        const real t255 = S_p[43] * B_p[9 * k + 7];
-        const real t256 = t254 + t255;
-        const real t257 = S_p[49] * B_p[9 * k + 8];
-        const real t258 = t256 + t257;
-        const real t259 = Rc[7] * t258;
-        const real t260 = t241 + t259;
-        const real t261 = S_p[2] * B_p[9 * k];
-        const real t262 = S_p[8] * B_p[9 * k + 1];
-        const real t263 = t261 + t262;
-        const real t264 = S_p[14] * B_p[9 * k + 2];
-        const real t265 = t263 + t264;
-        const real t266 = S_p[20] * B_p[9 * k + 3];
-        const real t267 = t265 + t266;
-        const real t268 = S_p[26] * B_p[9 * k + 4];
-        const real t269 = t267 + t268;
-        const real t270 = S_p[32] * B_p[9 * k + 5];
-        const real t271 = t269 + t270;
-        const real t272 = S_p[38] * B_p[9 * k + 6];
-        const real t273 = t271 + t272;
-        const real t274 = S_p[44] * B_p[9 * k + 7];
-        const real t275 = t273 + t274;
-        const real t276 = S_p[50] * B_p[9 * k + 8];
-        const real t277 = t275 + t276;
-        const real t278 = Rc[8] * t277;
-        const real t279 = t260 + t278;
-        const real t280 = r[1] * t279;
-        const real t281 = Rc[3] * t240;
-        const real t282 = Rc[4] * t258;
-        const real t283 = t281 + t282;
-        const real t284 = Rc[5] * t277;
-        const real t285 = t283 + t284;
-        const real t286 = r[2] * t285;
-        const real t287 = t280 - t286;
-        const real t288 = t223 + t287;
-        K[6 * k + 3] += t288;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t289 = S_p[3] * B_p[9 * k];
-        const real t290 = S_p[9] * B_p[9 * k + 1];
-        const real t291 = t289 + t290;
-        const real t292 = S_p[15] * B_p[9 * k + 2];
-        const real t293 = t291 + t292;
-        const real t294 = S_p[21] * B_p[9 * k + 3];
-        const real t295 = t293 + t294;
-        const real t296 = S_p[27] * B_p[9 * k + 4];
-        const real t297 = t295 + t296;
-        const real t298 = S_p[33] * B_p[9 * k + 5];
-        const real t299 = t297 + t298;
-        const real t300 = S_p[39] * B_p[9 * k + 6];
-        const real t301 = t299 + t300;
-        const real t302 = S_p[45] * B_p[9 * k + 7];
-        const real t303 = t301 + t302;
-        const real t304 = S_p[51] * B_p[9 * k + 8];
-        const real t305 = t303 + t304;
-        const real t306 = Rc[3] * t305;
-        const real t307 = S_p[4] * B_p[9 * k];
-        const real t308 = S_p[10] * B_p[9 * k + 1];
-        const real t309 = t307 + t308;
-        const real t310 = S_p[16] * B_p[9 * k + 2];
-        const real t311 = t309 + t310;
-        const real t312 = S_p[22] * B_p[9 * k + 3];
-        const real t313 = t311 + t312;
-        const real t314 = S_p[28] * B_p[9 * k + 4];
-        const real t315 = t313 + t314;
-        const real t316 = S_p[34] * B_p[9 * k + 5];
-        const real t317 = t315 + t316;
-        const real t318 = S_p[40] * B_p[9 * k + 6];
-        const real t319 = t317 + t318;
-        const real t320 = S_p[46] * B_p[9 * k + 7];
-        const real t321 = t319 + t320;
-        const real t322 = S_p[52] * B_p[9 * k + 8];
-        const real t323 = t321 + t322;
-        const real t324 = Rc[4] * t323;
-        const real t325 = t306 + t324;
-        const real t326 = S_p[5] * B_p[9 * k];
-        const real t327 = S_p[11] * B_p[9 * k + 1];
-        const real t328 = t326 + t327;
-        const real t329 = S_p[17] * B_p[9 * k + 2];
-        const real t330 = t328 + t329;
-        const real t331 = S_p[23] * B_p[9 * k + 3];
-        const real t332 = t330 + t331;
-        const real t333 = S_p[29] * B_p[9 * k + 4];
-        const real t334 = t332 + t333;
-        const real t335 = S_p[35] * B_p[9 * k + 5];
-        const real t336 = t334 + t335;
-        const real t337 = S_p[41] * B_p[9 * k + 6];
-        const real t338 = t336 + t337;
-        const real t339 = S_p[47] * B_p[9 * k + 7];
-        const real t340 = t338 + t339;
-        const real t341 = S_p[53] * B_p[9 * k + 8];
-        const real t342 = t340 + t341;
-        const real t343 = Rc[5] * t342;
-        const real t344 = t325 + t343;
-        const real t345 = S_p[0] * B_p[9 * k];
-        const real t346 = S_p[6] * B_p[9 * k + 1];
-        const real t347 = t345 + t346;
-        const real t348 = S_p[12] * B_p[9 * k + 2];
-        const real t349 = t347 + t348;
-        const real t350 = S_p[18] * B_p[9 * k + 3];
-        const real t351 = t349 + t350;
-        const real t352 = S_p[24] * B_p[9 * k + 4];
-        const real t353 = t351 + t352;
-        const real t354 = S_p[30] * B_p[9 * k + 5];
-        const real t355 = t353 + t354;
-        const real t356 = S_p[36] * B_p[9 * k + 6];
-        const real t357 = t355 + t356;
-        const real t358 = S_p[42] * B_p[9 * k + 7];
-        const real t359 = t357 + t358;
-        const real t360 = S_p[48] * B_p[9 * k + 8];
-        const real t361 = t359 + t360;
-        const real t362 = Rc[0] * t361;
-        const real t363 = S_p[1] * B_p[9 * k];
-        const real t364 = S_p[7] * B_p[9 * k + 1];
-        const real t365 = t363 + t364;
-        const real t366 = S_p[13] * B_p[9 * k + 2];
-        const real t367 = t365 + t366;
-        const real t368 = S_p[19] * B_p[9 * k + 3];
-        const real t369 = t367 + t368;
-        const real t370 = S_p[25] * B_p[9 * k + 4];
-        const real t371 = t369 + t370;
-        const real t372 = S_p[31] * B_p[9 * k + 5];
-        const real t373 = t371 + t372;
-        const real t374 = S_p[37] * B_p[9 * k + 6];
-        const real t375 = t373 + t374;
-        const real t376 = S_p[43] * B_p[9 * k + 7];
-        const real t377 = t375 + t376;
-        const real t378 = S_p[49] * B_p[9 * k + 8];
-        const real t379 = t377 + t378;
-        const real t380 = Rc[1] * t379;
-        const real t381 = t362 + t380;
-        const real t382 = S_p[2] * B_p[9 * k];
-        const real t383 = S_p[8] * B_p[9 * k + 1];
-        const real t384 = t382 + t383;
-        const real t385 = S_p[14] * B_p[9 * k + 2];
-        const real t386 = t384 + t385;
-        const real t387 = S_p[20] * B_p[9 * k + 3];
-        const real t388 = t386 + t387;
-        const real t389 = S_p[26] * B_p[9 * k + 4];
-        const real t390 = t388 + t389;
-        const real t391 = S_p[32] * B_p[9 * k + 5];
-        const real t392 = t390 + t391;
-        const real t393 = S_p[38] * B_p[9 * k + 6];
-        const real t394 = t392 + t393;
-        const real t395 = S_p[44] * B_p[9 * k + 7];
-        const real t396 = t394 + t395;
-        const real t397 = S_p[50] * B_p[9 * k + 8];
-        const real t398 = t396 + t397;
-        const real t399 = Rc[2] * t398;
-        const real t400 = t381 + t399;
-        const real t401 = r[2] * t400;
-        const real t402 = Rc[6] * t361;
-        const real t403 = Rc[7] * t379;
-        const real t404 = t402 + t403;
-        const real t405 = Rc[8] * t398;
-        const real t406 = t404 + t405;
-        const real t407 = r[0] * t406;
-        const real t408 = t401 - t407;
-        const real t409 = t344 + t408;
-        K[6 * k + 4] += t409;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t410 = S_p[3] * B_p[9 * k];
-        const real t411 = S_p[9] * B_p[9 * k + 1];
-        const real t412 = t410 + t411;
-        const real t413 = S_p[15] * B_p[9 * k + 2];
-        const real t414 = t412 + t413;
-        const real t415 = S_p[21] * B_p[9 * k + 3];
-        const real t416 = t414 + t415;
-        const real t417 = S_p[27] * B_p[9 * k + 4];
-        const real t418 = t416 + t417;
-        const real t419 = S_p[33] * B_p[9 * k + 5];
-        const real t420 = t418 + t419;
-        const real t421 = S_p[39] * B_p[9 * k + 6];
-        const real t422 = t420 + t421;
-        const real t423 = S_p[45] * B_p[9 * k + 7];
-        const real t424 = t422 + t423;
-        const real t425 = S_p[51] * B_p[9 * k + 8];
-        const real t426 = t424 + t425;
-        const real t427 = Rc[6] * t426;
-        const real t428 = S_p[4] * B_p[9 * k];
-        const real t429 = S_p[10] * B_p[9 * k + 1];
-        const real t430 = t428 + t429;
-        const real t431 = S_p[16] * B_p[9 * k + 2];
-        const real t432 = t430 + t431;
-        const real t433 = S_p[22] * B_p[9 * k + 3];
-        const real t434 = t432 + t433;
-        const real t435 = S_p[28] * B_p[9 * k + 4];
-        const real t436 = t434 + t435;
-        const real t437 = S_p[34] * B_p[9 * k + 5];
-        const real t438 = t436 + t437;
-        const real t439 = S_p[40] * B_p[9 * k + 6];
-        const real t440 = t438 + t439;
-        const real t441 = S_p[46] * B_p[9 * k + 7];
-        const real t442 = t440 + t441;
-        const real t443 = S_p[52] * B_p[9 * k + 8];
-        const real t444 = t442 + t443;
-        const real t445 = Rc[7] * t444;
-        const real t446 = t427 + t445;
-        const real t447 = S_p[5] * B_p[9 * k];
-        const real t448 = S_p[11] * B_p[9 * k + 1];
-        const real t449 = t447 + t448;
-        const real t450 = S_p[17] * B_p[9 * k + 2];
-        const real t451 = t449 + t450;
-        const real t452 = S_p[23] * B_p[9 * k + 3];
-        const real t453 = t451 + t452;
-        const real t454 = S_p[29] * B_p[9 * k + 4];
-        const real t455 = t453 + t454;
-        const real t456 = S_p[35] * B_p[9 * k + 5];
-        const real t457 = t455 + t456;
-        const real t458 = S_p[41] * B_p[9 * k + 6];
-        const real t459 = t457 + t458;
-        const real t460 = S_p[47] * B_p[9 * k + 7];
-        const real t461 = t459 + t460;
-        const real t462 = S_p[53] * B_p[9 * k + 8];
-        const real t463 = t461 + t462;
-        const real t464 = Rc[8] * t463;
-        const real t465 = t446 + t464;
-        const real t466 = S_p[0] * B_p[9 * k];
-        const real t467 = S_p[6] * B_p[9 * k + 1];
-        const real t468 = t466 + t467;
-        const real t469 = S_p[12] * B_p[9 * k + 2];
-        const real t470 = t468 + t469;
-        const real t471 = S_p[18] * B_p[9 * k + 3];
-        const real t472 = t470 + t471;
-        const real t473 = S_p[24] * B_p[9 * k + 4];
-        const real t474 = t472 + t473;
-        const real t475 = S_p[30] * B_p[9 * k + 5];
-        const real t476 = t474 + t475;
-        const real t477 = S_p[36] * B_p[9 * k + 6];
-        const real t478 = t476 + t477;
-        const real t479 = S_p[42] * B_p[9 * k + 7];
-        const real t480 = t478 + t479;
-        const real t481 = S_p[48] * B_p[9 * k + 8];
-        const real t482 = t480 + t481;
-        const real t483 = Rc[3] * t482;
-        const real t484 = S_p[1] * B_p[9 * k];
-        const real t485 = S_p[7] * B_p[9 * k + 1];
-        const real t486 = t484 + t485;
-        const real t487 = S_p[13] * B_p[9 * k + 2];
-        const real t488 = t486 + t487;
-        const real t489 = S_p[19] * B_p[9 * k + 3];
-        const real t490 = t488 + t489;
-        const real t491 = S_p[25] * B_p[9 * k + 4];
-        const real t492 = t490 + t491;
-        const real t493 = S_p[31] * B_p[9 * k + 5];
-        const real t494 = t492 + t493;
-        const real t495 = S_p[37] * B_p[9 * k + 6];
-        const real t496 = t494 + t495;
-        const real t497 = S_p[43] * B_p[9 * k + 7];
-        const real t498 = t496 + t497;
-        const real t499 = S_p[49] * B_p[9 * k + 8];
-        const real t500 = t498 + t499;
-        const real t501 = Rc[4] * t500;
-        const real t502 = t483 + t501;
-        const real t503 = S_p[2] * B_p[9 * k];
-        const real t504 = S_p[8] * B_p[9 * k + 1];
-        const real t505 = t503 + t504;
-        const real t506 = S_p[14] * B_p[9 * k + 2];
-        const real t507 = t505 + t506;
-        const real t508 = S_p[20] * B_p[9 * k + 3];
-        const real t509 = t507 + t508;
-        const real t510 = S_p[26] * B_p[9 * k + 4];
-        const real t511 = t509 + t510;
-        const real t512 = S_p[32] * B_p[9 * k + 5];
-        const real t513 = t511 + t512;
-        const real t514 = S_p[38] * B_p[9 * k + 6];
-        const real t515 = t513 + t514;
-        const real t516 = S_p[44] * B_p[9 * k + 7];
-        const real t517 = t515 + t516;
-        const real t518 = S_p[50] * B_p[9 * k + 8];
-        const real t519 = t517 + t518;
-        const real t520 = Rc[5] * t519;
-        const real t521 = t502 + t520;
-        const real t522 = r[0] * t521;
-        const real t523 = Rc[0] * t482;
-        const real t524 = Rc[1] * t500;
-        const real t525 = t523 + t524;
-        const real t526 = Rc[2] * t519;
-        const real t527 = t525 + t526;
-        const real t528 = r[1] * t527;
-        const real t529 = t522 - t528;
-        const real t530 = t465 + t529;
-        K[6 * k + 5] += t530;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t531 = T_p[0] * H[k];
-        const real t532 = T_p[1] * H[n + k];
-        const real t533 = t531 + t532;
-        const real t534 = T_p[2] * H[2 * n + k];
-        const real t535 = t533 + t534;
-        const real t536 = T_p[3] * H[3 * n + k];
-        const real t537 = t535 + t536;
-        const real t538 = T_p[4] * H[4 * n + k];
-        const real t539 = t537 + t538;
-        const real t540 = T_p[5] * H[5 * n + k];
-        const real t541 = t539 + t540;
-        Z_p[k] += t541;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t542 = T_p[6] * H[k];
-        const real t543 = T_p[7] * H[n + k];
-        const real t544 = t542 + t543;
-        const real t545 = T_p[8] * H[2 * n + k];
-        const real t546 = t544 + t545;
-        const real t547 = T_p[9] * H[3 * n + k];
-        const real t548 = t546 + t547;
-        const real t549 = T_p[10] * H[4 * n + k];
-        const real t550 = t548 + t549;
-        const real t551 = T_p[11] * H[5 * n + k];
-        const real t552 = t550 + t551;
-        Z_p[n + k] += t552;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t553 = T_p[12] * H[k];
-        const real t554 = T_p[13] * H[n + k];
-        const real t555 = t553 + t554;
-        const real t556 = T_p[14] * H[2 * n + k];
-        const real t557 = t555 + t556;
-        const real t558 = T_p[15] * H[3 * n + k];
-        const real t559 = t557 + t558;
-        const real t560 = T_p[16] * H[4 * n + k];
-        const real t561 = t559 + t560;
-        const real t562 = T_p[17] * H[5 * n + k];
-        const real t563 = t561 + t562;
-        Z_p[2 * n + k] += t563;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t564 = T_p[18] * H[k];
-        const real t565 = T_p[19] * H[n + k];
-        const real t566 = t564 + t565;
-        const real t567 = T_p[20] * H[2 * n + k];
-        const real t568 = t566 + t567;
-        const real t569 = T_p[21] * H[3 * n + k];
-        const real t570 = t568 + t569;
-        const real t571 = T_p[22] * H[4 * n + k];
-        const real t572 = t570 + t571;
-        const real t573 = T_p[23] * H[5 * n + k];
-        const real t574 = t572 + t573;
-        Z_p[3 * n + k] += t574;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t575 = T_p[24] * H[k];
-        const real t576 = T_p[25] * H[n + k];
-        const real t577 = t575 + t576;
-        const real t578 = T_p[26] * H[2 * n + k];
-        const real t579 = t577 + t578;
-        const real t580 = T_p[27] * H[3 * n + k];
-        const real t581 = t579 + t580;
-        const real t582 = T_p[28] * H[4 * n + k];
-        const real t583 = t581 + t582;
-        const real t584 = T_p[29] * H[5 * n + k];
-        const real t585 = t583 + t584;
-        Z_p[4 * n + k] += t585;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t586 = T_p[30] * H[k];
-        const real t587 = T_p[31] * H[n + k];
-        const real t588 = t586 + t587;
-        const real t589 = T_p[32] * H[2 * n + k];
-        const real t590 = t588 + t589;
-        const real t591 = T_p[33] * H[3 * n + k];
-        const real t592 = t590 + t591;
-        const real t593 = T_p[34] * H[4 * n + k];
-        const real t594 = t592 + t593;
-        const real t595 = T_p[35] * H[5 * n + k];
-        const real t596 = t594 + t595;
-        Z_p[5 * n + k] += t596;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t597 = T_p[36] * H[k];
-        const real t598 = T_p[37] * H[n + k];
-        const real t599 = t597 + t598;
-        const real t600 = T_p[38] * H[2 * n + k];
-        const real t601 = t599 + t600;
-        const real t602 = T_p[39] * H[3 * n + k];
-        const real t603 = t601 + t602;
-        const real t604 = T_p[40] * H[4 * n + k];
-        const real t605 = t603 + t604;
-        const real t606 = T_p[41] * H[5 * n + k];
-        const real t607 = t605 + t606;
-        Z_p[6 * n + k] += t607;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t608 = T_p[42] * H[k];
-        const real t609 = T_p[43] * H[n + k];
-        const real t610 = t608 + t609;
-        const real t611 = T_p[44] * H[2 * n + k];
-        const real t612 = t610 + t611;
-        const real t613 = T_p[45] * H[3 * n + k];
-        const real t614 = t612 + t613;
-        const real t615 = T_p[46] * H[4 * n + k];
-        const real t616 = t614 + t615;
-        const real t617 = T_p[47] * H[5 * n + k];
-        const real t618 = t616 + t617;
-        Z_p[7 * n + k] += t618;
-    }
-    for (int k = 0; k < n; ++k) {
-        const real t619 = T_p[48] * H[k];
-        const real t620 = T_p[49] * H[n + k];
-        const real t621 = t619 + t620;
-        const real t622 = T_p[50] * H[2 * n + k];
-        const real t623 = t621 + t622;
-        const real t624 = T_p[51] * H[3 * n + k];
-        const real t625 = t623 + t624;
-        const real t626 = T_p[52] * H[4 * n + k];
-        const real t627 = t625 + t626;
-        const real t628 = T_p[53] * H[5 * n + k];
-        const real t629 = t627 + t628;
-        Z_p[8 * n + k] += t629;
-    }
-    for (int k = 0; k < n; ++k) {
-        for (int l = 0; l < n; ++l) {
-            const real t630 = S_p[0] * B_p[9 * k];
-            const real t631 = S_p[6] * B_p[9 * k + 1];
-            const real t632 = t630 + t631;
-            const real t633 = S_p[12] * B_p[9 * k + 2];
-            const real t634 = t632 + t633;
-            const real t635 = S_p[18] * B_p[9 * k + 3];
-            const real t636 = t634 + t635;
-            const real t637 = S_p[24] * B_p[9 * k + 4];
-            const real t638 = t636 + t637;
-            const real t639 = S_p[30] * B_p[9 * k + 5];
-            const real t640 = t638 + t639;
-            const real t641 = S_p[36] * B_p[9 * k + 6];
-            const real t642 = t640 + t641;
-            const real t643 = S_p[42] * B_p[9 * k + 7];
-            const real t644 = t642 + t643;
-            const real t645 = S_p[48] * B_p[9 * k + 8];
-            const real t646 = t644 + t645;
-            const real t647 = t646 * H[l];
-            const real t648 = S_p[1] * B_p[9 * k];
-            const real t649 = S_p[7] * B_p[9 * k + 1];
-            const real t650 = t648 + t649;
-            const real t651 = S_p[13] * B_p[9 * k + 2];
-            const real t652 = t650 + t651;
-            const real t653 = S_p[19] * B_p[9 * k + 3];
-            const real t654 = t652 + t653;
-            const real t655 = S_p[25] * B_p[9 * k + 4];
-            const real t656 = t654 + t655;
-            const real t657 = S_p[31] * B_p[9 * k + 5];
-            const real t658 = t656 + t657;
-            const real t659 = S_p[37] * B_p[9 * k + 6];
-            const real t660 = t658 + t659;
-            const real t661 = S_p[43] * B_p[9 * k + 7];
-            const real t662 = t660 + t661;
-            const real t663 = S_p[49] * B_p[9 * k + 8];
-            const real t664 = t662 + t663;
-            const real t665 = t664 * H[n + l];
-            const real t666 = t647 + t665;
-            const real t667 = S_p[2] * B_p[9 * k];
-            const real t668 = S_p[8] * B_p[9 * k + 1];
-            const real t669 = t667 + t668;
-            const real t670 = S_p[14] * B_p[9 * k + 2];
-            const real t671 = t669 + t670;
-            const real t672 = S_p[20] * B_p[9 * k + 3];
-            const real t673 = t671 + t672;
-            const real t674 = S_p[26] * B_p[9 * k + 4];
-            const real t675 = t673 + t674;
-            const real t676 = S_p[32] * B_p[9 * k + 5];
-            const real t677 = t675 + t676;
-            const real t678 = S_p[38] * B_p[9 * k + 6];
-            const real t679 = t677 + t678;
-            const real t680 = S_p[44] * B_p[9 * k + 7];
-            const real t681 = t679 + t680;
-            const real t682 = S_p[50] * B_p[9 * k + 8];
-            const real t683 = t681 + t682;
-            const real t684 = t683 * H[2 * n + l];
-            const real t685 = t666 + t684;
-            const real t686 = S_p[3] * B_p[9 * k];
-            const real t687 = S_p[9] * B_p[9 * k + 1];
-            const real t688 = t686 + t687;
-            const real t689 = S_p[15] * B_p[9 * k + 2];
-            const real t690 = t688 + t689;
-            const real t691 = S_p[21] * B_p[9 * k + 3];
-            const real t692 = t690 + t691;
-            const real t693 = S_p[27] * B_p[9 * k + 4];
-            const real t694 = t692 + t693;
-            const real t695 = S_p[33] * B_p[9 * k + 5];
-            const real t696 = t694 + t695;
-            const real t697 = S_p[39] * B_p[9 * k + 6];
-            const real t698 = t696 + t697;
-            const real t699 = S_p[45] * B_p[9 * k + 7];
-            const real t700 = t698 + t699;
-            const real t701 = S_p[51] * B_p[9 * k + 8];
-            const real t702 = t700 + t701;
-            const real t703 = t702 * H[3 * n + l];
-            const real t704 = t685 + t703;
-            const real t705 = S_p[4] * B_p[9 * k];
-            const real t706 = S_p[10] * B_p[9 * k + 1];
-            const real t707 = t705 + t706;
-            const real t708 = S_p[16] * B_p[9 * k + 2];
-            const real t709 = t707 + t708;
-            const real t710 = S_p[22] * B_p[9 * k + 3];
-            const real t711 = t709 + t710;
-            const real t712 = S_p[28] * B_p[9 * k + 4];
-            const real t713 = t711 + t712;
-            const real t714 = S_p[34] * B_p[9 * k + 5];
-            const real t715 = t713 + t714;
-            const real t716 = S_p[40] * B_p[9 * k + 6];
-            const real t717 = t715 + t716;
-            const real t718 = S_p[46] * B_p[9 * k + 7];
-            const real t719 = t717 + t718;
-            const real t720 = S_p[52] * B_p[9 * k + 8];
-            const real t721 = t719 + t720;
-            const real t722 = t721 * H[4 * n + l];
-            const real t723 = t704 + t722;
-            const real t724 = S_p[5] * B_p[9 * k];
-            const real t725 = S_p[11] * B_p[9 * k + 1];
-            const real t726 = t724 + t725;
-            const real t727 = S_p[17] * B_p[9 * k + 2];
-            const real t728 = t726 + t727;
-            const real t729 = S_p[23] * B_p[9 * k + 3];
-            const real t730 = t728 + t729;
-            const real t731 = S_p[29] * B_p[9 * k + 4];
-            const real t732 = t730 + t731;
-            const real t733 = S_p[35] * B_p[9 * k + 5];
-            const real t734 = t732 + t733;
-            const real t735 = S_p[41] * B_p[9 * k + 6];
-            const real t736 = t734 + t735;
-            const real t737 = S_p[47] * B_p[9 * k + 7];
-            const real t738 = t736 + t737;
-            const real t739 = S_p[53] * B_p[9 * k + 8];
-            const real t740 = t738 + t739;
-            const real t741 = t740 * H[5 * n + l];
-            const real t742 = t723 + t741;
-            Z_x[n * k + l] += t742;
-        }
-    }
-    return 0;
+  }
+  return 0;
 }
 
-int mstmm_sweep_tangent_placed_port(int n, const real *restrict Rc, const real *restrict r,
-    const real *restrict H, const real *restrict B_p, const real *restrict S_p,
-    const real *restrict T_p, real *restrict K, real *restrict Z_p, real *restrict Z_x)
+int mstmm_sweep_tangent_placed_port(int n, in_t Rc, in_t r, in_t H, in_t B_p, in_t S_p, in_t T_p,
+    out_t K, out_t Z_p, out_t Z_x)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_port_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 2: return mstmm_sweep_tangent_placed_port_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 3: return mstmm_sweep_tangent_placed_port_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    case 4: return mstmm_sweep_tangent_placed_port_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    default: return mstmm_sweep_tangent_placed_port_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_port_sized(1, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+  case 2: return mstmm_sweep_tangent_placed_port_sized(2, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+  case 3: return mstmm_sweep_tangent_placed_port_sized(3, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+  case 4: return mstmm_sweep_tangent_placed_port_sized(4, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+  default: return mstmm_sweep_tangent_placed_port_sized(n, Rc, r, H, B_p, S_p, T_p, K, Z_p, Z_x);
+  }
 }
 
-static int mstmm_sweep_tangent_placed_port_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_placed_port(n, in[0], in[1], in[2], in[3], in[4], in[5], out[0], out[1], out[2]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_placed_port_inputs[] = {
-    {"Rc", 9, "", 0, 0},
-    {"r", 3, "m", 0, 0},
-    {"H", 6, "", 0, 1},
-    {"B_p", 9, "", 0, 1},
-    {"S_p", 54, "", 0, 0},
-    {"T_p", 54, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_tangent_placed_port_outputs[] = {
-    {"K", 6, "", 1, 1},
-    {"Z_p", 9, "", 1, 1},
-    {"Z_x", 1, "", 1, 2},
-};
+MSTMM_CALL(mstmm_sweep_tangent_placed_port, (n, in[0], in[1], in[2], in[3], in[4], in[5], out[0],
+  out[1], out[2]))
 
 /* rows less their change by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
@@ -4208,235 +1974,101 @@ static const mstmm_port mstmm_sweep_tangent_placed_port_outputs[] = {
  * out y[n] the remainder of the rows, added to what is there
  */
 static inline __attribute__((always_inline))
-int mstmm_sweep_tangent_placed_remainder_sized(int n, const real *restrict gain,
-    const real *restrict p, real *restrict y)
+int mstmm_sweep_tangent_placed_remainder_sized(int n, in_t gain, in_t p, out_t y)
 {
-    for (int k = 0; k < n; ++k) {
-        const real t0 = p[0] * gain[9 * k];
-        const real t1 = p[1] * gain[9 * k + 1];
-        const real t2 = t0 + t1;
-        const real t3 = p[2] * gain[9 * k + 2];
-        const real t4 = t2 + t3;
-        const real t5 = p[3] * gain[9 * k + 3];
-        const real t6 = t4 + t5;
-        const real t7 = p[4] * gain[9 * k + 4];
-        const real t8 = t6 + t7;
-        const real t9 = p[5] * gain[9 * k + 5];
-        const real t10 = t8 + t9;
-        const real t11 = p[6] * gain[9 * k + 6];
-        const real t12 = t10 + t11;
-        const real t13 = p[7] * gain[9 * k + 7];
-        const real t14 = t12 + t13;
-        const real t15 = p[8] * gain[9 * k + 8];
-        const real t16 = t14 + t15;
-        const real t17 = -t16;
-        y[k] += t17;
-    }
-    return 0;
+  for (int k = 0; k < n; ++k) {
+    y[k] += -(p[0] * gain[9 * k] + p[1] * gain[9 * k + 1] + p[2] * gain[9 * k + 2] + p[3] * gain[9 *
+      k + 3] + p[4] * gain[9 * k + 4] + p[5] * gain[9 * k + 5] + p[6] * gain[9 * k + 6] + p[7] *
+      gain[9 * k + 7] + p[8] * gain[9 * k + 8]);
+  }
+  return 0;
 }
 
-int mstmm_sweep_tangent_placed_remainder(int n, const real *restrict gain, const real *restrict p,
-    real *restrict y)
+int mstmm_sweep_tangent_placed_remainder(int n, in_t gain, in_t p, out_t y)
 {
-    switch (n) { /* loops over a known number are unrolled */
-    case 1: return mstmm_sweep_tangent_placed_remainder_sized(1, gain, p, y);
-    case 2: return mstmm_sweep_tangent_placed_remainder_sized(2, gain, p, y);
-    case 3: return mstmm_sweep_tangent_placed_remainder_sized(3, gain, p, y);
-    case 4: return mstmm_sweep_tangent_placed_remainder_sized(4, gain, p, y);
-    default: return mstmm_sweep_tangent_placed_remainder_sized(n, gain, p, y);
-    }
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_remainder_sized(1, gain, p, y);
+  case 2: return mstmm_sweep_tangent_placed_remainder_sized(2, gain, p, y);
+  case 3: return mstmm_sweep_tangent_placed_remainder_sized(3, gain, p, y);
+  case 4: return mstmm_sweep_tangent_placed_remainder_sized(4, gain, p, y);
+  default: return mstmm_sweep_tangent_placed_remainder_sized(n, gain, p, y);
+  }
 }
 
-static int mstmm_sweep_tangent_placed_remainder_call(int n, const real *const *in, real *const *out)
-{
-    return mstmm_sweep_tangent_placed_remainder(n, in[0], in[1], out[0]);
-}
-
-static const mstmm_port mstmm_sweep_tangent_placed_remainder_inputs[] = {
-    {"gain", 9, "", 0, 1},
-    {"p", 9, "", 0, 0},
-};
-
-static const mstmm_port mstmm_sweep_tangent_placed_remainder_outputs[] = {
-    {"y", 1, "", 1, 1},
-};
+MSTMM_CALL(mstmm_sweep_tangent_placed_remainder, (n, in[0], in[1], out[0]))
 
 static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
-    {
-        .name = "invert",
-        .function = (void (*)(void))mstmm_sweep_tangent_invert,
-        .call = mstmm_sweep_tangent_invert_call,
-        .n_inputs = 2,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_tangent_invert_inputs,
-        .outputs = mstmm_sweep_tangent_invert_outputs,
-        .ir_hash = "d51a0da114a148ce565cf89daf636eb2e848afd9546de3cfb59a5e7f6bb3d444",
-        .n_guards = 2,
-        .guards = mstmm_sweep_tangent_invert_guards,
-    },
-    {
-        .name = "node",
-        .function = (void (*)(void))mstmm_sweep_tangent_node,
-        .call = mstmm_sweep_tangent_node_call,
-        .n_inputs = 8,
-        .n_outputs = 6,
-        .inputs = mstmm_sweep_tangent_node_inputs,
-        .outputs = mstmm_sweep_tangent_node_outputs,
-        .ir_hash = "356bbc010f8ea4859a8714c4860e9db92ee426ef185f1ba4b6578958b2429ecf",
-        .n_guards = 2,
-        .guards = mstmm_sweep_tangent_node_guards,
-    },
-    {
-        .name = "assemble_port",
-        .function = (void (*)(void))mstmm_sweep_tangent_assemble_port,
-        .call = mstmm_sweep_tangent_assemble_port_call,
-        .n_inputs = 8,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_tangent_assemble_port_inputs,
-        .outputs = mstmm_sweep_tangent_assemble_port_outputs,
-        .ir_hash = "7666738e800fbfeb1b71f07e8bc29444e85aa681262650b08e119ae701577432",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "column_load",
-        .function = (void (*)(void))mstmm_sweep_tangent_column_load,
-        .call = mstmm_sweep_tangent_column_load_call,
-        .n_inputs = 5,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_tangent_column_load_inputs,
-        .outputs = mstmm_sweep_tangent_column_load_outputs,
-        .ir_hash = "b6e69234c0e309fcda7ee9e717260f289f44f16cbfdab8de086eeeb6b7dbf817",
-        .n_guards = 2,
-        .guards = mstmm_sweep_tangent_column_load_guards,
-    },
-    {
-        .name = "column_solution",
-        .function = (void (*)(void))mstmm_sweep_tangent_column_solution,
-        .call = mstmm_sweep_tangent_column_solution_call,
-        .n_inputs = 4,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_tangent_column_solution_inputs,
-        .outputs = mstmm_sweep_tangent_column_solution_outputs,
-        .ir_hash = "0c2c559f62e70ae12b5a741f8a8b24e1d788aee543f3274086597519cb7dcf96",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "port_motion",
-        .function = (void (*)(void))mstmm_sweep_tangent_port_motion,
-        .call = mstmm_sweep_tangent_port_motion_call,
-        .n_inputs = 3,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_port_motion_inputs,
-        .outputs = mstmm_sweep_tangent_port_motion_outputs,
-        .ir_hash = "0659969158f78cdd60943014cc29191ff98d93768b75182148d7bac811ce2509",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "increment_matrix",
-        .function = (void (*)(void))mstmm_sweep_tangent_increment_matrix,
-        .call = mstmm_sweep_tangent_increment_matrix_call,
-        .n_inputs = 4,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_tangent_increment_matrix_inputs,
-        .outputs = mstmm_sweep_tangent_increment_matrix_outputs,
-        .ir_hash = "d8e393901010e719c97ca2d5a0b66c4b8efc87d5399cdee4e868db3af72dec17",
-        .n_guards = 2,
-        .guards = mstmm_sweep_tangent_increment_matrix_guards,
-    },
-    {
-        .name = "coordinate_increment",
-        .function = (void (*)(void))mstmm_sweep_tangent_coordinate_increment,
-        .call = mstmm_sweep_tangent_coordinate_increment_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_coordinate_increment_inputs,
-        .outputs = mstmm_sweep_tangent_coordinate_increment_outputs,
-        .ir_hash = "22ad08c5df2eb3da8127bcfd89ac262f28d3f5e927b8a330ed7221ad4133faba",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_rows",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_rows,
-        .call = mstmm_sweep_tangent_placed_rows_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_placed_rows_inputs,
-        .outputs = mstmm_sweep_tangent_placed_rows_outputs,
-        .ir_hash = "fae39a1c1e9f8dc8418142c9f00807f3bf6d446c3a2d95a10d03de53a88d7103",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_own",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_own,
-        .call = mstmm_sweep_tangent_placed_own_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_tangent_placed_own_inputs,
-        .outputs = mstmm_sweep_tangent_placed_own_outputs,
-        .ir_hash = "0d62b9f1919cb7503db560ee181638ad0112335a8408316d1209a9b3b0878cf6",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_reduce",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_reduce,
-        .call = mstmm_sweep_tangent_placed_reduce_call,
-        .n_inputs = 3,
-        .n_outputs = 2,
-        .inputs = mstmm_sweep_tangent_placed_reduce_inputs,
-        .outputs = mstmm_sweep_tangent_placed_reduce_outputs,
-        .ir_hash = "caf068e2e8fb9f285f58cbb22b580ecb2753bce4080d7ed53657b4267c7458d5",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_node",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_node,
-        .call = mstmm_sweep_tangent_placed_node_call,
-        .n_inputs = 5,
-        .n_outputs = 4,
-        .inputs = mstmm_sweep_tangent_placed_node_inputs,
-        .outputs = mstmm_sweep_tangent_placed_node_outputs,
-        .ir_hash = "a6483a806e95a7b0a6b1c0cb9c450e8fa3cf18f2a33aa71406526de7f921da5d",
-        .n_guards = 2,
-        .guards = mstmm_sweep_tangent_placed_node_guards,
-    },
-    {
-        .name = "placed_port",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_port,
-        .call = mstmm_sweep_tangent_placed_port_call,
-        .n_inputs = 6,
-        .n_outputs = 3,
-        .inputs = mstmm_sweep_tangent_placed_port_inputs,
-        .outputs = mstmm_sweep_tangent_placed_port_outputs,
-        .ir_hash = "df4cd73080b2c8d5fe075b2f6ce46a3260023ed32f97f4a30d34cc04a364bed3",
-        .n_guards = 0,
-        .guards = NULL,
-    },
-    {
-        .name = "placed_remainder",
-        .function = (void (*)(void))mstmm_sweep_tangent_placed_remainder,
-        .call = mstmm_sweep_tangent_placed_remainder_call,
-        .n_inputs = 2,
-        .n_outputs = 1,
-        .inputs = mstmm_sweep_tangent_placed_remainder_inputs,
-        .outputs = mstmm_sweep_tangent_placed_remainder_outputs,
-        .ir_hash = "23b50e2046b2e3aab157da9682e8e133b60433cc1e342b9cc5f04ef65cd954b4",
-        .n_guards = 0,
-        .guards = NULL,
-    },
+  {"invert", MSTMM_FUNCTIONS(mstmm_sweep_tangent_invert), 2, 2, (const mstmm_port[]){{"D", 1, "", 0,
+    2}, {"one", 1, "", 0, 2}}, (const mstmm_port[]){{"inverse", 1, "", 0, 2}, {"work", 1, "", 0,
+    2}}, "9b671b59433d47c98261a9358363dd8a7c826990cfe324e7abaf8f7f2d9c470d", 2, (const
+    mstmm_guard[]){{1, "a pivot of D vanishes: a motion is undetermined"}, {2,
+    "the determinant is negative; all results are there"}}},
+  {"node", MSTMM_FUNCTIONS(mstmm_sweep_tangent_node), 8, 6, (const mstmm_port[]){{"H", 6, "", 0, 1},
+    {"B", 9, "", 0, 1}, {"G", 6, "", 0, 1}, {"W", 1, "", 0, 2}, {"S", 54, "", 0, 0}, {"K", 6, "", 0,
+    1}, {"Z_z", 9, "", 0, 1}, {"Z_x", 1, "", 0, 2}}, (const mstmm_port[]){{"V", 6, "", 0, 1}, {"D",
+    1, "", 0, 2}, {"right", 9, "", 0, 1}, {"gain", 9, "", 0, 1}, {"S_c", 54, "", 0, 0}, {"work", 1,
+    "", 0, 2}}, "6d1e1c66834cc5159735e4af01b32723343bf66906d66c40b79221e05fdc0028", 2, (const
+    mstmm_guard[]){{1, "a pivot of D vanishes: a motion is undetermined"}, {2,
+    "the determinant is negative; all results are there"}}},
+  {"assemble_port", MSTMM_FUNCTIONS(mstmm_sweep_tangent_assemble_port), 8, 4, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 1}, {"B", 9, "", 0, 1},
+    {"G", 6, "", 0, 1}, {"W", 1, "", 0, 2}, {"S", 54, "", 0, 0}, {"T", 54, "", 0, 0}}, (const
+    mstmm_port[]){{"K_x", 6, "", 0, 1}, {"K", 6, "", 1, 1}, {"Z_z", 9, "", 1, 1}, {"Z_x", 1, "", 1,
+    2}}, "2218412bb0ca7b90be362b3af23dddb803a8e83884886bec43519a12773f3e35", 0, NULL},
+  {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_tangent_column_load), 5, 4, (const mstmm_port[]){{"H",
+    6, "", 0, 1}, {"V", 6, "", 0, 1}, {"D", 1, "", 0, 2}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "",
+    0, 1}}, (const mstmm_port[]){{"rest", 1, "", 0, 1}, {"y", 1, "", 0, 1}, {"e_c", 6, "N, N*m", 0,
+    0}, {"work", 1, "", 0, 2}}, "0a51c8f5cf80a763b674cca889124d9b93a1c0c7e0858daa378f2a67a0a9488b",
+    2, (const mstmm_guard[]){{1, "a pivot of D vanishes: a motion is undetermined"}, {2,
+    "the determinant is negative; all results are there"}}},
+  {"column_solution", MSTMM_FUNCTIONS(mstmm_sweep_tangent_column_solution), 4, 2, (const
+    mstmm_port[]){{"B", 9, "", 0, 1}, {"gain", 9, "", 0, 1}, {"y", 1, "", 0, 1}, {"z_c", 9, "", 0,
+    0}}, (const mstmm_port[]){{"x", 1, "", 0, 1}, {"z", 9, "", 0, 0}},
+    "7e1842bb447c03ea124218b71ba1f0b5d9694202cdd7f1a700ab18e4fb9a8454", 0, NULL},
+  {"port_motion", MSTMM_FUNCTIONS(mstmm_sweep_tangent_port_motion), 3, 1, (const mstmm_port[]){{"B",
+    9, "", 0, 1}, {"x", 1, "", 0, 1}, {"z_c", 9, "", 0, 0}}, (const mstmm_port[]){{"z", 9, "", 0,
+    0}}, "3367b4006e9748c9de0812196f016843f960736264e4cbba5516b6cba165e890", 0, NULL},
+  {"increment_matrix", MSTMM_FUNCTIONS(mstmm_sweep_tangent_increment_matrix), 4, 3, (const
+    mstmm_port[]){{"sq", 1, "1/s", 0, 0}, {"kappa", 1, "", 0, 0}, {"one", 1, "", 0, 2}, {"g_q", 1,
+    "", 0, 2}}, (const mstmm_port[]){{"A", 1, "", 0, 2}, {"Q", 1, "", 0, 2}, {"work", 1, "", 0, 2}},
+    "6e27a1b2fd038e98f11c3b054ed705001854ad6f24be9c5d82bd9fd1cc611ab9", 2, (const mstmm_guard[]){{1,
+    "a pivot of A vanishes: a motion is undetermined"}, {2,
+    "the determinant is negative; all results are there"}}},
+  {"coordinate_increment", MSTMM_FUNCTIONS(mstmm_sweep_tangent_coordinate_increment), 2, 1, (const
+    mstmm_port[]){{"Q", 1, "", 0, 2}, {"rate", 1, "", 0, 1}}, (const mstmm_port[]){{"dq", 1, "", 0,
+    1}}, "5353c6d5ff3b20441541f103b55e93150714a7ac18b180e3510ee4af96747982", 0, NULL},
+  {"placed_rows", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_rows), 2, 1, (const mstmm_port[]){{"H",
+    6, "", 0, 1}, {"S_p", 54, "", 0, 0}}, (const mstmm_port[]){{"Z_p", 9, "", 0, 1}},
+    "c43f6cae8a8070ccace516e6948e20e448e4d7756591eea13e99c2467371204c", 0, NULL},
+  {"placed_own", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_own), 3, 2, (const mstmm_port[]){{"B_p",
+    9, "", 0, 1}, {"S_p", 54, "", 0, 0}, {"Z_p", 9, "", 0, 1}}, (const mstmm_port[]){{"K", 6, "", 1,
+    1}, {"Z_x", 1, "", 1, 2}}, "677f5f75e0c7a936b58e92cd16cef79f719805b45fd0d1e59ace2d566da3edc2",
+    0, NULL},
+  {"placed_reduce", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_reduce), 3, 2, (const
+    mstmm_port[]){{"inverse", 1, "", 0, 2}, {"Z_p", 9, "", 0, 1}, {"V", 6, "", 0, 1}}, (const
+    mstmm_port[]){{"gain", 9, "", 0, 1}, {"S_p", 54, "", 1, 0}},
+    "2077c715645ad1271c81cae5cd389f6d17e7630bdc5824c3e1104082febbb457", 0, NULL},
+  {"placed_node", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_node), 5, 4, (const mstmm_port[]){{"H",
+    6, "", 0, 1}, {"V", 6, "", 0, 1}, {"D", 1, "", 0, 2}, {"S_p", 54, "", 0, 0}, {"Z_p", 9, "", 0,
+    1}}, (const mstmm_port[]){{"right", 9, "", 0, 1}, {"gain", 9, "", 0, 1}, {"S_c", 54, "", 0, 0},
+    {"work", 1, "", 0, 2}}, "d1a4262669060418890b3c58bd3057f866cf9334f9f60008b943ecbb3a7a0410", 2,
+    (const mstmm_guard[]){{1, "a pivot of D vanishes: a motion is undetermined"}, {2,
+    "the determinant is negative; all results are there"}}},
+  {"placed_port", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_port), 6, 3, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"H", 6, "", 0, 1}, {"B_p", 9, "", 0,
+    1}, {"S_p", 54, "", 0, 0}, {"T_p", 54, "", 0, 0}}, (const mstmm_port[]){{"K", 6, "", 1, 1},
+    {"Z_p", 9, "", 1, 1}, {"Z_x", 1, "", 1, 2}},
+    "e136c13e266f295146747a05b9f87fd6d09230ebb5d6a00cff5ca44ee9d9d9ce", 0, NULL},
+  {"placed_remainder", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_remainder), 2, 1, (const
+    mstmm_port[]){{"gain", 9, "", 0, 1}, {"p", 9, "", 0, 0}}, (const mstmm_port[]){{"y", 1, "", 1,
+    1}}, "c57923e563454b7fb91ffda55bde66b5ad3c093c014a142179ce426b2dc30b44", 0, NULL},
 };
 
 const mstmm_element mstmm_sweep_tangent = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "tangent",
-    .hash = "34acbc90a61da2a7ab7398f164c7f41cab228147189544c97a480de3d040daf2",
+    .hash = "a680043fed1b697f2d6f05f4cede846cc719a7e25c3bd775b176cca7b908df29",
     .nq = 0,
     .nu = 0,
     .np = 0,

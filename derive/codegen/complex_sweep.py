@@ -48,7 +48,7 @@ _FUNCTION_NAMES = re.compile(
 )
 
 #: Zero initialisations, and additions to other values.
-_ZERO_VALUES = re.compile(r"((?:mstmm_complex t\d+|\]) = |^ +: )0;", re.MULTILINE)
+_ZERO_VALUES = re.compile(r"((?:complex_t t\d+|\]) = |^ +: )0;", re.MULTILINE)
 _FUNCTION_STARTS = re.compile(
     r"^(?=int mstmm_complex_\w+(?<!_sized)\(|mstmm_complex_\w+_kernel \*const)", re.MULTILINE
 )
@@ -89,9 +89,10 @@ def to_complex(text: str) -> str:
     for real_text, held_text in _HELD_TANGENTS.items():
         text = text.replace(real_text, held_text)
     text = _STATE_POINTERS.sub(f"{REAL} *", text)
-    text = re.sub(r"\breal\b", "mstmm_complex", text)
+    text = re.sub(r"\breal\b", "complex_t", text)
+    text = re.sub(r"\b(in|out)_t\b", r"complex_\1_t", text)
     text = _FUNCTION_NAMES.sub("mstmm_complex_", text)
-    text = _ZERO_VALUES.sub(r"\1mstmm_complex_plain(0);", text)
+    text = _ZERO_VALUES.sub(r"\1z_plain(0);", text)
     text = _ADDITIONS.sub(_replace_addition, text)
     text = text.replace("_table[];", f"_table[{MAX_SPEEDS + 1}];").replace("extern ", "")
     return _FUNCTION_STARTS.sub("static ", text)
@@ -99,5 +100,5 @@ def to_complex(text: str) -> str:
 
 def _replace_addition(found: re.Match[str]) -> str:
     indent, target, sign, value = found.groups()
-    operation = "plus" if sign == "+" else "minus"
-    return f"{indent}{target} = mstmm_complex_{operation}({target}, {value});"
+    operation = "add" if sign == "+" else "sub"
+    return f"{indent}{target} = z_{operation}({target}, {value});"

@@ -10,10 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from mstmm.abi import element_library as abi
 from mstmm.ir import KernelIR
 from mstmm.ir.element_spec import ElementSpec
+
+from .kernel_text import wrapped_lines
 
 Specs = Mapping[tuple[str, str], ElementSpec]
 
@@ -186,23 +189,26 @@ def call_text(callee: Callee, plain: Collection[str] = ()) -> str:
     inputs = {port.name for port in callee.kernel.inputs}
     has_size = callee.kernel.size_symbol is not None
     members = ["    int n;"] if has_size else []
-    members += [
-        f"    {_port_type(port, inputs, plain)} *{field};" for port, field in fields.items()
-    ]
+    for scalar, group in groupby(fields, key=lambda port: _scalar_type(port, inputs, plain)):
+        arrays = ", ".join(f"*{fields[port]}" for port in group)
+        members += wrapped_lines(f"{scalar} {arrays};", "    ")
     types = ["int"] if has_size else []
-    types += [f"{_port_type(port, inputs, plain)} *restrict" for port in fields]
+    types += [abi.c_parameter_type(port, port in inputs, plain) for port in fields]
     argument_names = [
         f"to.{field}" for field in (["n"] if has_size else []) + list(fields.values())
     ]
     struct = f"struct {name} {{\n" + "\n".join(members) + "\n};\n"
-    argument_text = _wrap_arguments(argument_names, "        ")
+
+    def body(function: str) -> str:
+        call = f"return {function}({', '.join(argument_names)});"
+        return "{\n" + "\n".join(wrapped_lines(call, "    ")) + "\n}\n"
+
     if callee.call_kind == "name":
-        body = f"    return {callee.function}(\n{argument_text});\n"
         return (
-            f"{struct}static inline int {name}_by(struct {name} to)\n{{\n{body}}}\n"
-            f"#define {name}(...) {name}_by((struct {name}){{__VA_ARGS__}})\n"
+            f"{struct}static inline int {name}_by(struct {name} to)\n{body(callee.function)}"
+            f"#define {name}(...) MSTMM_NAMED({name}, __VA_ARGS__)\n"
         )
-    typedef = f"typedef int {name}_kernel(\n{_wrap_arguments(types, '    ')});\n"
+    typedef = "\n".join(wrapped_lines(f"typedef int {name}_kernel({', '.join(types)});", "")) + "\n"
     if callee.call_kind == "speeds":
         dispatch_parameter, target = "int speeds", f"{name}_table[speeds]"
         table_declaration = f"extern {name}_kernel *const {name}_table[];\n"
@@ -212,19 +218,18 @@ def call_text(callee: Callee, plain: Collection[str] = ()) -> str:
             f"(({name}_kernel *)kernel)",
             "",
         )
-    body = f"    return {target}(\n{argument_text});\n"
     dispatch_argument = dispatch_parameter.split()[-1] if callee.call_kind == "speeds" else "kernel"
     arrays = _array_function(name, callee) if name.startswith("mstmm_hinge_hinge") else ""
     return (
         f"{struct}{typedef}{table_declaration}"
-        f"static inline int {name}_by({dispatch_parameter}, struct {name} to)\n{{\n{body}}}\n"
-        f"#define {name}({dispatch_argument}, ...) {name}_by({dispatch_argument}, (struct "
-        f"{name}){{__VA_ARGS__}})\n{arrays}"
+        f"static inline int {name}_by({dispatch_parameter}, struct {name} to)\n{body(target)}"
+        f"#define {name}({dispatch_argument}, ...) "
+        f"MSTMM_NAMED_OF({name}, {dispatch_argument}, __VA_ARGS__)\n{arrays}"
     )
 
 
-def _port_type(port: str, inputs: Collection[str], plain: Collection[str]) -> str:
-    return f"{'const ' if port in inputs else ''}{abi.c_scalar_type(port, plain)}"
+def _scalar_type(port: str, inputs: Collection[str], plain: Collection[str]) -> str:
+    return f"{'const ' if port in inputs else ''}{abi.REAL if port in plain else 'real'}"
 
 
 def _array_function(name: str, callee: Callee) -> str:
@@ -243,14 +248,3 @@ def _array_function(name: str, callee: Callee) -> str:
         f"static inline void {name}_arrays(struct {name} to, const real **inputs, real **outputs)\n"
         "{\n" + "\n".join(lines) + "\n}\n"
     )
-
-
-def _wrap_arguments(words: Sequence[str], indent: str) -> str:
-    lines, line = [], indent
-    for index, item in enumerate(words):
-        item += "," if index + 1 < len(words) else ""
-        if len(line) + len(item) > 98 and line.strip():
-            lines.append(line.rstrip())
-            line = indent
-        line += f"{item} "
-    return "\n".join([*lines, line.rstrip()])

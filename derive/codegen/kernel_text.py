@@ -6,8 +6,11 @@ operation, and a NaN is never hidden by min, max, sign or a guard.
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Collection, Sequence
 from fractions import Fraction
+from itertools import groupby
 from typing import Any
 
 from mstmm.abi.element_library import REAL, parameter_names, work_name
@@ -17,22 +20,38 @@ from mstmm.ir import (
     Constant,
     Element,
     Guard,
-    Inner,
     KernelIR,
     Operand,
     Port,
     Solve,
+    Statement,
     Store,
     Sum,
     Temporary,
 )
+from mstmm.ir.kernel import read_elements
+from mstmm.ir.statements import Expression, Line, Nested, Nesting
 
 from .vector_loops import LaneValue, VectorLoop, VectorLoops
 
-#: Operations on complex numbers as functions of C.
+#: Indentation of generated kernels.
+INDENT = "  "
+_STRING = re.compile(r'"[^"]*"')
+
+#: Operations on complex numbers as functions of C (runtime/engine/c/complex_lanes.h).
 _COMPLEX = {
-    "add": "mstmm_complex_plus({}, {})", "sub": "mstmm_complex_minus({}, {})",
-    "mul": "mstmm_complex_times({}, {})", "neg": "mstmm_complex_scaled(-1, {})",
+    "add": "z_add({}, {})", "sub": "z_sub({}, {})", "mul": "z_mul({}, {})",
+    "neg": "z_scale(-1, {})",
+}  # fmt: skip
+
+#: Precedence of C expressions: of an operand as such, products, sums, all others.
+_PRIMARY, _PRODUCT, _SUM, _OTHER = 3, 2, 1, 0
+#: Operation -> precedence of its text, least precedence of its operands in nested expressions.
+_PRECEDENCES = {
+    "mul": (_PRODUCT, (_PRODUCT, _PRIMARY)), "div": (_PRODUCT, (_PRODUCT, _PRIMARY)),
+    "add": (_SUM, (_SUM, _PRODUCT)), "sub": (_SUM, (_SUM, _PRODUCT)),
+    "neg": (_PRODUCT, (_PRIMARY,)), **dict.fromkeys(("lt", "le", "eq"), (_OTHER, (_SUM, _SUM))),
+    **{row.name: (_PRIMARY, (_OTHER,)) for row in OPERATIONS.values() if row.is_c_library_function},
 }  # fmt: skip
 
 
@@ -87,14 +106,40 @@ class KernelText:
         self.names = parameter_names(kernel)
         self.ports = {port.name: port for port in (*kernel.inputs, *kernel.outputs)}
         self._truths: set[int] = set()
-        self._plain_ports, self._plain_numbers = plain, set[int]()
-        self._complex = bool(plain)
+        self._real_ports, self._real_numbers = plain, set[int]()
+        self._is_complex = bool(plain)
+        self._nesting = Nesting(kernel.statements, _may_nest, is_ordered=False)
 
     def statements(self) -> list[dict[str, Any]]:
-        """One dictionary per statement; its `kind` is assign, sum, store, guard, solve or alike."""
+        """One dictionary per statement; its `kind` is text, guard or solve."""
         if self.vector_loops is not None:
             return self._loops(self.vector_loops)
-        return [self._statement(statement) for statement in self.kernel.statements]
+        lines = self._nesting.lines(self.kernel.statements)
+        views: list[dict[str, Any]] = []
+        for value, group in groupby(lines, key=self._stored_constant):
+            if value is None:
+                views += [self._statement(*line) for line in group]
+                continue
+            entries = [
+                self._entry(self.ports[store.port], store.index)
+                for store, _ in group
+                if isinstance(store, Store)
+            ]
+            text = " = ".join([*entries, f"{self._array_operand(value)};"])
+            views.append({"kind": "text", "lines": wrapped_lines(text, INDENT)})
+        return views
+
+    def _stored_constant(self, line: Line) -> Constant | None:
+        """Constant that a statement stores; its successors with the same one share its C text."""
+        statement, args = line
+        if (
+            isinstance(statement, Store)
+            and args
+            and isinstance(args[0], Constant)
+            and not self.ports[statement.port].accumulate
+        ):
+            return args[0]
+        return None
 
     def _loops(self, alike: VectorLoops) -> list[dict[str, Any]]:
         """Vector loops, each after its shared values, then the remaining stores."""
@@ -102,17 +147,19 @@ class KernelText:
         numbers: set[int] = set()
 
         def add_shared(operands: Sequence[Operand]) -> None:
-            for assign in alike.required_assignments(operands):
-                if assign.number not in numbers:
-                    numbers.add(assign.number)
-                    views.append(self._statement(assign))
+            required = alike.required_assignments(operands)
+            assigns = [assign for assign in required if assign.number not in numbers]
+            numbers.update(assign.number for assign in assigns)
+            views.extend(self._statement(*line) for line in self._nesting.lines(assigns))
 
         for loop in alike.loops:
             add_shared([Temporary(number) for number in loop.shared_temporaries])
-            views.append({"kind": "alike", "lines": self._loop(loop)})
+            views.append(
+                {"kind": "text", "lines": [f"{INDENT}{line}" for line in self._loop(loop)]}
+            )
         for store in alike.other_stores:
             add_shared([store.value])
-            views.append(self._statement(store))
+            views.append(self._statement(store, (store.value,)))
         return views
 
     def _loop(self, loop: VectorLoop) -> list[str]:
@@ -124,14 +171,14 @@ class KernelText:
         has_odd_count = loop.count % 2 == 1 and port.accumulate
         lines = [f"for (int k = 0; k < {loop.count}; k += 2) {{"]
         if has_odd_count:
-            lines.append(f"    const int next = k < {last_index};")
+            lines.append(f"{INDENT}const int next = k < {last_index};")
         elif loop.count % 2 == 1:
             lines = [f"for (int k = 0; k < {last_index}; k += k < {last_index - 2} ? 2 : 1) {{"]
         subtracted = loop.subtracted_values
         for value in loop.values:
             if value.number not in subtracted:
                 lines.append(
-                    f"    const two_t v{value.number} = {self._pair(value, has_odd_count)};"
+                    f"{INDENT}const two_t v{value.number} = {self._pair(value, has_odd_count)};"
                 )
         second_lines = []
         for index, stored_value in loop.stores:
@@ -140,17 +187,17 @@ class KernelText:
                 value, sign = subtracted[stored_value.number], "-="
             pointer, stride = self._lane_pointer(port, index, loop.axis)
             if stride == 1 and not has_odd_count:
-                lines.append(f"    *(two_free_t *)({pointer}) {sign} v{value.number};")
+                lines.append(f"{INDENT}*(two_free_t *)({pointer}) {sign} v{value.number};")
                 continue
             array, start = self.names[port.name], port.offset(index)
             index_text = f"{stride} * k" if stride != 1 else "k"
-            lines.append(f"    {array}[{start} + {index_text}] {sign} v{value.number}[0];")
+            lines.append(f"{INDENT}{array}[{start} + {index_text}] {sign} v{value.number}[0];")
             second_lines.append(
                 f"{array}[{start + stride} + {index_text}] {sign} v{value.number}[1];"
             )
         if second_lines and has_odd_count:
-            second_lines = ["if (next) {", *(f"    {line}" for line in second_lines), "}"]
-        return [*lines, *(f"    {line}" for line in second_lines), "}"]
+            second_lines = ["if (next) {", *(f"{INDENT}{line}" for line in second_lines), "}"]
+        return [*lines, *(f"{INDENT}{line}" for line in second_lines), "}"]
 
     def _pair(self, value: LaneValue, odd: bool) -> str:
         """C expression of a value for two neighbouring entries."""
@@ -176,94 +223,106 @@ class KernelText:
 
     def used_names(self) -> set[str]:
         """C names of the input arrays that the statements read."""
-        names_read: set[str] = set()
+        names_read = {self.names[entry.port] for entry in read_elements(self.kernel)}
         for statement in self.kernel.statements:
-            operands = list(_operands(statement))
-            names_read |= {self.names[o.port] for o in operands if isinstance(o, Element)}
             if isinstance(statement, Solve):
                 names_read |= {self.names[statement.matrix], self.names[statement.right]}
         return names_read
 
-    def _statement(self, statement: object) -> dict[str, Any]:
-        if isinstance(statement, (Assign, Sum)):
-            return self._inner_statement(statement)
-        if isinstance(statement, Store):
-            port = self.ports[statement.port]
-            return {
-                "kind": "store",
-                "loops": statement.loops,
-                "body": [self._inner_statement(a) for a in statement.body],
-                "target": self._entry(port, statement.index),
-                "sign": "+=" if port.accumulate else "=",
-                "value": self._array_operand(statement.value),
-            }
+    def _statement(self, statement: Statement, args: Sequence[Nested]) -> dict[str, Any]:
         if isinstance(statement, Guard):
-            condition = self._truth(statement.condition)
             message = comment_text(statement.message)
             return {
-                "kind": "guard", "condition": condition, "code": statement.code,
+                "kind": "guard", "condition": self._truth(args[0]), "code": statement.code,
                 "message": message,
             }  # fmt: skip
-        assert isinstance(statement, Solve)
-        return self._solve(statement)
+        if isinstance(statement, Solve):
+            return self._solve(statement)
+        return {"kind": "text", "lines": self._lines(statement, args, INDENT)}
 
-    def _inner_statement(self, statement: Inner) -> dict[str, Any]:
+    def _lines(
+        self, statement: Assign | Sum | Store, args: Sequence[Nested], indent: str
+    ) -> list[str]:
+        """C lines of an assignment, a sum or a store."""
         if isinstance(statement, Assign):
-            return self._assign(statement)
-        return {
-            "kind": "sum",
-            "number": statement.number,
-            "over": statement.over,
-            "body": [self._inner_statement(inner) for inner in statement.body],
-            "value": self._array_operand(statement.value),
-        }
-
-    def _assign(self, assign: Assign) -> dict[str, Any]:
-        row = OPERATIONS[assign.op]
-        if row.truth:
-            self._truths.add(assign.number)
+            self._define(statement, args)
+            value, _ = self._value(statement.op, args)
+            is_real = self._is_complex and statement.number in self._real_numbers
+            scalar = REAL if is_real else "real"
+            return wrapped_lines(f"{scalar} t{statement.number} = {value};", indent)
+        if isinstance(statement, Sum):
+            start = "z_plain(0)" if self._is_complex else "0"
+            head = [f"{indent}real t{statement.number} = {start};"]
+            loops, target, sign = (statement.over,), f"t{statement.number}", "+"
         else:
-            self._truths.discard(assign.number)
-        if self._complex and not self._are_all_plain(assign.args):
-            return self._complex_assign(assign)
-        self._plain_numbers.add(assign.number)
-        operand_texts = [self.operand(a) for a in assign.args]
-        truths = {f"t{index}": self._truth(a) for index, a in enumerate(assign.args)}
-        expression = row.c.format(*operand_texts, **truths)
-        return {
-            "kind": "assign", "number": assign.number, "expression": expression,
-            "scalar": REAL if self._complex else "real",
-        }  # fmt: skip
+            port = self.ports[statement.port]
+            head, loops, target = [], statement.loops, self._entry(port, statement.index)
+            sign = "+" if port.accumulate else ""
+            if args:
+                return wrapped_lines(self._assignment(target, sign, args[0]), indent)
+        body, value = self._nesting.body(statement)
+        inner = indent + INDENT * len(loops)
+        lines = [
+            f"{indent}{INDENT * depth}for (int {k} = 0; {k} < n; ++{k}) {{"
+            for depth, k in enumerate(loops)
+        ]
+        lines += [line for part in body for line in self._lines(*part, inner)]
+        lines += wrapped_lines(self._assignment(target, sign, value), inner)
+        lines += [f"{indent}{INDENT * depth}}}" for depth in reversed(range(len(loops)))]
+        return head + lines
+
+    def _assignment(self, target: str, sign: str, value: Nested) -> str:
+        """`target = value;`, or with the sign + `target += value;`."""
+        text = self._array_operand(value)
+        if self._is_complex and sign:
+            return f"{target} = z_add({target}, {text});"
+        return f"{target} {sign}= {text};"
+
+    def _define(self, assign: Assign, args: Sequence[Nested]) -> None:
+        """Keep whether the value of an assignment is a truth value, and whether it is real."""
+        if OPERATIONS[assign.op].truth:
+            self._truths.add(assign.number)
+        if all(map(self._is_real, args)):
+            self._real_numbers.add(assign.number)
+
+    def _value(self, op: str, args: Sequence[Nested]) -> tuple[str, int]:
+        """C text of an operation, and its precedence."""
+        if self._is_complex and not all(map(self._is_real, args)):
+            return self._complex_value(op, args), _PRIMARY
+        row = OPERATIONS[op]
+        precedence, least = _PRECEDENCES.get(op, (_OTHER, (_PRIMARY,) * row.arity))
+        texts = [self._operand(a, limit) for a, limit in zip(args, least, strict=True)]
+        truths = {f"t{k}": self._truth(a) for k, a in enumerate(args[: row.conditions])}
+        return row.c.format(*texts, **truths), precedence
+
+    def _operand(self, operand: Nested, least: int) -> str:
+        """C text of an operand, in brackets if its precedence is below `least`."""
+        if not isinstance(operand, Expression):
+            return self.operand(operand)
+        text, precedence = self._value(operand.assign.op, operand.args)
+        return f"({text})" if precedence < least else text
 
     # --- complex numbers ------------------------------------------------------------------------
 
-    def _are_all_plain(self, operands: Sequence[Operand]) -> bool:
-        return all(
-            o.number in self._plain_numbers if isinstance(o, Temporary)
-            else not isinstance(o, Element) or o.port in self._plain_ports
-            for o in operands
-        )  # fmt: skip
+    def _is_real(self, operand: Nested) -> bool:
+        """Whether a number is real although arrays are complex."""
+        if isinstance(operand, Expression):
+            return all(map(self._is_real, operand.args))
+        if isinstance(operand, Temporary):
+            return operand.number in self._real_numbers
+        return not isinstance(operand, Element) or operand.port in self._real_ports
 
-    def _complex_assign(self, assign: Assign) -> dict[str, Any]:
+    def _complex_value(self, op: str, args: Sequence[Nested]) -> str:
         """Operation on complex numbers, or on a complex and a real one, as a function call."""
-        self._plain_numbers.discard(assign.number)
-        if assign.op == "mul" and any(self._are_all_plain([a]) for a in assign.args):
-            args = sorted(assign.args, key=lambda a: not self._are_all_plain([a]))
-            operand_texts = [self.operand(a) for a in args]
-            call = "mstmm_complex_scaled({}, {})"
-        else:
-            operand_texts = [self._array_operand(a) for a in assign.args]
-            call = _COMPLEX[assign.op]
-        return {
-            "kind": "assign", "number": assign.number, "expression": call.format(*operand_texts),
-            "scalar": "real",
-        }  # fmt: skip
+        if op == "mul" and any(map(self._is_real, args)):
+            real, other = sorted(args, key=self._is_real, reverse=True)
+            return f"z_scale({self._operand(real, _OTHER)}, {self._operand(other, _OTHER)})"
+        return _COMPLEX[op].format(*map(self._array_operand, args))
 
-    def _array_operand(self, operand: Operand) -> str:
+    def _array_operand(self, operand: Nested) -> str:
         """C text of an operand in an array's own type."""
-        text = self.operand(operand)
-        is_real = self._complex and self._are_all_plain([operand])
-        return f"mstmm_complex_plain({text})" if is_real else text
+        text = self._operand(operand, _OTHER)
+        return f"z_plain({text})" if self._is_complex and self._is_real(operand) else text
 
     def _solve(self, solve: Solve) -> dict[str, Any]:
         columns = self.ports[solve.right].shape[1:]
@@ -292,14 +351,37 @@ class KernelText:
             return f"t{operand.number}"
         return self._entry(self.ports[operand.port], operand.index)
 
-    def _truth(self, operand: Operand) -> str:
-        text = self.operand(operand)
-        if isinstance(operand, Temporary) and operand.number in self._truths:
-            return f"{text} != 0"
-        return f"fabs({text}) > 0"
+    def _truth(self, operand: Nested) -> str:
+        if isinstance(operand, Expression) and OPERATIONS[operand.assign.op].truth:
+            return self._operand(operand, _PRIMARY)
+        text = self._operand(operand, _OTHER)
+        is_truth = isinstance(operand, Temporary) and operand.number in self._truths
+        return f"{text} != 0" if is_truth else f"fabs({text}) > 0"
 
     def _entry(self, port: Port, index: tuple[int | str, ...]) -> str:
         return f"{self.names[port.name]}[{_entry_offset(port, index)}]"
+
+
+def _may_nest(value: Assign, reader: Assign | None, place: int) -> bool:
+    """Whether the C text of a reader may contain that of an operand.
+
+    It must occur once, and be evaluated in any case; truth values are conditions.
+    """
+    if reader is None:
+        return True
+    if OPERATIONS[value.op].truth:
+        return place < OPERATIONS[reader.op].conditions
+    return reader.op in _PRECEDENCES
+
+
+def wrapped_lines(text: str, indent: str) -> list[str]:
+    """Lines of one C statement or initialiser."""
+    text = _STRING.sub(lambda string: string[0].replace(" ", "\0"), text)
+    lines = textwrap.wrap(
+        text, 100, initial_indent=indent, subsequent_indent=f"{indent}{INDENT}",
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+    return [line.replace("\0", " ") for line in lines]
 
 
 def _entry_offset(port: Port, index: tuple[int | str, ...]) -> str:
@@ -324,14 +406,3 @@ def _entry_offset(port: Port, index: tuple[int | str, ...]) -> str:
     if constant_offset or not terms:
         terms.append(str(constant_offset))
     return " + ".join(terms)
-
-
-def _operands(statement: object) -> list[Operand]:
-    if isinstance(statement, Assign):
-        return list(statement.args)
-    if isinstance(statement, (Sum, Store)):
-        inner = [operand for line in statement.body for operand in _operands(line)]
-        return [*inner, statement.value]
-    if isinstance(statement, Guard):
-        return [statement.condition]
-    return []

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -27,13 +28,24 @@ from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
 from .complex_sweep import REAL_PORTS, complex_kernels, complex_passes, to_complex
 from .kernel_calls import kernel_calls_header
-from .kernel_text import KernelText, comment_text, solver_template, string_literal
+from .kernel_text import (
+    INDENT,
+    KernelText,
+    comment_text,
+    solver_template,
+    string_literal,
+    wrapped_lines,
+)
 from .slot_storage import layout_header
 from .sweep_text import sweep_files
 from .vector_loops import VECTORIZED_OUTPUTS
 
 #: Run-time sizes for which the compiler unrolls the loops of a kernel.
 _UNROLLED_SIZES = (1, 2, 3, 4)
+#: Kinds of elements whose kernels are called through their descriptors only.
+_KINDS_BY_DESCRIPTOR = ("hinge", "body", "force", "law")
+#: Text that reads the run-time size.
+_SIZE = re.compile(r"< n;|n \*")
 
 
 def element_source(spec: ElementSpec) -> str:
@@ -52,7 +64,7 @@ def registry_source(specs: Sequence[ElementSpec]) -> str:
 
 
 def elements_header(specs: Sequence[ElementSpec]) -> str:
-    """`elements.h`: descriptors and kernel functions, for C that calls kernels by name."""
+    """`elements.h`: descriptors, and the kernels that C calls by name."""
     return _render("elements.h.jinja", elements=_summaries(specs))
 
 
@@ -62,24 +74,16 @@ def engine_headers() -> dict[str, str]:
 
 
 def manifest_text(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
-    """`manifest.json`: ABI number, SHA-256 of the C text, names and hashes of kernels.
+    """`manifest.json`: ABI number, SHA-256 of the C text, names and hashes of elements.
 
     It detects a module that was compiled from other text (runtime/libraries/build_extension.py).
     """
     text = hashlib.sha256()
     for name in sorted(name for name in files if name.endswith((".c", ".h"))):
         text.update(f"{name}\n{files[name]}".encode())
-    elements = [
-        {
-            "kind": spec.kind,
-            "name": spec.name,
-            "hash": spec.hash(),
-            "kernels": {kernel.name: kernel.hash() for kernel in spec.kernels},
-        }
-        for spec in specs
-    ]
-    data = {"abi": abi.ABI_VERSION, "sources": text.hexdigest(), "elements": elements}
-    return json.dumps(data, indent=1) + "\n"
+    elements = [{"kind": s.kind, "name": s.name, "hash": s.hash()} for s in specs]
+    head = {"abi": abi.ABI_VERSION, "sources": text.hexdigest()}
+    return f'{json.dumps(head)[:-1]}, "elements": {_lines_of(elements)}}}\n'
 
 
 def catalogue_text(specs: Iterable[ElementSpec]) -> str:
@@ -96,7 +100,12 @@ def catalogue_text(specs: Iterable[ElementSpec]) -> str:
         }
         for spec in specs
     ]
-    return json.dumps(entries, indent=1) + "\n"
+    return _lines_of(entries) + "\n"
+
+
+def _lines_of(entries: Iterable[Any]) -> str:
+    """JSON list with one entry a line."""
+    return "[\n" + ",\n".join(map(json.dumps, entries)) + "\n]"
 
 
 def generated_files(
@@ -128,9 +137,7 @@ def generated_files(
     if ("sweep", "frames") in {(spec.kind, spec.name) for spec in sorted_specs}:
         files |= _engine_files(sorted_specs)
     if hinges:
-        files["hinges.json"] = (
-            json.dumps([hinge_properties_to_data(h) for h in hinges], indent=1) + "\n"
-        )
+        files["hinges.json"] = _lines_of(map(hinge_properties_to_data, hinges)) + "\n"
     files["catalogue.json"] = catalogue_text(sorted((*sorted_specs, *on_demand), key=_sort_key))
     files["manifest.json"] = manifest_text(sorted_specs, files)
     return files
@@ -190,6 +197,9 @@ def _environment() -> jinja2.Environment:
     )
     environment.filters["c_string"] = string_literal
     environment.filters["c_comment"] = comment_text
+    environment.filters["c_lines"] = lambda text, indent=INDENT: "\n".join(
+        wrapped_lines(text, indent)
+    )
     return environment
 
 
@@ -230,7 +240,11 @@ def _summaries(specs: Sequence[ElementSpec]) -> list[dict[str, Any]]:
     return [
         {
             "symbol": abi.element_symbol(spec.kind, spec.name),
-            "prototypes": [abi.prototype(spec.kind, spec.name, k) for k in abi.c_kernels(spec)],
+            "prototypes": [
+                abi.prototype(spec.kind, spec.name, kernel)
+                for kernel in abi.c_kernels(spec)
+                if spec.kind not in _KINDS_BY_DESCRIPTOR
+            ],
         }
         for spec in specs
         if abi.has_c(spec)
@@ -290,8 +304,7 @@ def _kernel_view(
     names_written = {text.names[s.port] for s in kernel.statements if hasattr(s, "port")}
     names = [text.names[port.name] for port in (*kernel.inputs, *kernel.outputs)]
     unused_names = [name for name in names if name not in names_read | names_written]
-    has_loop = any(s["kind"] in ("sum", "solve") or s.get("loops") for s in statements)
-    uses_size = any("n *" in str(s) for s in statements)
+    uses_size = any(s["kind"] == "solve" or _SIZE.search(str(s)) for s in statements)
     solved_outputs = [s["output"] for s in statements if s["kind"] == "solve" and s["negative"]]
     guards = [(s.code, s.message) for s in kernel.statements if isinstance(s, (Guard, Solve))]
     guards += [(NEGATIVE_DETERMINANT, "the determinant is negative; all results are there")] * bool(
@@ -303,15 +316,11 @@ def _kernel_view(
         "prototype": abi.prototype(spec.kind, spec.name, kernel, plain=plain),
         "sized": _sized_view(spec, kernel, plain) if kernel.size_symbol else None,
         "purpose": kernel.purpose,
-        "sources": list(kernel.sources),
+        "sources": [s for s in kernel.sources if plain or s not in spec.sources],
         "inputs": [_port_view(port) for port in kernel.inputs],
         "outputs": [_port_view(port) for port in outputs],
         "arguments": arguments,
-        "unused": (["n"] if kernel.size_symbol and not (has_loop or uses_size) else [])
-        + unused_names,
-        "trampoline_unused": ([] if kernel.size_symbol else ["n"])
-        + ([] if kernel.inputs else ["in"])
-        + ([] if outputs else ["out"]),
+        "unused": (["n"] if kernel.size_symbol and not uses_size else []) + unused_names,
         "statements": statements,
         "negative": NEGATIVE_DETERMINANT,
         "solved_outputs": solved_outputs,

@@ -184,9 +184,11 @@ def c_outputs(kernel: KernelIR) -> tuple[Port, ...]:
     return (*kernel.outputs, Port(work_name(kernel), (size, size), meaning="factor L, D of solve"))
 
 
-def c_scalar_type(port: str, plain: Collection[str]) -> str:
-    """C type of the numbers of a port."""
-    return REAL if port in plain else "real"
+def c_parameter_type(port: str, is_input: bool, plain: Collection[str] = ()) -> str:
+    """C type of the array of a port as a parameter."""
+    if port in plain:
+        return f"{'const ' if is_input else ''}{REAL} *restrict"
+    return "in_t" if is_input else "out_t"
 
 
 def prototype(
@@ -200,12 +202,9 @@ def prototype(
     names = parameter_names(kernel)
     parameters = ["int n"] if kernel.size_symbol else []
     parameters += [
-        f"const {c_scalar_type(port.name, plain)} *restrict {names[port.name]}"
-        for port in kernel.inputs
+        f"{c_parameter_type(port.name, True, plain)} {names[port.name]}" for port in kernel.inputs
     ]
-    parameters += [
-        f"real *restrict {names.get(port.name, port.name)}" for port in c_outputs(kernel)
-    ]
+    parameters += [f"out_t {names.get(port.name, port.name)}" for port in c_outputs(kernel)]
     arguments = ", ".join(parameter.replace(" ", "\0") for parameter in parameters) or "void"
     text = f"int\0{kernel_symbol(kind, name, kernel.name)}{suffix}({arguments})"
     return textwrap.fill(text, 100, subsequent_indent="    ").replace("\0", " ")

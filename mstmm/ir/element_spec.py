@@ -5,16 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import astuple, dataclass
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
 from .hinge_properties import (
     HingeProperties,
     Param,
-    hinge_properties,
     hinge_properties_from_data,
     hinge_properties_to_data,
 )
-from .kernel import KernelIR, kernel_from_data, to_json
+from .kernel import KernelIR, json_lines, kernel_from_data, kernel_to_data
 
 __all__ = ["ENTRY_POINTS", "ElementSpec", "Param"]
 
@@ -48,7 +49,7 @@ class ElementSpec:
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-# --- stored form: one file per element, kernels as written by ir.to_json --------------------------
+# --- stored form: one file per element, one statement a line --------------------------------------
 
 
 def element_to_json(spec: ElementSpec) -> str:
@@ -67,9 +68,16 @@ def element_to_json(spec: ElementSpec) -> str:
     }
     if spec.facts is not None:
         head["facts"] = hinge_properties_to_data(spec.facts)
-    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
-    kernels = ",\n".join(to_json(kernel).rstrip("\n") for kernel in spec.kernels)
-    return "{\n" + ",\n".join(lines) + ',\n"kernels": [\n' + kernels + "\n]}\n"
+    kernels = ",\n".join(_kernel_lines(kernel, head["sources"]) for kernel in spec.kernels)
+    return json_lines(head)[:-2] + ',\n"kernels": [\n' + kernels + "\n]}\n"
+
+
+def _kernel_lines(kernel: KernelIR, element_sources: list[str]) -> str:
+    """JSON of a kernel in its element, without sources if they are those of the element."""
+    data = kernel_to_data(kernel)
+    if data["sources"] == element_sources:
+        del data["sources"]
+    return json_lines(data).rstrip("\n")
 
 
 def element_from_json(text: str) -> ElementSpec:
@@ -79,17 +87,18 @@ def element_from_json(text: str) -> ElementSpec:
         group: tuple(Param(*entry) for entry in data[group])
         for group in ("coordinates", "speeds", "parameters")
     }
-    kernels = tuple(map(kernel_from_data, data["kernels"]))
-    facts = None
-    if "facts" in data:
-        facts = hinge_properties_from_data(data["facts"])
-    elif data["kind"] == "hinge":  # stored by a version whose hinges had no facts
-        motion = [kernel for kernel in kernels if kernel.name == "hinge"]
-        facts = hinge_properties(motion[0], data["name"], **groups) if motion else None
+    kernels = tuple(kernel_from_data({"sources": data["sources"]} | k) for k in data["kernels"])
+    facts = hinge_properties_from_data(data["facts"]) if "facts" in data else None
     return ElementSpec(
         kind=data["kind"], name=data["name"], title=data["title"], kernels=kernels,
         sources=tuple(data["sources"]), facts=facts, **groups,
     )  # fmt: skip
+
+
+def kernels_from_json(text: str) -> dict[str, dict[str, Any]]:
+    """Name -> data of the kernels of a stored element; see `kernel_from_data`."""
+    data = json.loads(text)
+    return {kernel["name"]: {"sources": data["sources"]} | kernel for kernel in data["kernels"]}
 
 
 def kernel_from_json(text: str, name: str) -> KernelIR:
@@ -97,5 +106,17 @@ def kernel_from_json(text: str, name: str) -> KernelIR:
 
     KeyError if the element has no kernel of this name; ValueError as for `element_from_json`.
     """
-    stored = {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
-    return kernel_from_data(stored[name])
+    return kernel_from_data(kernels_from_json(text)[name])
+
+
+@cache
+def builtin_kernel(stem: str, name: str) -> KernelIR:
+    """Kernel of a built-in element such as "sweep_modal".  KeyError as for `kernel_from_json`."""
+    return kernel_from_data(_builtin_kernels(stem)[name])
+
+
+@cache
+def _builtin_kernels(stem: str) -> dict[str, dict[str, Any]]:
+    return kernels_from_json(
+        files("mstmm.generated").joinpath(f"{stem}.json").read_text(encoding="utf-8")
+    )

@@ -15,7 +15,7 @@ from importlib.resources import files
 from typing import Any
 
 from .interpreter import GuardFailure, evaluate_floats
-from .kernel import KernelIR, kernel_from_data, to_json
+from .kernel import KernelIR, kernel_from_data, kernel_to_data
 from .statements import Assign, Constant, Element, Operand, Store, Temporary
 
 
@@ -358,12 +358,12 @@ def hinge_properties_to_data(facts: HingeProperties) -> dict[str, Any]:
         key: [list(astuple(p)) for p in getattr(facts, key)]
         for key in ("coordinates", "speeds", "parameters")
     }
-    rates = {} if facts.rates is None else {"rates": json.loads(to_json(facts.rates))}
+    rates = {} if facts.rates is None else {"rates": kernel_to_data(facts.rates)}
     return {
         "name": facts.name, "allows": facts.allows, **groups, "frame": facts.frame,
         "keys": list(facts.keys), "runs_as": facts.runs_as, "quaternion": facts.quaternion,
         "straight": facts.straight, "in_place": facts.in_place, "varies": list(facts.varies),
-        "start_motion": json.loads(to_json(facts.start_motion)), **rates,
+        "start_motion": kernel_to_data(facts.start_motion), **rates,
     }  # fmt: skip
 
 

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from .operations import OPERATIONS
 from .statements import (
     LOOP_INDEX,
+    LOOPS,
     Assign,
     Check,
     Constant,
     Element,
+    Expression,
     Guard,
     Inner,
+    Nested,
+    Nesting,
     Operand,
     Port,
     Solve,
@@ -23,6 +28,7 @@ from .statements import (
     Store,
     Sum,
     Temporary,
+    operands,
 )
 
 
@@ -73,10 +79,8 @@ def _assignments(statements: Iterable[Statement]) -> Iterator[Assign]:
 
 def read_elements(kernel: KernelIR) -> list[Element]:
     """Entries of inputs and complete outputs that statements read."""
-    operands = [operand for statement in assignments(kernel) for operand in statement.args]
-    operands += [s.value for s in kernel.statements if isinstance(s, (Store, Sum))]
-    operands += [s.condition for s in kernel.statements if isinstance(s, Guard)]
-    return [x for x in operands if isinstance(x, Element)]
+    read = (operand for statement in kernel.statements for operand in operands(statement))
+    return [operand for operand in read if isinstance(operand, Element)]
 
 
 def reads_port(kernel: KernelIR, port: str) -> bool:
@@ -97,105 +101,185 @@ def check(kernel: KernelIR) -> None:
 # --- stored form -----------------------------------------------------------------------------
 
 
-def _operand_to_list(operand: Operand) -> Any:
+def _operand_text(operand: Operand) -> str:
     if isinstance(operand, Constant):
         return operand.text
     if isinstance(operand, Temporary):
-        return operand.number
-    return [operand.port, *operand.index]
+        return f"t{operand.number}"
+    return f"{operand.port}[{','.join(map(str, operand.index))}]"
 
 
-def _operand_from_list(data: Any) -> Operand:
-    if isinstance(data, str):
-        return Constant(data)
-    if isinstance(data, int):
-        return Temporary(data)
-    return Element(data[0], tuple(data[1:]))
+def _operand_from_text(text: str) -> Operand:
+    if text.endswith("]"):
+        port, _, entries = text[:-1].partition("[")
+        index = (entry if entry in LOOPS else int(entry) for entry in entries.split(",") if entry)
+        return Element(port, tuple(index))
+    return Temporary(int(text[1:])) if text[0] == "t" else Constant(text)
 
 
-def _assign_to_list(assign: Assign) -> list[Any]:
-    return [assign.number, assign.op, *(_operand_to_list(a) for a in assign.args)]
+#: Operation of every name in stored expressions: its sign in C if it has one.
+_STORED_OPERATIONS = {row.sign or name: row for name, row in OPERATIONS.items()}
+_STORED_NAMES = {row.name: name for name, row in _STORED_OPERATIONS.items()}
 
 
-def _assign_from_list(data: list[Any]) -> Assign:
-    return Assign(data[0], data[1], tuple(_operand_from_list(a) for a in data[2:]))
+def _expression_text(nested: Nested) -> str:
+    """Expression in postfix notation: operands, then their operation."""
+    if not isinstance(nested, Expression):
+        return _operand_text(nested)
+    return _assign_text(nested.assign, nested.args)
 
 
-def _statement_to_data(statement: Statement) -> Any:
-    if isinstance(statement, Assign):
-        return _assign_to_list(statement)
-    if isinstance(statement, Sum):
-        body = [_statement_to_data(a) for a in statement.body]
-        data: dict[str, Any] = {
-            "sum": statement.number,
-            "body": body,
-            "value": _operand_to_list(statement.value),
-        }
-        return data | ({"over": statement.over} if statement.over != LOOP_INDEX else {})
-    if isinstance(statement, Store):
-        body = [_statement_to_data(a) for a in statement.body]
-        data = {
-            "store": [statement.port, *statement.index],
-            "value": _operand_to_list(statement.value),
-        }
-        return data | ({"body": body} if body else {})
-    if isinstance(statement, Guard):
-        condition = _operand_to_list(statement.condition)
-        return {"guard": condition, "code": statement.code, "message": statement.message}
-    data = {
-        "solve": [statement.port, statement.matrix, statement.right],
-        "code": statement.code,
-        "message": statement.message,
-        "relative_pivot": statement.relative_pivot,
-    }
-    return data if statement.symmetric else data | {"symmetric": False}
+def _assign_text(assign: Assign, args: Iterable[Nested]) -> str:
+    return " ".join([*map(_expression_text, args), _STORED_NAMES[assign.op]])
 
 
-def _inner_from_data(data: Any) -> Inner:
-    if isinstance(data, list):
-        return _assign_from_list(data)
-    body = tuple(_inner_from_data(a) for a in data["body"])
-    return Sum(data["sum"], body, _operand_from_list(data["value"]), data.get("over", LOOP_INDEX))
+class _StatementWriter:
+    """Statements of one kernel as JSON data.
+
+    Assignments and stores are texts such as "t7 = R[0,0] H[0] * t2 +".  The assignments inside an
+    expression have the numbers that follow those before them.
+    """
+
+    def __init__(self, kernel: KernelIR) -> None:
+        numbers = list(_defined_numbers(kernel.statements))
+        is_consecutive = numbers == list(range(len(numbers)))
+        self._nesting = Nesting(kernel.statements, lambda *_: is_consecutive, is_ordered=True)
+
+    def data(self, statements: Iterable[Statement]) -> list[Any]:
+        lines = self._nesting.lines(statements)
+        return [self._line_data(statement, args) for statement, args in lines]
+
+    def _line_data(self, statement: Statement, args: Sequence[Nested]) -> Any:
+        if isinstance(statement, Assign):
+            return f"t{statement.number} = {_assign_text(statement, args)}"
+        if isinstance(statement, Guard):
+            condition = _expression_text(args[0])
+            return {"guard": condition, "code": statement.code, "message": statement.message}
+        if isinstance(statement, Solve):
+            data = asdict(statement)
+            return {"solve": [data.pop(key) for key in ("port", "matrix", "right")], **data}
+        if isinstance(statement, Store):
+            target = _operand_text(Element(statement.port, statement.index))
+            if args:
+                return f"{target} = {_expression_text(args[0])}"
+            head = {"store": target}
+        else:
+            over = {"over": statement.over} if statement.over != LOOP_INDEX else {}
+            head = {"sum": f"t{statement.number}", **over}
+        lines, value = self._nesting.body(statement)
+        body = [self._line_data(*line) for line in lines]
+        return head | ({"body": body} if body else {}) | {"value": _expression_text(value)}
 
 
-def _statement_from_data(data: Any) -> Statement:
-    if isinstance(data, list):
-        return _assign_from_list(data)
-    if "sum" in data:
-        return _inner_from_data(data)
-    if "store" in data:
-        port, *index = data["store"]
-        body = tuple(_inner_from_data(a) for a in data.get("body", ()))
-        return Store(port, tuple(index), _operand_from_list(data["value"]), body)
-    if "guard" in data:
-        return Guard(_operand_from_list(data["guard"]), data["code"], data["message"])
-    port, matrix, right = data["solve"]
-    return Solve(
-        port, matrix, right, data["code"], data["message"], data["relative_pivot"],
-        data.get("symmetric", True),
-    )  # fmt: skip
+class _StatementReader:
+    """Inverse of `_StatementWriter`."""
+
+    def __init__(self) -> None:
+        self._next_number = 0
+        self._operands: dict[str, Operand] = {}
+
+    def statements(self, data: Iterable[Any]) -> tuple[Any, ...]:
+        return tuple(statement for line in data for statement in self._line(line))
+
+    def _line(self, line: Any) -> list[Statement]:
+        if isinstance(line, str):
+            target, _, expression = line.partition(" = ")
+            entry = self._operand(target)
+            if isinstance(entry, Temporary):
+                return [*self._expression(expression, entry.number)[0]]
+            assigns, value = self._expression(expression)
+            return [*assigns, _store(entry, value)]
+        if not isinstance(line, dict):
+            raise ValueError(f"unknown statement {line}; generate the element again")
+        if "guard" in line:
+            assigns, value = self._expression(line["guard"])
+            return [*assigns, Guard(value, line["code"], line["message"])]
+        if "solve" in line:
+            rest = {key: value for key, value in line.items() if key != "solve"}
+            return [Solve(*line["solve"], **rest)]
+        body = self.statements(line.get("body", ()))
+        assigns, value = self._expression(line["value"])
+        body += tuple(assigns)
+        if "store" in line:
+            return [_store(self._operand(line["store"]), value, body)]
+        number = self._operand(line["sum"]).number
+        self._next_number = number + 1
+        return [Sum(number, body, value, line.get("over", LOOP_INDEX))]
+
+    def _operand(self, text: str) -> Any:
+        operand = self._operands.get(text)
+        if operand is None:
+            operand = self._operands[text] = _operand_from_text(text)
+        return operand
+
+    def _expression(self, text: str, number: int | None = None) -> tuple[list[Assign], Operand]:
+        """Assignments of an expression, the last one with `number` if it is given; its value."""
+        tokens = text.split()
+        if number is not None:
+            self._next_number = number + 1 - sum(token in _STORED_OPERATIONS for token in tokens)
+        assigns: list[Assign] = []
+        stack: list[Operand] = []
+        for token in tokens:
+            row = _STORED_OPERATIONS.get(token)
+            if row is None:
+                stack.append(self._operand(token))
+                continue
+            assigns.append(Assign(self._next_number, row.name, tuple(stack[-row.arity :])))
+            stack[-row.arity :] = [Temporary(self._next_number)]
+            self._next_number += 1
+        if len(stack) != 1:
+            raise ValueError(f"expected one value, found {len(stack)} in {text!r}")
+        return assigns, stack[0]
 
 
-def to_json(kernel: KernelIR) -> str:
-    """Convert a kernel to JSON: one statement per line, the same bytes on every machine."""
+def _store(entry: Element, value: Operand, body: tuple[Inner, ...] = ()) -> Store:
+    return Store(entry.port, entry.index, value, body)
+
+
+def _defined_numbers(statements: Iterable[Statement]) -> Iterator[int]:
+    for statement in statements:
+        if isinstance(statement, (Sum, Store)):
+            yield from _defined_numbers(statement.body)
+        if isinstance(statement, (Assign, Sum)):
+            yield statement.number
+
+
+def kernel_to_data(kernel: KernelIR) -> dict[str, Any]:
+    """Convert a kernel to lists, numbers and texts; `kernel_from_data` is the inverse."""
 
     def port(p: Port) -> list[Any]:
         data = [p.name, list(p.shape), p.unit, p.meaning]
         return [*data, "accumulate"] if p.accumulate else data
 
-    head = {
+    return {
         "name": kernel.name,
         "purpose": kernel.purpose,
         "sources": list(kernel.sources),
-        "size_symbol": kernel.size_symbol,
+        **({"size_symbol": kernel.size_symbol} if kernel.size_symbol else {}),
         "inputs": [port(p) for p in kernel.inputs],
         "outputs": [port(p) for p in kernel.outputs],
+        "statements": _StatementWriter(kernel).data(kernel.statements),
     }
-    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
-    body = ",\n".join(
-        json.dumps(_statement_to_data(s), separators=(",", ":")) for s in kernel.statements
-    )
-    return "{\n" + ",\n".join(lines) + ',\n"statements": [\n' + body + "\n]}\n"
+
+
+def json_lines(data: Mapping[str, Any]) -> str:
+    """JSON of kernel data, or of part of it: one key or statement a line."""
+    lines = []
+    for key, value in data.items():
+        text = _compact(value)
+        if key == "statements":
+            text = "[\n" + ",\n".join(map(_compact, value)) + "\n]"
+        lines.append(f"{json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "}\n"
+
+
+def _compact(data: Any) -> str:
+    return json.dumps(data, separators=(",", ":"))
+
+
+def to_json(kernel: KernelIR) -> str:
+    """Convert a kernel to JSON: one statement per line, the same bytes on every machine."""
+    return json_lines(kernel_to_data(kernel))
 
 
 def from_json(text: str) -> KernelIR:
@@ -213,8 +297,8 @@ def kernel_from_data(data: Mapping[str, Any]) -> KernelIR:
         name=data["name"],
         inputs=tuple(port(p) for p in data["inputs"]),
         outputs=tuple(port(p) for p in data["outputs"]),
-        statements=tuple(_statement_from_data(s) for s in data["statements"]),
-        size_symbol=data["size_symbol"],
+        statements=_StatementReader().statements(data["statements"]),
+        size_symbol=data.get("size_symbol"),
         purpose=data["purpose"],
         sources=tuple(data["sources"]),
     )

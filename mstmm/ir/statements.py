@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -158,6 +160,107 @@ class Solve:
 
 
 Statement = Assign | Sum | Store | Guard | Solve
+
+
+def operands(statement: Statement) -> tuple[Operand, ...]:
+    """Operands that a statement reads, those of its body first."""
+    if isinstance(statement, Assign):
+        return statement.args
+    if isinstance(statement, (Store, Sum)):
+        inner = (operand for line in statement.body for operand in operands(line))
+        return (*inner, statement.value) if statement.body else (statement.value,)
+    return (statement.condition,) if isinstance(statement, Guard) else ()
+
+
+# --- nested expressions ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Expression:
+    """Assignment that only the statement around it reads, with its operands."""
+
+    assign: Assign
+    args: tuple[Operand | Expression, ...]
+    depth: int
+
+
+Nested = Operand | Expression
+#: Statement with its operands.
+Line = tuple[Statement, tuple[Nested, ...]]
+
+_MAX_DEPTH = 30  # of nested expressions; compilers permit 256 brackets
+
+
+class Nesting:
+    """Statements with their operands, assignments that are read once inside their readers.
+
+    With `is_ordered` only where the evaluation of operands from left to right keeps the order of
+    the statements.  No assignment moves across a store, a loop or a guard.
+    `is_allowed(value, reader, place)` says whether a value may be operand number `place` of an
+    assignment, or of another statement if `reader` is None.
+    """
+
+    def __init__(
+        self,
+        statements: Iterable[Statement],
+        is_allowed: Callable[[Assign, Assign | None, int], bool],
+        *,
+        is_ordered: bool,
+    ) -> None:
+        self._is_allowed, self._is_ordered = is_allowed, is_ordered
+        self._counts = Counter(
+            operand.number
+            for statement in statements
+            for operand in operands(statement)
+            if isinstance(operand, Temporary)
+        )
+
+    def lines(self, statements: Iterable[Statement]) -> list[Line]:
+        """Statements of one level; loops are without operands, see `body`."""
+        lines, pending = self._nest(statements)
+        return lines + [(value.assign, value.args) for value in pending.values()]
+
+    def body(self, loop: Sum | Store) -> tuple[list[Line], Nested]:
+        """Statements inside a loop, and its value."""
+        lines, pending = self._nest(loop.body)
+        (value,) = self._operands([loop.value], pending)
+        return lines + [(value.assign, value.args) for value in pending.values()], value
+
+    def _nest(self, statements: Iterable[Statement]) -> tuple[list[Line], dict[int, Expression]]:
+        lines: list[Line] = []
+        pending: dict[int, Expression] = {}
+        for statement in statements:
+            if isinstance(statement, Assign):
+                args = self._operands(statement.args, pending, statement)
+                depth = 1 + max((a.depth for a in args if isinstance(a, Expression)), default=0)
+                pending[statement.number] = Expression(statement, args, depth)
+                continue
+            is_loop = isinstance(statement, Sum) or (
+                isinstance(statement, Store) and bool(statement.loops or statement.body)
+            )
+            args = () if is_loop else self._operands(operands(statement), pending)
+            lines += [(value.assign, value.args) for value in pending.values()]
+            lines.append((statement, args))
+            pending.clear()
+        return lines, pending
+
+    def _operands(
+        self, args: Sequence[Operand], pending: dict[int, Expression], reader: Assign | None = None
+    ) -> tuple[Nested, ...]:
+        """Operands, where possible the pending values themselves."""
+        nested: list[Nested] = list(args)
+        for place in reversed(range(len(args))):
+            operand = args[place]
+            value = pending.get(operand.number) if isinstance(operand, Temporary) else None
+            if (
+                value is not None
+                and self._counts[value.assign.number] == 1
+                and not (self._is_ordered and value is not next(reversed(pending.values())))
+                and value.depth < _MAX_DEPTH
+                and self._is_allowed(value.assign, reader, place)
+            ):
+                nested[place] = pending.pop(value.assign.number)
+        return tuple(nested)
 
 
 # --- validation: rejects what no backend could run ------------------------------------------------

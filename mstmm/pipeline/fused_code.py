@@ -7,15 +7,15 @@ cache.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -30,8 +30,7 @@ from ..abi import derivative_library as columns_abi
 from ..abi.fused_library import ABI_VERSION, COMPILER_FLAGS, OPTIONAL_FLAGS
 from ..errors import ElementError, EnvironmentFailure, SceneError
 from ..ir import KernelIR
-from ..ir.element_spec import ElementSpec
-from ..ir.kernel import kernel_from_data
+from ..ir.element_spec import ElementSpec, builtin_kernel
 from ..ir.scene_structure import BodyStructure, Key, Structure
 from ..runtime.libraries.cache import BuiltLibrary, Recipe, find, open_cached_library
 from ..runtime.packing.fused_structure import structure_of
@@ -483,25 +482,10 @@ def kernel_lookup(definitions: Mapping[Key, ElementSpec]) -> Callable[[Key, str]
     """
 
     def kernel(key: Key, name: str) -> KernelIR:
-        if key not in definitions:
-            return _prebuilt_kernel(key, name)
-        for candidate in definitions[key].kernels:
-            if candidate.name == name:
-                return candidate
+        with suppress(KeyError):
+            if key not in definitions:
+                return builtin_kernel("_".join(key), name)
+            return {k.name: k for k in definitions[key].kernels}[name]
         raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
 
     return kernel
-
-
-@cache
-def _stored_kernels(key: Key) -> dict[str, Any]:
-    text = files("mstmm.generated").joinpath(f"{key[0]}_{key[1]}.json").read_text(encoding="utf-8")
-    return {kernel["name"]: kernel for kernel in json.loads(text)["kernels"]}
-
-
-@cache
-def _prebuilt_kernel(key: Key, name: str) -> KernelIR:
-    data = _stored_kernels(key).get(name)
-    if data is None:
-        raise ElementError(f"{key[0]} {key[1]} has no kernel {name!r}")
-    return kernel_from_data(data)

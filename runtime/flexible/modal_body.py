@@ -13,8 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib.resources import files
 from typing import TypeVar
 
 import numpy as np
@@ -22,7 +20,7 @@ import numpy as np
 from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
 from mstmm.ir import KernelIR
-from mstmm.ir.element_spec import kernel_from_json
+from mstmm.ir.element_spec import builtin_kernel
 
 from .beam.section_ports import BeamShapes
 from .modal_parts import MassPoint, ModalPort, Moments, Truncation
@@ -202,11 +200,9 @@ def without_mass(body: ModalBody) -> ModalBody:
     return replace(body, mass=0.0, first=np.zeros(3), second=np.zeros((3, 3)), **zeros)
 
 
-@cache
 def kernel(name: str) -> KernelIR:
     """Kernel of the element "modal" with the given name."""
-    text = files("mstmm.generated").joinpath("sweep_modal.json").read_text(encoding="utf-8")
-    return kernel_from_json(text, name)
+    return builtin_kernel("sweep_modal", name)
 
 
 # --- rejection of bodies that cannot be computed in double precision ------------------------------

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cache, cached_property
-from importlib.resources import files
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.expression.derivatives import INPUTS
 from mstmm.ir import KernelIR
-from mstmm.ir.element_spec import kernel_from_json
+from mstmm.ir.element_spec import builtin_kernel
 from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE
 from mstmm.scene.tables.bushing import upper_triangle
 from mstmm.scene.tables.closures import CURVE, DISTANCE, ROLLING
@@ -299,10 +298,8 @@ def deflection_of(ends: tuple[Array, Array]) -> Array:
     return np.einsum("nij,nki->nkj", axes, components).reshape(-1, 6)
 
 
-@cache
 def _wrench_kernel(element: str) -> KernelIR:
-    text = files("mstmm.generated").joinpath(f"force_{element}.json").read_text(encoding="utf-8")
-    return kernel_from_json(text, "wrench")
+    return builtin_kernel(f"force_{element}", "wrench")
 
 
 def _wrench_of_ends(ends: tuple[Array, Array], numbers: tuple[float, ...], element: str) -> Array:

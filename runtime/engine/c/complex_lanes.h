@@ -10,56 +10,58 @@ typedef double mstmm_lanes __attribute__((vector_size(8 * MSTMM_LANES)));
 typedef int64_t mstmm_bits __attribute__((vector_size(8 * MSTMM_LANES)));
 typedef struct {
     mstmm_lanes re, im;
-} mstmm_complex;
+} complex_t;
+typedef const complex_t *restrict complex_in_t;
+typedef complex_t *restrict complex_out_t;
 
 #define MSTMM_COMPLEX static inline __attribute__((always_inline))
 
-MSTMM_COMPLEX mstmm_complex mstmm_complex_plus(mstmm_complex a, mstmm_complex b)
+MSTMM_COMPLEX complex_t z_add(complex_t a, complex_t b)
 {
-    return (mstmm_complex){a.re + b.re, a.im + b.im};
+    return (complex_t){a.re + b.re, a.im + b.im};
 }
 
-MSTMM_COMPLEX mstmm_complex mstmm_complex_minus(mstmm_complex a, mstmm_complex b)
+MSTMM_COMPLEX complex_t z_sub(complex_t a, complex_t b)
 {
-    return (mstmm_complex){a.re - b.re, a.im - b.im};
+    return (complex_t){a.re - b.re, a.im - b.im};
 }
 
-MSTMM_COMPLEX mstmm_complex mstmm_complex_times(mstmm_complex a, mstmm_complex b)
+MSTMM_COMPLEX complex_t z_mul(complex_t a, complex_t b)
 {
-    return (mstmm_complex){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
+    return (complex_t){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re};
 }
 
-MSTMM_COMPLEX mstmm_complex mstmm_complex_scaled(double factor, mstmm_complex a)
+MSTMM_COMPLEX complex_t z_scale(double factor, complex_t a)
 {
-    return (mstmm_complex){factor * a.re, factor * a.im};
+    return (complex_t){factor * a.re, factor * a.im};
 }
 
-MSTMM_COMPLEX mstmm_complex mstmm_complex_plain(double number)
+MSTMM_COMPLEX complex_t z_plain(double number)
 {
-    return (mstmm_complex){number + (mstmm_lanes){0}, (mstmm_lanes){0}};
+    return (complex_t){number + (mstmm_lanes){0}, (mstmm_lanes){0}};
 }
 
-MSTMM_COMPLEX void mstmm_complex_set_zero(mstmm_complex *to, int n)
+MSTMM_COMPLEX void mstmm_complex_set_zero(complex_t *to, int n)
 {
-    for (int j = 0; j < n; j++) to[j] = mstmm_complex_plain(0);
+    for (int j = 0; j < n; j++) to[j] = z_plain(0);
 }
 
-MSTMM_COMPLEX mstmm_complex mstmm_complex_inverse(mstmm_complex a)
+MSTMM_COMPLEX complex_t z_inverse(complex_t a)
 {
     const mstmm_lanes square = a.re * a.re + a.im * a.im;
-    return (mstmm_complex){a.re / square, -a.im / square};
+    return (complex_t){a.re / square, -a.im / square};
 }
 
 /* |re| + |im| of every lane, and of all of them. */
-MSTMM_COMPLEX mstmm_lanes mstmm_complex_size(mstmm_complex a)
+MSTMM_COMPLEX mstmm_lanes z_size(complex_t a)
 {
     const mstmm_bits all = INT64_MAX + (mstmm_bits){0};
     return (mstmm_lanes)((mstmm_bits)a.re & all) + (mstmm_lanes)((mstmm_bits)a.im & all);
 }
 
-MSTMM_COMPLEX double mstmm_complex_sizes(mstmm_complex a)
+MSTMM_COMPLEX double z_sizes(complex_t a)
 {
-    const mstmm_lanes size = mstmm_complex_size(a);
+    const mstmm_lanes size = z_size(a);
     double sum = 0;
     for (int lane = 0; lane < MSTMM_LANES; lane++) sum += size[lane];
     return sum;
@@ -69,9 +71,9 @@ MSTMM_COMPLEX double mstmm_complex_sizes(mstmm_complex a)
  * mstmm_solve_lu (templates/solve_lu.c.jinja), singular if one of the lanes is.  A pivot is
  * refused where it is zero alone: frequencies are asked for, and counted, next to where they
  * vanish, and the digits that are lost are told by how inertia grows (complex_sweeps.h). */
-MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *restrict a,
-                                         const mstmm_complex *restrict b, mstmm_complex *restrict x,
-                                         mstmm_complex *restrict work, double relative_pivot)
+MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const complex_t *restrict a,
+                                         const complex_t *restrict b, complex_t *restrict x,
+                                         complex_t *restrict work, double relative_pivot)
 {
     (void)relative_pivot;
     for (int i = 0; i < n * n; i++) work[i] = a[i];
@@ -79,39 +81,35 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
     for (int i = 0; i < n; i++) {
         int best = i;
         for (int k = i + 1; k < n; k++)
-            if (mstmm_complex_sizes(work[best * n + i]) < mstmm_complex_sizes(work[k * n + i]))
-                best = k;
+            if (z_sizes(work[best * n + i]) < z_sizes(work[k * n + i])) best = k;
         for (int j = i; best != i && j < n; j++) {
-            const mstmm_complex entry = work[i * n + j];
+            const complex_t entry = work[i * n + j];
             work[i * n + j] = work[best * n + j];
             work[best * n + j] = entry;
         }
         for (int j = 0; best != i && j < m; j++) {
-            const mstmm_complex entry = x[i * m + j];
+            const complex_t entry = x[i * m + j];
             x[i * m + j] = x[best * m + j];
             x[best * m + j] = entry;
         }
-        const mstmm_bits there = mstmm_complex_size(work[i * n + i]) > 0;
+        const mstmm_bits there = z_size(work[i * n + i]) > 0;
         for (int lane = 0; lane < MSTMM_LANES; lane++)
             if (!there[lane]) return 1;
-        const mstmm_complex scale = work[i * n + i] = mstmm_complex_inverse(work[i * n + i]);
+        const complex_t scale = work[i * n + i] = z_inverse(work[i * n + i]);
         for (int k = i + 1; k < n; k++) {
-            const mstmm_complex factor = mstmm_complex_times(work[k * n + i], scale);
+            const complex_t factor = z_mul(work[k * n + i], scale);
             for (int j = i + 1; j < n; j++)
-                work[k * n + j] = mstmm_complex_minus(work[k * n + j],
-                                                      mstmm_complex_times(factor, work[i * n + j]));
+                work[k * n + j] = z_sub(work[k * n + j], z_mul(factor, work[i * n + j]));
             for (int j = 0; j < m; j++)
-                x[k * m + j] =
-                    mstmm_complex_minus(x[k * m + j], mstmm_complex_times(factor, x[i * m + j]));
+                x[k * m + j] = z_sub(x[k * m + j], z_mul(factor, x[i * m + j]));
         }
     }
     for (int i = n - 1; i >= 0; i--)
         for (int j = 0; j < m; j++) {
-            mstmm_complex rest = x[i * m + j];
+            complex_t rest = x[i * m + j];
             for (int k = i + 1; k < n; k++)
-                rest =
-                    mstmm_complex_minus(rest, mstmm_complex_times(work[i * n + k], x[k * m + j]));
-            x[i * m + j] = mstmm_complex_times(rest, work[i * n + i]);
+                rest = z_sub(rest, z_mul(work[i * n + k], x[k * m + j]));
+            x[i * m + j] = z_mul(rest, work[i * n + i]);
         }
     return 0;
 }
@@ -119,21 +117,21 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
 /* --- what a pass is at: numbers of the state are plain, what moves is complex --- */
 
 typedef struct {
-    mstmm_complex *numbers;
+    complex_t *numbers;
     const real *held;    /* what no s changes of them */
     int kept;            /* S of every body stays */
 } mstmm_complex_tangents;
 
 typedef struct {
-    mstmm_complex *workspace;
+    complex_t *workspace;
 } mstmm_complex_slope;
 
 typedef struct {
     const mstmm_model *model;
     real *workspace;
     const real *memory;
-    const mstmm_complex *column;
-    mstmm_complex *answer;
+    const complex_t *column;
+    complex_t *answer;
     mstmm_complex_slope *slope;
     mstmm_complex_tangents *tangents;
     mstmm_failure *failure;

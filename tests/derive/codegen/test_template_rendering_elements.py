@@ -56,7 +56,6 @@ def test_manifest_and_descriptors_agree(library: CLibrary) -> None:
     for entry, stem in zip(MANIFEST["elements"], STEMS, strict=True):
         spec = stored_spec(stem)
         assert (entry["hash"], entry["kind"], entry["name"]) == (spec.hash(), spec.kind, spec.name)
-        assert entry["kernels"] == {kernel.name: kernel.hash() for kernel in spec.kernels}
         if stem not in library.elements:
             assert not (GENERATED / f"{stem}.c").exists() and not abi.has_c(spec)
             continue

@@ -5,18 +5,15 @@ Geometry, loads and efforts come from the reference formulation, not from the en
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import mstmm.generated
 from mstmm.ir import KernelIR
-from mstmm.ir.kernel import kernel_from_data
+from mstmm.ir.element_spec import builtin_kernel
 from tests.reference import laws
 from tests.reference import newton_euler as dense
 from tests.reference.jets import Array
@@ -34,9 +31,7 @@ KERNELS = {"pin": "pin_spatial", "ball": "ball", "elastic": "acceleration"}
 @cache
 def generated_kernel(name: str) -> KernelIR:
     """The stored kernel of a classical matrix."""
-    folder = Path(mstmm.generated.__path__[0])
-    data = json.loads((folder / f"classical_{name}.json").read_text())
-    return kernel_from_data(data["kernels"][0])
+    return builtin_kernel(f"classical_{name}", "transfer")
 
 
 @dataclass(frozen=True)
