@@ -6,17 +6,20 @@ are shared: no new derivation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 
 from mstmm.ir import Guard, KernelIR, Port
-from mstmm.ir.differentiation import derivatives
+from mstmm.ir.differentiation import derivatives, differentiate, jacobian
+from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.graph import Graph, Node
-from mstmm.ir.inline import Inliner, Nodes, element_nodes
+from mstmm.ir.inline import Inliner, Nodes, element_nodes, specialise
 
 from ..equations import riccati_sweep
 from ..equations import tangent_hinge_elimination as hinge_tangent
 from ..lower.kernel_lowering import lower
+from ..schedule.planar_passes import LOAD, PLANAR_KERNELS
 
 #: Outputs of the hinge kernel that have a directional derivative in the generic steps.
 _CHANGED_OUTPUTS = ("H", "v", "w", "c")
@@ -167,3 +170,188 @@ def _along_kernel(nu: int) -> KernelIR:
 @cache
 def _rotation_kernel() -> KernelIR:
     return lower(hinge_tangent.tangent_pose_change(), "tangent_pose_change")
+
+
+# --- planar sweep ---------------------------------------------------------------------------------
+# Where every hinge turns about z, motions are planar and out-of-plane loads move nothing.
+# Rotations keep two numbers, motions and loads three, S six.  Each kernel is the spatial one
+# evaluated with these components only, and its arrays store no others.
+
+#: In-plane entries of S, and of a direction in every row of W.
+_MASS = (0, 1, 5, 6, 10, 20)
+_DIRECTIONS = tuple(6 * row + entry for row in range(6) for entry in LOAD)
+#: (ports, their length) -> in-plane entries; ports not listed have no axes.  Body positions keep
+#: the out-of-plane coordinate, for forces whose ends are in different planes.
+_IN_PLANE_ENTRIES: dict[tuple[str, int], tuple[int, ...]] = {
+    (name, length): left
+    for names, length, left in (
+        ("motion motion_I motion_C motion_B", 9, (2, 5, 6, 7)),
+        ("S S_I", 21, _MASS),
+        ("e e_I delta delta_I delta_A delta_B G K K_p J J_A J_B w slip drift relative", 6, LOAD),
+        ("ro r_e r_A d v v_I v_C v_B", 3, (0, 1)),
+        ("w_I w_C w_B", 3, (2,)),
+        ("floor", 2, (1,)),
+        ("p", 10, (0, 1, 2, 9)),
+        ("W", 36, _DIRECTIONS),
+    )
+    for name in names.split()
+}  # fmt: skip
+_ROTATIONS = ("Rt", "Rc", "R_C", "A", "A_I", "A_C", "A_B")
+#: Inputs that are zero, by kernel: position across a pin and its prescribed motion, end deviations.
+_ZERO = {
+    "forward": "s", "velocity": "v_rel", "point": "delta gravity", "angular_motion": "delta",
+    "factor": "W",
+}  # fmt: skip
+#: Outputs that are never used: P of a pin coincides with its inboard point.
+_UNUSED_OUTPUTS = {"forward": "r", "point": "a_K", "angular_motion": "alpha_K"}
+
+
+def planar_spec(specs: Iterable[ElementSpec]) -> ElementSpec:
+    """Planar kernels, made from the spatial ones."""
+    spec_by_key = {(spec.kind, spec.name): spec for spec in specs}
+    kernels = tuple(
+        _planar_kernel(kernel)
+        for key, names in PLANAR_KERNELS.values()
+        for kernel in spec_by_key[key].kernels
+        if kernel.name in names.split()
+    )
+    return ElementSpec("sweep", "planar_pin", "pins in a plane", (), (), (), kernels)
+
+
+def _planar_kernel(kernel: KernelIR) -> KernelIR:
+    zeros, unused = (table.get(kernel.name, "").split() for table in (_ZERO, _UNUSED_OUTPUTS))
+
+    def planar_port(port: Port) -> Port:
+        entries_kept = _in_plane_entries(port)
+        return port if entries_kept is None else replace(port, shape=(len(entries_kept),))
+
+    def input_nodes(graph: Graph, port: Port) -> Nodes:
+        zero, unit = graph.constant(0), graph.constant(1)
+        if port.name == "H":  # about z
+            return [zero] * (port.length() - 1) + [unit]
+        if port.name in zeros:
+            return [zero] * port.length()
+        entries = element_nodes(graph, planar_port(port))
+        if port.name in _ROTATIONS:
+            cosine, sine = entries
+            return [cosine, -sine, zero, sine, cosine, zero, zero, zero, unit]
+        entries_kept = _in_plane_entries(port)
+        if entries_kept is None:
+            return entries
+        nodes = [zero] * port.length()
+        for index, entry in zip(entries_kept, entries, strict=True):
+            nodes[index] = entry
+        return nodes
+
+    def output_nodes(port: Port, nodes: Nodes) -> list[Node] | None:
+        entries_kept = _in_plane_entries(port)
+        if port.name in unused:
+            return None
+        return nodes if entries_kept is None else [nodes[index] for index in entries_kept]
+
+    planar = specialise(kernel, input_nodes, output_nodes, laid=planar_port)
+    return replace(planar, purpose=f"{planar.purpose}, in a plane")
+
+
+def _in_plane_entries(port: Port) -> tuple[int, ...] | None:
+    """In-plane entries of an array; None if all are kept."""
+    return (0, 3) if port.name in _ROTATIONS else _IN_PLANE_ENTRIES.get((port.name, port.length()))
+
+
+# --- tangents -------------------------------------------------------------------------------------
+# For a kernel `name` in the table, `name_slope` gives the derivatives of its outputs along a
+# direction; it is the IR of the kernel differentiated operation by operation (one-sided at kinks
+# of a law), so the equations of an element are stated once.  It reads the inputs of the kernel and
+# `d_PORT` for each port that varies, and gives `d_PORT` for the outputs.
+
+#: Suffix of the name of a differentiated kernel.
+SLOPE = "_slope"
+#: Kernels of full derivatives of an output by a port, one row per entry of the port: name ->
+#: (kernel, port, output), by kind of the element.
+_JACOBIANS = {
+    "body": {"load_by_motion": ("bias_load", "motion", "e")},
+    "hinge": {
+        "rates_by_coordinates": ("hinge", "q", "qdot"),
+        "rates_by_speeds": ("hinge", "u", "qdot"),
+    },
+}
+
+#: kernel -> (ports that vary, outputs; "" for all), by kind and name of the element. "generic"
+#: means the steps for any hinge; "hinge", "body" and "force" mean every element of that kind.
+_DIFFERENTIATED: dict[str, dict[str, tuple[str, str]]] = {
+    "hinge": {"hinge": ("q u", "")},
+    "body": {"bias_load": ("motion", "")},
+    "force": {"wrench": ("t A_F x_F v_F w_F A_T x_T v_T w_T effort", "F M")},
+    "laws": {
+        "linear": ("q u effort", "tau"),
+        "full": ("q u effort", "tau"),
+        "rotation": ("q u effort", "tau"),
+        "six": ("q u effort", "tau"),
+    },
+    "generic": {
+        "forward": ("R d H v w c s motion_I", ""),
+        "effort": ("H f", ""),
+        "complement": ("H", ""),
+        "add_known_part": ("y z", ""),
+        "add_multiplier_effort": ("y x", ""),
+    },
+    "frames": {
+        "pose": ("A_I x_I Rc r", ""),
+        "velocity": ("Rc r v_I w_I v_rel", ""),
+        "point": ("A x v motion", "x_K v_K"),
+        "angular_motion": ("A motion", "w_K"),
+        "end_frame": ("A", ""),
+        "applied_load": ("A A_F F M", ""),
+        "reaction_wrench": ("x_F x_T F M", ""),
+        "length": ("x_F x_T v_F v_T", ""),
+        "transport": ("Rc r e", ""),
+        "driven_effort": ("load udot tau", ""),
+    },
+    "loops": {
+        "relative_pose": ("A_C x_C A_B x_B Rc r", ""),
+        "slip": ("R_C d v_C w_C v_B w_B", ""),
+        "drift": ("R_C d slip motion_C motion_B", ""),
+        "row": ("w R_C Rc r_A", ""),
+        "known_parts": ("W relative", ""),
+        "apply_effort": ("J tau", ""),
+        "apply_multiplier": ("K x", ""),
+        "distance": ("d", "W"),
+        "distance_drift": ("d slip", ""),
+        "plane": ("d", "W"),
+        "rolling": ("R_C d", "W"),
+        "rolling_drift": ("R_C slip", ""),
+    },
+    "modal": {
+        "residual": ("eta etad motion", "S_rf e e_f"),
+        "prescribed_load": ("S_rf s", ""),
+        "momentum": ("eta etad v w", "h h_f"),
+        "section": ("eta etad", ""),
+        "end_motion": ("x Psi xd Psid xdd Psidd", ""),
+        "frame_motion": ("x Psi xd Psid xdd Psidd", ""),
+        "subspace": ("H6 Phi", ""),
+        "prescribed_bias": ("H s c", ""),
+        "modal_effort": ("H e e_f", ""),
+    },
+}
+
+
+def with_slopes(group: str, kernels: Iterable[KernelIR]) -> tuple[KernelIR, ...]:
+    """Kernels, then derivatives of those in the table, and combined kernels of hinges."""
+    kernels = tuple(kernels)
+    differentiated = _DIFFERENTIATED.get(group, {})
+    slopes = [slope(k, *differentiated[k.name]) for k in kernels if k.name in differentiated]
+    by_name = {kernel.name: kernel for kernel in kernels}
+    for name, (kernel, port, output) in _JACOBIANS.get(group, {}).items():
+        if next(p for p in by_name[kernel].inputs if p.name == port).length():
+            slopes.append(replace(jacobian(by_name[kernel], port, output), name=name))
+    if group == "hinge":
+        slopes += across_kernels(by_name["hinge"])
+    return (*kernels, *slopes)
+
+
+def slope(kernel: KernelIR, ports: str, outputs: str) -> KernelIR:
+    """Differentiated kernel; names of ports that it does not have are ignored."""
+    input_names = {port.name for port in kernel.inputs}
+    varying = [name for name in ports.split() if name in input_names]
+    derivative = differentiate(kernel, varying, outputs.split() or None, values=False, guards=False)
+    return replace(derivative, name=kernel.name + SLOPE)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 from mstmm.ir import KernelIR
 from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.hinge_properties import HingeProperties, hinge_properties
 
 from ..classical.catalogue import CLASSICAL, RUN_ELEMENTS, classical_derivation, classical_spec
+from ..codegen.template_rendering import generated_files, write_generated
 from ..definition.element import Hinge
 from ..equations import riccati_sweep
 from ..equations.hinge import speeds_of
+from .combined_hinge_kernels import planar_spec, with_slopes
 from .kernels import (
     FRAME_DERIVATIONS,
     MAX_SPEEDS,
@@ -31,9 +35,7 @@ from .kernels import (
     screw_kernels,
     tangent_kernels,
 )
-from .planar_kernels import planar_spec
 from .registry import Element, builtin_elements, builtin_hinges, kind_of
-from .tangent_kernels import with_slopes
 
 __all__ = [
     "FRAME_DERIVATIONS",
@@ -144,3 +146,40 @@ def on_demand_specs() -> list[ElementSpec]:
         ElementSpec("classical", name, matrix.title, (), (), (), (), matrix.sources)
         for name, matrix in derivations
     ]
+
+
+# --- generated files ------------------------------------------------------------------------------
+
+
+def regenerate(folder: Path | str) -> list[Path]:
+    """Derive everything and write it; remove files of elements that no longer exist."""
+    target, specs = Path(folder), all_specs()
+    written = write_generated(specs, target, hinges=all_facts(specs), on_demand=on_demand_specs())
+    for path in target.iterdir():
+        if path.suffix in (".c", ".h", ".json") and path not in written:
+            path.unlink()
+    return written
+
+
+def differences(folder: Path | str) -> list[str]:
+    """Unified diffs between a fresh derivation and `folder`; empty if identical."""
+    target = Path(folder)
+    specs = all_specs()
+    fresh = generated_files(specs, hinges=all_facts(specs), on_demand=on_demand_specs())
+    stored = {
+        path.name: path.read_text(encoding="utf-8")
+        for path in sorted(target.iterdir())
+        if path.suffix in (".c", ".h", ".json")
+    }
+    diffs = []
+    for name in sorted(fresh.keys() | stored.keys()):
+        if fresh.get(name) != stored.get(name):
+            lines = difflib.unified_diff(
+                stored.get(name, "").splitlines(),
+                fresh.get(name, "").splitlines(),
+                f"committed/{name}",
+                f"derived/{name}",
+                lineterm="",
+            )
+            diffs.append("\n".join(list(lines)[:40]))
+    return diffs

@@ -20,19 +20,24 @@ from ..equations import (
     constraints,
     kinematics,
     laws,
+    ldl_elimination,
     loop_closure,
-    multiple_right_hand_sides,
     qr_sweep,
     riccati_sweep,
     screw_transport,
     tangent_hinge_elimination,
     tangent_sweep,
+    user_elements,
 )
-from ..equations import force_element as force_kernels
 from ..equations import tangent_position_loads as placed
-from ..equations import user_body as body_kernels
-from ..equations.constrained_directions import complement
-from ..equations.hinge import HingeMotion, hinge_derivation, hinge_pose, hinge_quantities, motion_of
+from ..equations.hinge import (
+    HingeMotion,
+    complement,
+    hinge_derivation,
+    hinge_pose,
+    hinge_quantities,
+    motion_of,
+)
 from ..equations.ldl_elimination import eliminate_factored, recover_factored
 from ..equations.links import axial, rotational
 from ..flexible import (
@@ -123,12 +128,12 @@ def kernels_of(element: Element) -> tuple[Kernel, ...]:
         return hinge_kernels(element)
     if isinstance(element, Body):
         return (
-            Kernel("inertia", body_kernels.inertia(element)),
-            Kernel("bias_load", body_kernels.bias_load(element)),
-            Kernel("energy", body_kernels.kinetic_energy(element)),
+            Kernel("inertia", user_elements.inertia(element)),
+            Kernel("bias_load", user_elements.bias_load(element)),
+            Kernel("energy", user_elements.kinetic_energy(element)),
         )
-    wrench = force_kernels.wrench(element)
-    return (Kernel("wrench", wrench, force_kernels.wrench_guards(element)),)
+    wrench = user_elements.wrench(element)
+    return (Kernel("wrench", wrench, user_elements.wrench_guards(element)),)
 
 
 def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
@@ -176,20 +181,16 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("recover", riccati_sweep.back_substitute(nu)),
         Kernel("effort", riccati_sweep.effort(nu)),
         Kernel("project", riccati_sweep.project(nu)),
-        Kernel("factor", multiple_right_hand_sides.factor(nu), riccati_sweep.pivot_guards(nu)),
-        Kernel("column_load", multiple_right_hand_sides.column_load(nu)),
-        Kernel("column_acceleration", multiple_right_hand_sides.column_acceleration(nu)),
+        Kernel("factor", ldl_elimination.factor(nu), riccati_sweep.pivot_guards(nu)),
+        Kernel("column_load", ldl_elimination.column_load(nu)),
+        Kernel("column_acceleration", ldl_elimination.column_acceleration(nu)),
         Kernel("qr_eliminate", qr_sweep.qr_eliminate(nu), qr_sweep.qr_guards(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _TANGENT_STEPS),
         *(Kernel(make.__name__, make(nu)) for make in _TANGENT_SPEED_STEPS if nu),
         Kernel("complement", complement(nu)),
         *(Kernel(make.__name__, make(nu)) for make in loop_closure.OF_SPEEDS if nu),
         *((Kernel("required_load", riccati_sweep.required_load(nu)),) if nu else ()),
-        *(
-            (Kernel("ground_column_load", multiple_right_hand_sides.ground_column_load(nu)),)
-            if nu
-            else ()
-        ),
+        *((Kernel("ground_column_load", ldl_elimination.ground_column_load(nu)),) if nu else ()),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )

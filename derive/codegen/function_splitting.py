@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 from mstmm.ir import Assign, Guard, Store, Temporary
 
-from ..fuse.optimisation.statement_units import Line, operands
-from .guard_text import GUARDS_NAME, Guards
-from .straight_line import StraightText, parameter_list, port_array_name
+from ..fuse.instruction_scheduling import Line, operands
+from .straight_line import GUARDS_NAME, Guards, StraightText, parameter_list, port_array_name
 
 #: Statements per part, and the longest function that is not split; measured.
 PART_SIZE, MAX_UNSPLIT_SIZE = 1000, 2000

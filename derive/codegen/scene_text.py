@@ -17,15 +17,15 @@ import mstmm.templates
 from mstmm.abi.fused_library import ABI_VERSION, COMPILER_FLAGS, DECLARATIONS, SYMBOL
 from mstmm.ir import Element, KernelIR, Operand
 
-from ..fuse.optimisation.instruction_scheduling import interleave, order_for_registers
-from ..fuse.optimisation.sincos_pairing import Angle, gather
+from ..fuse.instruction_scheduling import interleave, order_for_registers
+from ..fuse.sum_balancing import Angle, gather
 from .function_splitting import MAX_UNSPLIT_SIZE, FunctionParts, statement_text
-from .guard_text import Guards
 from .kernel_text import string_literal
 from .straight_line import (
     LANE_DIALECT,
     SCALAR_DIALECT,
     Dialect,
+    Guards,
     StraightText,
     parameter_list,
     port_array_name,

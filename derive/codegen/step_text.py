@@ -26,8 +26,8 @@ from ..schedule.pass_steps import (
     all_steps,
 )
 from ..schedule.slot_definitions import SLOTS
+from .cache_tiling import condition_text, condition_variables
 from .kernel_calls import MAX_SPEEDS, Callee
-from .schedule_conditions import condition_text, condition_variables
 from .slot_storage import VARIABLES, SlotExpression, slot_expression, slot_size
 
 #: Traits that only scene-specific code uses.

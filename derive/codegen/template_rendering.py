@@ -26,7 +26,6 @@ from mstmm.ir.hinge_properties import HingeProperties, hinge_properties_to_data
 from mstmm.ir.statements import NEGATIVE_DETERMINANT
 from mstmm.ir.tape import GUARD_OPCODE, INSTRUCTION_WIDTH, OPCODES, OUTPUT_WIDTH
 
-from .complex_sweep import REAL_PORTS, complex_kernels, complex_passes, to_complex
 from .kernel_calls import kernel_calls_header
 from .kernel_text import (
     INDENT,
@@ -37,7 +36,7 @@ from .kernel_text import (
     wrapped_lines,
 )
 from .slot_storage import layout_header
-from .sweep_text import sweep_files
+from .sweep_text import REAL_PORTS, complex_kernels, complex_passes, sweep_files, to_complex
 from .vector_loops import VECTORIZED_OUTPUTS
 
 #: Run-time sizes for which the compiler unrolls the loops of a kernel.

@@ -32,8 +32,8 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde
-from .block_matrices import column, part, stack, symbol
-from .constrained_directions import DIRECTIONS
+from ..definition.notation import column, part, stack, symbol
+from .hinge import DIRECTIONS
 from .loop_closure import OFFSET, ROTATION, VELOCITY_ERROR
 
 #: Least square of a length used as a divisor, m^2: coincident points, a disc that lies flat.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
-from .block_matrices import column, part, stack, symbol
+from ..definition.notation import column, part, stack, symbol
 from .riccati_sweep import FLOOR, MOTION, SHIFT, E, R, inertia_floor
 
 A_PARENT = Quantity(symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")

@@ -32,8 +32,8 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Triangular, axial, tilde
-from .block_matrices import column, part, stack, symbol
-from .constrained_directions import DIRECTIONS
+from ..definition.notation import column, part, stack, symbol
+from .hinge import DIRECTIONS
 from .ldl_elimination import divide_rows
 from .riccati_sweep import SHIFT, R
 

@@ -17,7 +17,7 @@ import sympy as sp
 
 from ..definition.derivation import tilde
 from ..definition.notation import Matrix
-from .mass_distribution import POINT, MassDistribution, general
+from .rigid_body import POINT, MassDistribution, general
 
 #: Position, velocity and acceleration of the body-fixed origin o, in body axes (m, m/s, m/s^2).
 X0 = Matrix(sp.symbols("X0_x X0_y X0_z", real=True))

@@ -24,7 +24,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Triangle, Triangular, tilde
-from .block_matrices import column, part, stack, symbol
+from ..definition.notation import column, part, stack, symbol
 from .riccati_sweep import (
     FLOOR,
     MOTION,

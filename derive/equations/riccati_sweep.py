@@ -18,7 +18,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde
-from .block_matrices import column, diagonal, part, stack, symbol
+from ..definition.notation import column, diagonal, part, stack, symbol
 from .hinge import HingeMotion
 
 #: Least ratio of a pivot to the mean inertia of the body that it moves.

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde
-from .block_matrices import part, stack, symbol
+from ..definition.notation import part, stack, symbol
 from .riccati_sweep import SOURCES, E, S
 
 ROTATION = Quantity(symbol("turn", 2), "", "cosine and sine of the angle")

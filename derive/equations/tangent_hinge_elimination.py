@@ -10,7 +10,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
-from .block_matrices import column, part, stack, symbol
+from ..definition.notation import column, part, stack, symbol
 from .riccati_sweep import PARENT_E, SHIFT, E, R, free_speeds, transport
 from .tangent_sweep import (
     KNOWN_LOAD,

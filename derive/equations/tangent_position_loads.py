@@ -27,7 +27,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
-from .block_matrices import column, part, stack, symbol
+from ..definition.notation import column, part, stack, symbol
 from .riccati_sweep import SHIFT, R
 from .tangent_hinge_elimination import DISPLACEMENT, ROTATION
 from .tangent_sweep import OWN_D, OWN_K, SOLUTION, SOURCES, V_REL, Z_PARENT, D, H, N, V

@@ -34,7 +34,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
-from .block_matrices import column, part, stack, symbol
+from ..definition.notation import column, part, stack, symbol
 from .riccati_sweep import SHIFT, E, R
 
 #: Number of unknowns of a hinge, or of a flexible body.

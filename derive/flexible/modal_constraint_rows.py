@@ -10,10 +10,9 @@ the modes eliminated, etadd = g - G a - S_ff^-1 K_f x,
 from __future__ import annotations
 
 from ..definition.derivation import Derivation, Equation, Quantity, Solve
-from ..equations.block_matrices import symbol
-from .modal_residual import S_FF
+from ..definition.notation import symbol
+from .modal_residual import S_FF, modal_vector
 from .modal_sweep import MODAL_ACCELERATIONS, MODAL_GAIN, MODAL_SUBSPACE
-from .modal_symbols import modal_vector
 
 SOURCES = ("Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)",)
 

@@ -15,11 +15,13 @@ import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from ..equations.riccati_sweep import DELTA, SHIFT, SOURCES, E, R, S
-from .modal_residual import E_F, S_FF, S_RF
-from .modal_symbols import (
+from .modal_residual import (
     DAMPING,
+    E_F,
     ETA,
     ETAD,
+    S_FF,
+    S_RF,
     STIFFNESS,
     N,
     modal_columns,

@@ -16,7 +16,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
-from .modal_symbols import (
+from .modal_residual import (
     ETA,
     ETAD,
     SOURCES,

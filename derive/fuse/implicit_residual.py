@@ -18,9 +18,9 @@ from ..schedule.forward_kinematics import FORWARD, PRESCRIBED_ACCELERATIONS
 from ..schedule.pass_steps import Run, Sweep
 from ..schedule.sweeps import INVERSE_DYNAMICS
 from .fusion_state import FusionState, Kernels
-from .optimisation.sum_balancing import BalancedKernels
 from .scene_kernels import FAILED, FusedSceneIR, inputs_of
 from .schedule_interpreter import ScheduleInterpreter
+from .sum_balancing import BalancedKernels
 
 Matrix = list[Nodes]
 #: Largest number of speeds for which K and M are stored separately. A product by them costs about a

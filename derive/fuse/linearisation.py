@@ -18,9 +18,9 @@ from mstmm.ir.unrolled_solve import solve_symmetric
 from ..schedule.sweeps import INVERSE_DYNAMICS
 from .fusion_state import FusionState, Kernels
 from .implicit_residual import RATES
-from .optimisation.sum_balancing import balance
 from .scene_kernels import FAILED, FusedSceneIR, fuse, inputs_of
 from .schedule_interpreter import ScheduleInterpreter
+from .sum_balancing import balance
 
 
 def fuse_linear(

@@ -18,9 +18,9 @@ from ..schedule.forward_kinematics import POSES
 from ..schedule.pass_steps import Run, Sweep
 from .fusion_state import FusionState, Kernels
 from .implicit_residual import RATES
-from .optimisation.sum_balancing import BalancedKernels
 from .scene_kernels import FAILED, FusedSceneIR, inputs_of
 from .schedule_interpreter import ScheduleInterpreter
+from .sum_balancing import BalancedKernels
 
 GIVEN_MOTION = Sweep(
     "given_motion", "Poses and velocities as they are given.", (*RATES.runs, Run(whole=POSES))

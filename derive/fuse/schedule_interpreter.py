@@ -36,8 +36,7 @@ from ..schedule.pass_steps import (
 )
 from ..schedule.slot_definitions import SLOTS
 from .constraint_slots import RowSlots, closure_at, coupling_inputs, row_subject
-from .fusion_state import FusionState
-from .kernel_selection import along_a_screw, screw_axis, unit_row
+from .fusion_state import FusionState, along_a_screw, screw_axis, unit_row
 from .slot_values import GROUND, Subject
 
 #: Lengths of local slots that are initialised with zeros.

@@ -24,6 +24,7 @@ from mstmm.ir.unrolled_solve import (
 )
 
 from ..definition.derivation import (
+    FUNCTIONS,
     Derivation,
     Equation,
     Factor,
@@ -32,7 +33,6 @@ from ..definition.derivation import (
     Triangle,
     Triangular,
 )
-from ..definition.sympy_functions import FUNCTIONS
 
 
 def port(quantity: Quantity) -> Port:

@@ -11,7 +11,7 @@ for methods that allow an approximate tangent.
 from __future__ import annotations
 
 from .differentiated_passes import D
-from .mass_matrix import COLUMN, COLUMN_BACKWARD, COLUMN_FORWARD, FACTORISE
+from .inverse_dynamics import COLUMN, COLUMN_BACKWARD, COLUMN_FORWARD, FACTORISE
 from .pass_steps import (
     Add,
     Copy,

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .couplings import (
+from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
+from .forward_kinematics import HINGE_MOTION
+from .loads import (
     BIAS_EFFORTS_TO_KNOWN,
     EFFORTS_TO_KNOWN,
     OWN_COUPLINGS,
@@ -18,8 +20,6 @@ from .couplings import (
     efforts_of,
     efforts_of_own,
 )
-from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
-from .forward_kinematics import HINGE_MOTION
 from .pass_steps import (
     TIPS_TO_ROOT,
     Add,

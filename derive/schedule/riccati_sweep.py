@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
+from .forward_kinematics import HINGE_MOTION
 from .pass_steps import (
     TIPS_TO_ROOT,
     Add,
@@ -176,4 +177,88 @@ RECOVER = Pass(
         *only("section", *PORT_MOTION),
     ),
     skip="idle", given=("parent.delta",),
+)  # fmt: skip
+
+
+# --- least-squares sweep --------------------------------------------------------------------------
+# It keeps accuracy for large mass ratios (heavy bodies outboard of light ones).  Rows use the
+# storage of S, and d that of deviations; S and e are recomputed from them for later readers.  The
+# forward pass is that of the Riccati sweep, with the same gains.
+
+QR_OWN = Pass(
+    "qr_own", "body", "Rows of a single body, with its load at the bias motion.",
+    (
+        RunPass(whole=HINGE_MOTION, when="own"),
+        call("qr.factor", S="body.S", U="local.U"),
+        Copy(to="body.U", source="local.U"),
+        call("qr.bias", when="rigid", U="body.U", motion="body.motion", d="body.d", e="body.e"),
+        Copy(to="body.d", when="!rigid"),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+_ROWS = {"U": "body.U", "d": "body.d", "e": "body.e"}
+_REDUCED_PORTS = {"V": "local.V", "d_V": "local.d_V", "e_Q": "local.e_Q"}
+
+QR_CONDENSE = Pass(
+    "qr_condense", "body", "Rows of a body, complete, carried across its hinge to the parent.",
+    (
+        *FREE,
+        FREE_EFFORTS,
+        call("generic{free}.qr_eliminate", fails="undetermined", H="hinge.H_free",
+             J="hinge.J_free", floor="body.floor", **_ROWS, tau="hinge.tau_free", G="hinge.G",
+             g="hinge.g", **_REDUCED_PORTS),
+        call("qr.merge", when="on_body", Rc="body.R", r="body.r", **_REDUCED_PORTS, U_P="parent.U",
+             d_P="parent.d", U="local.U", d="local.d", e_I="parent.e"),
+        Copy(to="parent.U", source="local.U", when="on_body"),
+        Copy(to="parent.d", source="local.d", when="on_body"),
+        call("qr.rows_to_riccati", when="loads_read", **_ROWS, S="local.S", e_S="local.e_S"),
+        Copy(to="body.S", source="local.S", when="loads_read"),
+        Copy(to="body.e", source="local.e_S", when="loads_read"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+
+# --- links ----------------------------------------------------------------------------------------
+# The hinge moves about and along z, or rotates about a point.  Consecutive links are swept without
+# their workspace blocks: only what the next pass reads is stored, and S and e stay in registers or
+# local arrays from link to link.
+
+_LINK = {"link": "link.numbers", "turn": "link.turn"}
+_BODY = {"b": "link.b", "p": "link.p"}
+
+LINK_TURN = Pass(
+    "link_turn",
+    "link",
+    "Rotation across the hinge; about z only its angle, because sines and cosines of two links"
+    " are computed together.",
+    (call("link.turn", **_LINK, q="link.q"),),
+)
+
+LINK_FORWARD = Pass(
+    "link_forward", "link", "Bias motion and own load of a link.",
+    (
+        call("link.forward", fails="hinge", **_LINK, **_BODY, q="link.q", u="link.u",
+             motion_I="outer.motion", d="link.shift", motion="link.motion", e_B="link.load",
+             qdot="link.qdot"),
+    ),
+)  # fmt: skip
+
+LINK_CONDENSE = Pass(
+    "link_condense", "link", "S and e of a link and its outboard part, carried to the parent.",
+    (
+        call("link.condense", fails="undetermined", **_LINK, d="link.shift", **_BODY,
+             S_K="inner.S", e_K="inner.e", e_B="link.load", tau="link.tau", G="link.G",
+             g="link.g", S_I="outer.S", e_I="outer.e"),
+    ),
+    order=TIPS_TO_ROOT,
+)  # fmt: skip
+
+LINK_RECOVER = Pass(
+    "link_recover", "link", "Acceleration of a link, and its deviation, which replaces its motion.",
+    (
+        call("link.recover", **_LINK, d="link.shift", p="link.p", G="link.G", g="link.g",
+             delta_I="outer.delta", udot="link.udot", delta="link.motion"),
+    ),
 )  # fmt: skip

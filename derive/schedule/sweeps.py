@@ -5,13 +5,29 @@ from __future__ import annotations
 from dataclasses import replace
 
 from .approximate_tangent import APPROXIMATE_SOLUTION, APPROXIMATE_TANGENT, RATES_CHANGE
-from .couplings import COUPLING_LOADS, COUPLING_MULTIPLIERS
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
 from .forward_kinematics import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED_ACCELERATIONS
-from .inverse_dynamics import REQUIRED_EFFORTS
+from .inverse_dynamics import (
+    COLUMN,
+    COLUMN_BACKWARD,
+    COLUMN_FORWARD,
+    COMPOSITION,
+    FACTORISE,
+    HINGE_EFFORTS,
+    OUTBOARD_LOAD,
+    REQUIRED_EFFORTS,
+)
 from .iterative_refinement import ROTOR_RESIDUAL, ROTOR_RESIDUAL_OF_TREE
-from .links import LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER, LINK_TURN
-from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
+from .loads import (
+    COUPLING_LOADS,
+    COUPLING_MULTIPLIERS,
+    DRIVE_POWER,
+    EFFORTS,
+    EFFORTS_POWER,
+    FORCES,
+    LAWS,
+    LOADS,
+)
 from .loop_closure import (
     CLEAR_LOADS,
     CLOSURE_ACCELERATIONS,
@@ -22,19 +38,18 @@ from .loop_closure import (
     ROW_ELIMINATION,
     ROW_MULTIPLIER,
 )
-from .mass_matrix import (
-    COLUMN,
-    COLUMN_BACKWARD,
-    COLUMN_FORWARD,
-    COMPOSITION,
-    FACTORISE,
-    HINGE_EFFORTS,
-    OUTBOARD_LOAD,
-)
 from .pass_steps import Pass, Run, Sweep
 from .planar_passes import planar_sweep
-from .qr_sweep import QR_CONDENSE, QR_OWN
-from .riccati_sweep import CONDENSE, RECOVER
+from .riccati_sweep import (
+    CONDENSE,
+    LINK_CONDENSE,
+    LINK_FORWARD,
+    LINK_RECOVER,
+    LINK_TURN,
+    QR_CONDENSE,
+    QR_OWN,
+    RECOVER,
+)
 from .tangent_sweep import (
     APPLIED_SLOPE,
     CONTRIBUTIONS,

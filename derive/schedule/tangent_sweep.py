@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from . import position_dependent_loads
-from .couplings import COUPLING_LOADS
 from .differentiated_passes import (
     SLOPE,
     D,
@@ -32,7 +31,7 @@ from .forward_kinematics import (
     PRESCRIBED_ACCELERATIONS,
 )
 from .inverse_dynamics import REQUIRED_EFFORTS
-from .loads import EFFORTS, FORCES, LAWS, LOADS
+from .loads import COUPLING_LOADS, EFFORTS, FORCES, LAWS, LOADS
 from .loop_closure import CLOSURE_LOADS
 from .pass_steps import (
     TIPS_TO_ROOT,

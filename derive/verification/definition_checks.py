@@ -18,7 +18,7 @@ from mstmm.ir.element_spec import Param
 from mstmm.ir.hinge_properties import FRAMES
 
 from ..catalogue.registry import Element, builtin_elements, kind_of
-from ..definition import method_results as stated
+from ..definition import derivation as stated
 from ..definition.element import Body, ForceElement, Hinge, Symbols, rotation_about
 from ..definition.nonsmooth_functions import slope
 from ..equations.hinge import HingeMotion, motion_of, speeds_of

@@ -67,7 +67,7 @@ typedef struct {{
     int (*rates)({_GIVEN}, double *dq);
     int (*coordinates)({_GIVEN}, const double *steps, const double *x, const double *rho,
                        double *dq);
-    /* Inverse dynamics and the mass matrix; see derive/fuse/inverse_dynamics.py. */
+    /* Inverse dynamics and the mass matrix; see derive/fuse/scene_kernels.py. */
     int (*required)({_GIVEN}, double *efforts);
     int (*mass)({_GIVEN}, double *M);
     /* A point of one body; see derive/fuse/point_kinematics.py. */

@@ -95,7 +95,7 @@ def _checkout_folder() -> Path:
 
 
 def _regenerate(json: bool) -> None:
-    from mstmm.derive.catalogue.generate import regenerate
+    from mstmm.derive.catalogue.element_specs import regenerate
 
     folder = _checkout_folder()
     print_note("deriving every element; this takes a while")
@@ -108,7 +108,7 @@ def _regenerate(json: bool) -> None:
 
 
 def _compare_with_committed(json: bool) -> None:
-    from mstmm.derive.catalogue.generate import differences
+    from mstmm.derive.catalogue.element_specs import differences
 
     folder = _generated_folder()
     if not json:

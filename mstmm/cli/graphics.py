@@ -127,7 +127,7 @@ def _load_result(what: str, t_end: float | None) -> Result:
 
 def _nearest_result(what: str, error: LoopClosureError) -> Result:
     import mstmm
-    from mstmm.pipeline.nearest_pose import nearest_pose_result
+    from mstmm.pipeline.assembled_scene import nearest_pose_result
 
     return nearest_pose_result(mstmm.load_scene(what), error)
 

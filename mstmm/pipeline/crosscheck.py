@@ -119,7 +119,7 @@ def _make_subject(
     kernels: Sequence[Kernel],
     compiled: Compiled | None,
 ) -> _Subject:
-    from ..derive.catalogue.tangent_kernels import with_slopes
+    from ..derive.catalogue.combined_hinge_kernels import with_slopes
     from ..derive.definition.element import Hinge
     from ..derive.equations.hinge import speeds_of
     from ..derive.verification.sample_points import InputSampler
@@ -238,7 +238,7 @@ class _Subject:
         n: int,
     ) -> float:
         """Largest error of C relative to its rounding bound."""
-        from ..derive.verification.rounding_bounds import rounding_bounds
+        from ..derive.verification.kernel_evaluation import rounding_bounds
 
         largest_share = 0.0
         for name, limits in rounding_bounds(kernel, inputs, n).items():

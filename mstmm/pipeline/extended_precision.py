@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from hashlib import sha256
 from typing import Any
 
 import mpmath
 
+from ..abi.scalar_types import COMPILER_FLAGS, EXTRA_FLAGS, SCALARS, SYMBOL
 from ..array_validation import Array
+from ..derive.codegen.scalar_library import library_source
 from ..derive.fuse.scene_kernels import fuse
 from ..derive.verification.kernel_evaluation import evaluate
 from ..ir import KernelIR
@@ -15,8 +18,31 @@ from ..ir.element_spec import ElementSpec
 from ..ir.scene_structure import Key, Structure
 from ..runtime.engine.compiled_scene import CompiledScene
 from ..runtime.kernels import kernel_store
+from ..runtime.kernels.scalar_kernel import ScalarKernel
+from ..runtime.libraries.cache import Recipe, open_cached_library
 from ..runtime.packing.fused_structure import structure_of
 from .fused_code import kernel_lookup
+
+# --- kernels --------------------------------------------------------------------------------------
+# The source text comes from derive, the library from the cache.
+
+
+def compile_kernel(kernel: KernelIR, scalar: str = "double") -> ScalarKernel:
+    """Compile a kernel without loops in "float", "double" or "quadruple" precision.
+
+    Quadruple is IEEE binary128.  Raises ValueError for another scalar type or a kernel of run-time
+    size, EnvironmentFailure if there is no compiler or it does not support the type.
+    """
+    if scalar not in SCALARS:
+        raise ValueError(f"scalar type {scalar!r}: expected one of {', '.join(SCALARS)}")
+    text = library_source(kernel, scalar)
+    identity = {"text": sha256(text.encode()).hexdigest(), "scalar": scalar}
+    flags = (*COMPILER_FLAGS, *EXTRA_FLAGS.get(scalar, ()))
+    recipe = Recipe("kernel", identity, lambda key: {"kernel.c": text}, flags, (SYMBOL,))
+    return open_cached_library(recipe, lambda path, key: ScalarKernel(kernel, scalar, path))[0]
+
+
+# --- accelerations --------------------------------------------------------------------------------
 
 #: Digits of the evaluation; a Riccati sweep loses as many digits as the mass ratio has.
 DIGITS = 60

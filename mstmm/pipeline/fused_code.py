@@ -349,7 +349,7 @@ class Fusion:
 
     def fused_inverse(self, structure: Structure) -> FusedSceneIR:
         """IR of inverse dynamics and the mass matrix."""
-        from ..derive.fuse.inverse_dynamics import fuse_inverse
+        from ..derive.fuse.scene_kernels import fuse_inverse
 
         return fuse_inverse(structure, kernel_lookup(self._definitions))
 

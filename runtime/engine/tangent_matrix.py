@@ -7,7 +7,7 @@ models use R and its tangent, which is eliminated from the tips to the root
 (derive/equations/tangent_sweep.py).
 
 The harmonic response solves Z(s) x = r with Z(s) = s^2 M + s C + K, the complex tangent of the
-residual (derive/codegen/complex_sweep.py).  The contributions of the bodies are computed once;
+residual (derive/codegen/sweep_text.py).  The contributions of the bodies are computed once;
 every s requires one elimination.  Hysteretic damping adds i (K' - K), where K' belongs to a scene
 with its stiffness increased by the loss factors.
 """

@@ -12,11 +12,10 @@ from functools import cache, partial
 
 from ...definition.derivation import Derivation
 from . import body as flexible_body
-from . import rigid_hinges as flexible_joint
+from . import hinge as flexible_joint
 from . import spring_hinges as flexible_spring
-from .body_options import BodyStatement
+from .body_options import PLANE, SPACE, BodyStatement
 from .hinge import named_pairing
-from .state import PLANE, SPACE
 
 #: Modes of the beams adjacent to the generated hinges.
 PLANAR_MODES, SPATIAL_MODES = 3, 2

@@ -12,9 +12,8 @@ import sympy as sp
 from ...definition.derivation import Derivation, Equation, Quantity, Solve, vector
 from ...definition.notation import Matrix, Perp, Tilde
 from . import hinge as flexible_hinge
-from .hinge import FlexibleHinge, Pairing
-from .rigid_hinges import section_inputs, section_rotation, section_slopes
-from .state import rows_of
+from .body_options import rows_of
+from .hinge import FlexibleHinge, Pairing, section_inputs, section_rotation, section_slopes
 
 MAP_C = sp.MatrixSymbol("C", 1, 1)
 C = MAP_C[0, 0]

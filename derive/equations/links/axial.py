@@ -22,10 +22,10 @@ import sympy as sp
 
 from ...definition.derivation import Derivation, Equation, Quantity, tilde
 from ...definition.element import Body
-from .. import user_body as body_kernels
-from ..block_matrices import part, stack, symbol
+from ...definition.notation import part, stack, symbol
+from .. import user_elements
 from ..hinge import HingeMotion, HingePose, hinge_quantities
-from ..hinge_elimination import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
+from ..ldl_elimination import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
 from ..riccati_sweep import (
     DELTA,
     MOTION,
@@ -111,7 +111,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
             Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
             *_about_z().outboard_motion(between, motion_q),
             Equation("bias motion", MOTION.symbol, body_motion(motion, motion_q)),
-            Equation("load", OWN_LOAD.symbol, body_entries(body_kernels.bias_load(body), "e")),
+            Equation("load", OWN_LOAD.symbol, body_entries(user_elements.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
         sources=SOURCES,
@@ -147,7 +147,7 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
     gain, offset = gains(nu)
     tau = next(q for q in elimination.inputs if q.name == "tau")
     middle = (symbol("S_x", 6, 6), symbol("e_x", 6))
-    mass = body_entries(body_kernels.inertia(body), "S")
+    mass = body_entries(user_elements.inertia(body), "S")
     return Derivation(
         motion.hinge.name,
         f"S and e of a rigid body carried across the {motion.hinge.title}",
@@ -168,7 +168,7 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
 
 def pivot_threshold(body: Body) -> sp.ImmutableDenseMatrix:
     """Lower limit of pivots, from the body's own inertia."""
-    return inertia_floor(body_entries(body_kernels.inertia(body), "S"))
+    return inertia_floor(body_entries(user_elements.inertia(body), "S"))
 
 
 def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:

@@ -18,11 +18,10 @@ import sympy as sp
 
 from ...definition.derivation import Derivation, Equation, Quantity, Triangular, tilde
 from ...definition.element import Body, Hinge
-from .. import user_body as body_kernels
-from ..block_matrices import part, stack, symbol
+from ...definition.notation import part, stack, symbol
+from .. import user_elements
 from ..hinge import HingeMotion, has_subspace, hinge_pose, hinge_quantities
-from ..hinge_elimination import REDUCED_E
-from ..ldl_elimination import eliminate_factored
+from ..ldl_elimination import REDUCED_E, eliminate_factored
 from ..riccati_sweep import (
     DELTA,
     MOTION,
@@ -98,7 +97,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
                 stack(back * w, back * wd, back * (rdd + carrier * lever)),
             ),
             Equation("bias motion", MOTION.symbol, body_motion(motion, motion_q)),
-            Equation("load", OWN_LOAD.symbol, body_entries(body_kernels.bias_load(body), "e")),
+            Equation("load", OWN_LOAD.symbol, body_entries(user_elements.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
         sources=SOURCES,
@@ -121,7 +120,7 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
     gain, offset = _gains(nu)
     factor, z = symbol("F", nu, nu), symbol("Z", nu, 6)
     stored = sp.ImmutableDenseMatrix(nu, 6, lambda i, j: z[i, j] if j < 3 else factor[i, j - 3])
-    mass = body_entries(body_kernels.inertia(body), "S")
+    mass = body_entries(user_elements.inertia(body), "S")
     steps, carried = congruence("S_Q")
     return Derivation(
         motion.hinge.name,

@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 from scipy.optimize import brentq
 
-from ...derive.classical.harmonic_beam import BETA, LENGTH, field_matrix
+from ...derive.classical.harmonic_stiffness import BETA, LENGTH, field_matrix
 from ...runtime.flexible.beam.shape_functions import wave_number
 from ..case_definition import COUNT_SCALE, LINEAR_SCALE, LOG_SCALE, CaseDefinition, MethodDefinition
 from ..error_measures import refinement_correction, simulate_to_end

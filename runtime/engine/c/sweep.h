@@ -14,7 +14,7 @@
 #include "tape.h"
 
 /* cdef begin */
-/* Moments of the fields of a flexible body under one density; see derive/flexible/modal_symbols.py. */
+/* Moments of the fields of a flexible body under one density; see derive/flexible/modal_residual.py. */
 typedef struct {
     const real *rigid, *c, *p, *b, *z[6], *y[3], *g[3], *m;
 } mstmm_moments;

@@ -9,10 +9,10 @@ import pytest
 
 from mstmm.cli import stored_elements
 from mstmm.derive.codegen.cache_tiling import ChainedPasses, TiledRun, tile_sweep
-from mstmm.derive.codegen.prefetch import prefetch_function
+from mstmm.derive.codegen.pass_loops import prefetch_function
 from mstmm.derive.codegen.sweep_text import sweep_files
 from mstmm.derive.schedule.approximate_tangent import APPROXIMATE_TANGENT, LAWS_FACTORISE, LAWS_OWN
-from mstmm.derive.schedule.mass_matrix import COLUMN
+from mstmm.derive.schedule.inverse_dynamics import COLUMN
 from mstmm.derive.schedule.pass_steps import ROOT_TO_TIPS, TIPS_TO_ROOT, Copy, Pass, Run, Sweep
 from mstmm.derive.schedule.sweeps import ACCELERATIONS
 from mstmm.derive.schedule.tangent_sweep import TANGENT_SOLUTION

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mstmm.derive.codegen import function_splitting, scene_text
-from mstmm.derive.verification.rounding_bounds import rounding_bounds
+from mstmm.derive.verification.kernel_evaluation import rounding_bounds
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.graph import Graph
 from tests.support.kernels.fused_helpers import COMPILERS, FusedLab

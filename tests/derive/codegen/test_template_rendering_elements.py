@@ -14,7 +14,7 @@ import pytest
 
 from mstmm.abi import element_library as abi
 from mstmm.derive.classical.catalogue import CLASSICAL, RUN_ELEMENTS, classical_spec
-from mstmm.derive.verification.rounding_bounds import rounding_bounds
+from mstmm.derive.verification.kernel_evaluation import rounding_bounds
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.element_spec import ElementSpec, element_from_json
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats

@@ -10,7 +10,7 @@ T = 1/2 yd^T M(eta) yd with yd = [v; w; etad] is formed from the moments that th
 import sympy as sp
 
 from mstmm.derive.definition.derivation import Derivation
-from mstmm.derive.flexible import modal_residual, modal_symbols, section
+from mstmm.derive.flexible import modal_residual, section
 
 N = 2
 
@@ -72,8 +72,8 @@ _SYMMETRIC = ("Z_", "G_", "M", "K", "D")
 
 def _data() -> dict[str, sp.Matrix]:
     arrays = {}
-    for quantity in (*modal_symbols.MOMENTS, modal_symbols.STIFFNESS, modal_symbols.DAMPING):
-        rows, columns = (N if x == modal_symbols.N else int(x) for x in quantity.symbol.shape)
+    for quantity in (*modal_residual.MOMENTS, modal_residual.STIFFNESS, modal_residual.DAMPING):
+        rows, columns = (N if x == modal_residual.N else int(x) for x in quantity.symbol.shape)
         symmetric = quantity.name.startswith(_SYMMETRIC)
         arrays[quantity.name] = _explicit(quantity.name, rows, columns, symmetric)
     return arrays

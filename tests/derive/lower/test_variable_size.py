@@ -13,8 +13,7 @@ from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, S
 from mstmm.derive.lower.kernel_lowering import lower
 from mstmm.derive.show.document import kernel_listing
 from mstmm.derive.verification.equation_evaluation import evaluate_equations
-from mstmm.derive.verification.kernel_evaluation import evaluate
-from mstmm.derive.verification.rounding_bounds import rounding_bounds
+from mstmm.derive.verification.kernel_evaluation import evaluate, rounding_bounds
 from mstmm.errors import NumericalFailure
 from mstmm.ir import Element, KernelIR, Port, Store, Sum, from_json, to_json
 from mstmm.ir.differentiation import differentiate

@@ -13,7 +13,7 @@ from mstmm.derive.definition.element import Symbols
 from mstmm.derive.definition.notation import explicit
 from mstmm.derive.elements.body_rigid import RigidBody
 from mstmm.derive.equations.rigid_body import newton_euler_form
-from mstmm.derive.equations.user_body import bias_load, inertia
+from mstmm.derive.equations.user_elements import bias_load, inertia
 from mstmm.derive.show.captions import split_caption
 from mstmm.derive.show.document import ElementView
 from mstmm.derive.show.plain_text import text_box

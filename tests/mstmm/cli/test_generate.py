@@ -110,7 +110,7 @@ def test_check_and_file_do_not_mix(mstmm: Command, knee: Path) -> None:
 def test_generated_folder_that_is_out_of_date(
     mstmm: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    differences = "mstmm.derive.catalogue.generate.differences"
+    differences = "mstmm.derive.catalogue.element_specs.differences"
     monkeypatch.setattr(differences, lambda folder: ["--- committed/x"])
     done = mstmm("generate", "--check")
     assert done.code == 2 and "mstmm generate" in done.err and "committed/x" in done.out

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mstmm.derive.definition.sympy_functions import FUNCTIONS
+from mstmm.derive.definition.derivation import FUNCTIONS
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.differentiation import derivative
 from mstmm.ir.graph import Graph

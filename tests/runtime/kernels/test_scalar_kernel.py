@@ -13,7 +13,7 @@ from mstmm.abi.scalar_types import SCALARS
 from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.graph import Graph
-from mstmm.pipeline.kernel_compilation import compile_kernel
+from mstmm.pipeline.extended_precision import compile_kernel
 from mstmm.runtime.kernels.scalar_kernel import fractions
 from tests.support.kernels.random_kernels import random_inputs, random_kernel
 

@@ -10,7 +10,7 @@ import pytest
 
 import mstmm
 from mstmm.errors import LoopClosureError
-from mstmm.pipeline.nearest_pose import nearest_pose_result
+from mstmm.pipeline.assembled_scene import nearest_pose_result
 from mstmm.runtime.result.result import Result
 from tests.reference.jets import Array
 from tests.support.scenes.linkages import (

@@ -7,8 +7,8 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from mstmm.derive.classical.discrete.body_options import Space
 from mstmm.derive.classical.discrete.hinge import Pairing
-from mstmm.derive.classical.discrete.state import Space
 from mstmm.derive.classical.state_vector import StateVector
 from mstmm.derive.definition.derivation import Derivation
 from mstmm.derive.verification.kernel_evaluation import evaluate

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from mstmm.derive.classical.discrete import body as flexible_body
-from mstmm.derive.classical.discrete import rigid_hinges as flexible_joint
-from mstmm.derive.classical.discrete.body_options import BodyStatement
+from mstmm.derive.classical.discrete import hinge as flexible_joint
+from mstmm.derive.classical.discrete.body_options import PLANE, BodyStatement
 from mstmm.derive.classical.discrete.hinge import Pairing
-from mstmm.derive.classical.discrete.state import PLANE
 from mstmm.derive.lower.kernel_lowering import lower
 from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR

@@ -16,8 +16,7 @@ import pytest
 
 from mstmm.derive.catalogue.kernels import built_in_kernels
 from mstmm.derive.classical.discrete import body as flexible_body
-from mstmm.derive.classical.discrete.body_options import BodyStatement
-from mstmm.derive.classical.discrete.state import PLANE, SPACE
+from mstmm.derive.classical.discrete.body_options import PLANE, SPACE, BodyStatement
 from mstmm.derive.definition.derivation import Quantity
 from mstmm.derive.definition.notation import matrix_symbols
 from mstmm.derive.lower.kernel_lowering import lower

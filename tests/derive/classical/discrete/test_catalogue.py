@@ -16,10 +16,9 @@ import pytest
 from mstmm.derive.catalogue.kernels import Kernel
 from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.classical.discrete import body as flexible_body
-from mstmm.derive.classical.discrete.body_options import BodyStatement
+from mstmm.derive.classical.discrete.body_options import PLANE, SPACE, BodyStatement
 from mstmm.derive.classical.discrete.catalogue import BODIES, HINGES, PLANAR_MODES, SPATIAL_MODES
 from mstmm.derive.classical.discrete.hinge import PAIRINGS, Pairing, named_pairing
-from mstmm.derive.classical.discrete.state import PLANE, SPACE
 from mstmm.derive.definition.derivation import Derivation
 from mstmm.derive.lower.kernel_lowering import lower
 from tests.support.classical.discrete_bodies import DIGITS, kernel_inputs

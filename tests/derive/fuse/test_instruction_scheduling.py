@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from mstmm.derive.fuse.optimisation.instruction_scheduling import interleave, order_for_registers
-from mstmm.derive.fuse.optimisation.sincos_pairing import gather
-from mstmm.derive.fuse.optimisation.statement_units import Line, operands
+from mstmm.derive.fuse.instruction_scheduling import Line, interleave, operands, order_for_registers
+from mstmm.derive.fuse.sum_balancing import gather
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
 from mstmm.ir.graph import Graph
 from mstmm.ir.interpreter import evaluate_floats

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mstmm.derive.classical.harmonic_beam import (
+from mstmm.derive.classical.harmonic_stiffness import (
     BETA,
     LENGTH,
     field_matrix,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mstmm.derive.verification.kernel_evaluation import evaluate
-from mstmm.derive.verification.rounding_bounds import UNIT_ROUNDOFF, rounding_bounds
+from mstmm.derive.verification.kernel_evaluation import UNIT_ROUNDOFF, evaluate, rounding_bounds
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Solve, Store, Temporary
 from mstmm.ir.graph import Graph
 from mstmm.ir.interpreter import GuardFailure, evaluate_floats

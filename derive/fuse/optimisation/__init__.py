@@ -1,1 +1,0 @@
-"""Optimisation of straight-line code: order, balanced sums, paired sines and cosines."""
