@@ -16,6 +16,7 @@ from ..classical.catalogue import CLASSICAL, classical_derivation, classical_gua
 from ..definition.derivation import Derivation, Equation, Quantity, vector
 from ..definition.element import Body, Hinge
 from ..elements.body_rigid import RigidBody
+from ..equations import axial_links as axial
 from ..equations import (
     constraints,
     kinematics,
@@ -29,6 +30,7 @@ from ..equations import (
     tangent_sweep,
     user_elements,
 )
+from ..equations import rotational_links as rotational
 from ..equations import tangent_position_loads as placed
 from ..equations.hinge import (
     HingeMotion,
@@ -39,7 +41,6 @@ from ..equations.hinge import (
     motion_of,
 )
 from ..equations.ldl_elimination import eliminate_factored, recover_factored
-from ..equations.links import axial, rotational
 from ..flexible import (
     beam_fields,
     beam_foreshortening,

@@ -19,16 +19,18 @@ from mstmm.ir import Element, KernelIR, Operand
 
 from ..fuse.instruction_scheduling import interleave, order_for_registers
 from ..fuse.sum_balancing import Angle, gather
-from .function_splitting import MAX_UNSPLIT_SIZE, FunctionParts, statement_text
 from .kernel_text import string_literal
 from .straight_line import (
     LANE_DIALECT,
+    MAX_UNSPLIT_SIZE,
     SCALAR_DIALECT,
     Dialect,
+    FunctionParts,
     Guards,
     StraightText,
     parameter_list,
     port_array_name,
+    statement_text,
 )
 
 __all__ = ["ABI_VERSION", "COMPILER_FLAGS", "function_text", "fused_sources", "support_text"]

@@ -3,7 +3,7 @@
 import sympy as sp
 
 from ..definition.element import ForceElement, Param, Symbols
-from ..definition.rotations import rotation_vector
+from ..definition.notation import rotation_vector
 
 _SIX = range(6)
 #: Symmetric matrices are given by the upper triangle, row by row.

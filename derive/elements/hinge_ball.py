@@ -3,7 +3,7 @@
 import sympy as sp
 
 from ..definition.element import Hinge, Param, Symbols
-from ..definition.rotations import rate_of, rotation_of
+from ..definition.notation import rate_of, rotation_of
 
 
 class Ball(Hinge):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, vector
-from ..definition.rotations import rate_of, rotation_of
+from ..definition.notation import rate_of, rotation_of
 
 LINEAR = ("stiffness", "rest", "damping")
 FRICTION = ("coulomb", "static", "stribeck_velocity", "regularisation_velocity")

@@ -9,7 +9,7 @@ from mstmm.errors import ElementError
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from ..definition.element import Body, ForceElement, Symbols, describe_array
 from ..definition.nonsmooth_functions import slope
-from ..definition.rotations import rotating_derivative
+from ..definition.notation import rotating_derivative
 from .riccati_sweep import MOTION, E, S
 
 # --- bodies ---------------------------------------------------------------------------------------

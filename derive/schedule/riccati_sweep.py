@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import (
@@ -10,6 +12,7 @@ from .pass_steps import (
     ByScrew,
     CheckPivots,
     Copy,
+    EachSpeed,
     Pass,
     RunPass,
     ScatterSpeeds,
@@ -262,3 +265,36 @@ LINK_RECOVER = Pass(
              delta_I="outer.delta", udot="link.udot", delta="link.motion"),
     ),
 )  # fmt: skip
+
+
+# --- iterative refinement -------------------------------------------------------------------------
+# The accelerations of the first solution are the bias motion.  Their inverse dynamics, which
+# eliminates nothing, is the right-hand side of the same sweep: large mass ratios then only affect
+# the digits of the correction.
+
+ROTOR_RESIDUAL = Pass(
+    "rotor_residual", "body", "Efforts less those of the rotors at the computed accelerations.",
+    (
+        EachSpeed(
+            steps=(
+                call("frames.driven_effort", load="zero", J="body.rotor[k]", udot="body.s[k]",
+                     tau="body.tau[k]", tau_d="local.lack"),
+                Copy(to="body.tau[k]"),
+                Add(to="body.tau[k]", source="local.lack", times=-1),
+            ),
+        ),
+        # Prescribed speeds have no equation.
+        EachSpeed(
+            steps=(
+                call("frames.driven_effort", load="zero", J="body.rotor[k]", udot="body.s[k]",
+                     tau="zero", tau_d="local.rotor"),
+                Add(to="body.tau[k]", source="local.rotor"),
+            ),
+            imposed=True, when="imposed",
+        ),
+    ),
+    skip="cut",
+)  # fmt: skip
+
+#: For trees without cut hinges.
+ROTOR_RESIDUAL_OF_TREE = replace(ROTOR_RESIDUAL, name="rotor_residual_of_tree", skip="")

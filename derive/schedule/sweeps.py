@@ -17,7 +17,6 @@ from .inverse_dynamics import (
     OUTBOARD_LOAD,
     REQUIRED_EFFORTS,
 )
-from .iterative_refinement import ROTOR_RESIDUAL, ROTOR_RESIDUAL_OF_TREE
 from .loads import (
     COUPLING_LOADS,
     COUPLING_MULTIPLIERS,
@@ -49,6 +48,8 @@ from .riccati_sweep import (
     QR_CONDENSE,
     QR_OWN,
     RECOVER,
+    ROTOR_RESIDUAL,
+    ROTOR_RESIDUAL_OF_TREE,
 )
 from .tangent_sweep import (
     APPLIED_SLOPE,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mstmm.derive.codegen import function_splitting, scene_text
+from mstmm.derive.codegen import scene_text, straight_line
 from mstmm.derive.verification.kernel_evaluation import rounding_bounds
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.graph import Graph
@@ -44,7 +44,7 @@ def lab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     with pytest.MonkeyPatch.context() as patch:
         if size:
             patch.setattr(scene_text, "MAX_UNSPLIT_SIZE", 0)
-            patch.setattr(function_splitting, "PART_SIZE", size)
+            patch.setattr(straight_line, "PART_SIZE", size)
         return FusedLab(folder, [*SMOOTH, *MIXED, guarded_kernel()], compiler)
 
 

@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import pytest
 import sympy as sp
 
-from mstmm.derive.classical.catalogue import CLASSICAL, classical_spec
-from mstmm.derive.classical.discrete.catalogue import DISCRETE_DERIVATIONS
+from mstmm.derive.classical.catalogue import CLASSICAL, DISCRETE_DERIVATIONS, classical_spec
 from mstmm.derive.codegen.template_rendering import element_source
 from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from mstmm.derive.definition.notation import Matrix, Tilde, explicit

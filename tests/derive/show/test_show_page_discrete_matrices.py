@@ -7,8 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mstmm.derive.classical.catalogue import CLASSICAL
-from mstmm.derive.classical.discrete.catalogue import BODIES, DISCRETE_DERIVATIONS, HINGES
+from mstmm.derive.classical.catalogue import BODIES, CLASSICAL, DISCRETE_DERIVATIONS, HINGES
 from mstmm.derive.show.plain_text import WIDTH, column_count
 from mstmm.derive.show.show_page import show_view
 from mstmm.derive.show.subjects import element_view

@@ -1,32 +1,16 @@
-"""A rigid body outboard of a hinge that moves along and about z: four kernels.
-
-The transformation from the parent consists of two axial screws, chosen when the scene is packed
-(modified Denavit-Hartenberg parameters): a constant one about x, and the hinge's own about z with
-its constant angle and shift.  One link is
-
-    turn       angle about z, whose sine and cosine the engine computes for two links at a time
-    forward    bias motion of the body and the load that it requires
-    condense   own inertia and outboard bodies; elimination; transport to the parent
-    recover    accelerations
-
-and only turn, d, e, G and g are stored between the passes.
-
-S is carried across the screws by plain products: the double-angle form would save a tenth of the
-time but lose up to one and a half digits outboard of long chains, where small moments are
-differences of large ones.
-"""
+"""TODO"""
 
 from __future__ import annotations
 
 import sympy as sp
 
-from ...definition.derivation import Derivation, Equation, Quantity, tilde
-from ...definition.element import Body
-from ...definition.notation import part, stack, symbol
-from .. import user_elements
-from ..hinge import HingeMotion, HingePose, hinge_quantities
-from ..ldl_elimination import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
-from ..riccati_sweep import (
+from ..definition.derivation import Derivation, Equation, Quantity, tilde
+from ..definition.element import Body
+from ..definition.notation import part, stack, symbol
+from . import user_elements
+from .hinge import HingeMotion, HingePose, hinge_quantities
+from .ldl_elimination import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
+from .riccati_sweep import (
     DELTA,
     MOTION,
     PARENT_DELTA,
@@ -38,7 +22,7 @@ from ..riccati_sweep import (
     inertia_floor,
     unit_directions,
 )
-from ..screw_transport import OUT_E, OUT_S, Stage
+from .screw_transport import OUT_E, OUT_S, Stage
 
 LINK = Quantity(
     symbol("link", 5), "", "screw about x: cosine, sine, shift (m); angle and shift of z at q = 0"

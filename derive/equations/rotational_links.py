@@ -1,28 +1,17 @@
-"""A rigid body outboard of a hinge that rotates about a point: four kernels.
-
-The link of a ball hinge.  Its speeds are given in the body's axes, so these cannot be chosen, and
-the transformation from the parent is a general rotation and position, Rt and ro of `riccati_sweep`:
-
-    turn       rotation to the parent, from the coordinates
-    forward    bias motion of the body and the load that it requires
-    condense   own inertia and outboard bodies; elimination; transport to the parent
-    recover    accelerations
-
-Ports have the names and meanings of `axial`: `turn` is the part of the transformation that depends
-on the coordinates, and G and g hold the factors of `ldl_elimination` for back-substitution.
-"""
+"""TODO"""
 
 from __future__ import annotations
 
 import sympy as sp
 
-from ...definition.derivation import Derivation, Equation, Quantity, Triangular, tilde
-from ...definition.element import Body, Hinge
-from ...definition.notation import part, stack, symbol
-from .. import user_elements
-from ..hinge import HingeMotion, has_subspace, hinge_pose, hinge_quantities
-from ..ldl_elimination import REDUCED_E, eliminate_factored
-from ..riccati_sweep import (
+from ..definition.derivation import Derivation, Equation, Quantity, Triangular, tilde
+from ..definition.element import Body, Hinge
+from ..definition.notation import part, stack, symbol
+from . import user_elements
+from .axial_links import BODY, OUTER_E, OUTER_S, OWN_LOAD, body_entries, body_motion
+from .hinge import HingeMotion, has_subspace, hinge_pose, hinge_quantities
+from .ldl_elimination import REDUCED_E, eliminate_factored
+from .riccati_sweep import (
     DELTA,
     MOTION,
     PARENT_DELTA,
@@ -36,8 +25,7 @@ from ..riccati_sweep import (
     outboard_deviation,
     transport,
 )
-from ..screw_transport import OUT_E, OUT_S
-from .axial import BODY, OUTER_E, OUTER_S, OWN_LOAD, body_entries, body_motion
+from .screw_transport import OUT_E, OUT_S
 
 LINK = Quantity(
     symbol("link", 12), "", "rotation, inboard hinge axes to parent axes; inboard point (m)"

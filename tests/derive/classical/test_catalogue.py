@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 
 from mstmm.derive.catalogue.kernels import Kernel
-from mstmm.derive.classical.catalogue import CLASSICAL
+from mstmm.derive.classical.catalogue import BODIES, CLASSICAL, HINGES, PLANAR_MODES, SPATIAL_MODES
 from mstmm.derive.classical.discrete import body as flexible_body
 from mstmm.derive.classical.discrete.body_options import PLANE, SPACE, BodyStatement
-from mstmm.derive.classical.discrete.catalogue import BODIES, HINGES, PLANAR_MODES, SPATIAL_MODES
 from mstmm.derive.classical.discrete.hinge import PAIRINGS, Pairing, named_pairing
 from mstmm.derive.definition.derivation import Derivation
 from mstmm.derive.lower.kernel_lowering import lower
