@@ -41,7 +41,7 @@ typedef struct {
     int (*rates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *dq);
     int (*coordinates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, const double *x, const double *rho,
                        double *dq);
-    /* Inverse dynamics and the mass matrix; see derive/fuse/inverse_dynamics.py. */
+    /* Inverse dynamics and the mass matrix; see derive/fuse/scene_kernels.py. */
     int (*required)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *efforts);
     int (*mass)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M);
     /* A point of one body; see derive/fuse/point_kinematics.py. */
