@@ -12,7 +12,7 @@
  * in  p[10] parameters: mass [kg], mcx [kg*m], mcy [kg*m], mcz [kg*m], Jxx [kg*m2], Jxy [kg*m2], Jxz [kg*m2], Jyy [kg*m2], Jyz [kg*m2], Jzz [kg*m2]; body axes, about its input end
  * out S[21] f = S a + e of everything outboard, at P
  */
-int mstmm_body_rigid_inertia(in_t p, out_t S)
+static int mstmm_body_rigid_inertia(in_t p, out_t S)
 {
   S[0] = p[0];
   S[1] = S[2] = S[3] = 0.0;
@@ -43,7 +43,7 @@ MSTMM_CALL(mstmm_body_rigid_inertia, (in[0], out[0]))
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out e[6] (N, N*m) force part of f = S a + e, at P
  */
-int mstmm_body_rigid_bias_load(in_t p, in_t motion, out_t e)
+static int mstmm_body_rigid_bias_load(in_t p, in_t motion, out_t e)
 {
   real t1 = motion[0] * motion[1];
   real t4 = motion[0] * motion[2];
@@ -76,7 +76,7 @@ MSTMM_CALL(mstmm_body_rigid_bias_load, (in[0], in[1], out[0]))
  * in  w[3] (rad/s) angular velocity
  * out T[1] (J) kinetic energy
  */
-int mstmm_body_rigid_energy(in_t p, in_t v, in_t w, out_t T)
+static int mstmm_body_rigid_energy(in_t p, in_t v, in_t w, out_t T)
 {
   T[0] = 0.5 * (p[0] * (v[2] * v[2] + (v[0] * v[0] + v[1] * v[1]))) + (0.5 * (w[2] * (p[9] * w[2] +
     (p[6] * w[0] + p[8] * w[1]))) + (0.5 * (w[1] * (p[8] * w[2] + (p[5] * w[0] + p[7] * w[1]))) +
@@ -93,7 +93,7 @@ MSTMM_CALL(mstmm_body_rigid_energy, (in[0], in[1], in[2], out[0]))
  * in  d_motion[9] derivative of motion
  * out d_e[6] (N, N*m) derivative of e
  */
-int mstmm_body_rigid_bias_load_slope(in_t p, in_t motion, in_t d_motion, out_t d_e)
+static int mstmm_body_rigid_bias_load_slope(in_t p, in_t motion, in_t d_motion, out_t d_e)
 {
   real t2 = motion[2] * d_motion[0] + motion[0] * d_motion[2];
   real t7 = motion[1] * d_motion[0] + motion[0] * d_motion[1];
@@ -132,7 +132,7 @@ MSTMM_CALL(mstmm_body_rigid_bias_load_slope, (in[0], in[1], in[2], out[0]))
  * in  motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out J[9][6] e by motion, transposed
  */
-int mstmm_body_rigid_load_by_motion(in_t p, in_t motion, out_t J)
+static int mstmm_body_rigid_load_by_motion(in_t p, in_t motion, out_t J)
 {
   real t0 = motion[2] * p[3];
   real t1 = motion[1] * p[2];

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* ball hinge, classical transfer matrix
  * in  U[13][13] ([m/s2, rad/s2, N*m, N, 1]) transfer matrix of the outboard body

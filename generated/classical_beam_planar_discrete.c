@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* planar beam of Euler and Bernoulli with 3 modes, discrete-time classical matrix
  * in  m[1] (kg) mass

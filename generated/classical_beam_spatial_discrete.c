@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* spatial beam of Euler and Bernoulli, a mode per bending plane, discrete-time classical matrix
  * in  m[1] (kg) mass

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* spatial rigid body, classical transfer matrix
  * in  M[1] (kg) mass

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* smooth ball, discrete-time classical matrix
  * in  U[15][15] ([m, rad, N*m, N, m, 1]) matrix of the outboard body

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* smooth ball, discrete-time classical matrix
  * in  U[13][13] ([m, rad, N*m, N, 1]) matrix of the outboard body

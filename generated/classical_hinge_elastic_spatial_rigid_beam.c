@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* elastic hinge (spatial), discrete-time classical matrix
  * in  W[2][15] (N) modal rows of the outboard body

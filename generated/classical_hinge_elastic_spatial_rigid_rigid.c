@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* elastic hinge (spatial), discrete-time classical matrix
  * in  k_t[3][3] (N/m) stiffness, inertial axes at the predictor

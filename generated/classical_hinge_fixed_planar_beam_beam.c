@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* fixed hinge (planar), discrete-time classical matrix
  * in  W[3][10] (N) modal rows of the outboard body

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* fixed hinge (planar), discrete-time classical matrix
  * in  gamma[1] (rad) angle of the outboard from the inboard section

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* fixed hinge (spatial), discrete-time classical matrix
  * in  S_I[3][2] (1/m) section rotation per mode at the inboard side of the hinge, inertial axes

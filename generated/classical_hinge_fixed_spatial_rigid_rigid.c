@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* fixed hinge (spatial), discrete-time classical matrix
  * in  beta[3] (rad) inboard less outboard section at the predictor (0 where the weld is closed)

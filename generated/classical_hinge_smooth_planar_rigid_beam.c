@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* smooth pin (planar), discrete-time classical matrix
  * in  U[10][10] ([m, rad, N*m, N, m, 1]) matrix of the outboard body

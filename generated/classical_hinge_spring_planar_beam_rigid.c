@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* spring hinge (planar, nonlinear torsion spring), discrete-time classical matrix
  * in  Theta_I[1][3] (1/m) section rotation per mode at the inboard side of the hinge

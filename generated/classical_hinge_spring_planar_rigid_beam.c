@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* spring hinge (planar, nonlinear torsion spring), discrete-time classical matrix
  * in  W[3][10] (N) modal rows of the outboard body

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* spring hinge (planar, nonlinear torsion spring), discrete-time classical matrix
  * in  k_t[2][2] (N/m) stiffness, inertial axes at the predictor

@@ -24,7 +24,7 @@
  * out V[1] (J) stored energy
  * out P[1] (W) power of non-conservative forces
  */
-int mstmm_force_bearing6_wrench(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F, in_t w_F,
+static int mstmm_force_bearing6_wrench(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F, in_t w_F,
     in_t A_T, in_t x_T, in_t v_T, in_t w_T, out_t F, out_t M, out_t V, out_t P)
 {
   (void)t;
@@ -363,7 +363,7 @@ MSTMM_CALL(mstmm_force_bearing6_wrench, (in[0], in[1], in[2], in[3], in[4], in[5
  * out d_F[3] (N) derivative of F
  * out d_M[3] (N*m) derivative of M
  */
-int mstmm_force_bearing6_wrench_slope(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F,
+static int mstmm_force_bearing6_wrench_slope(in_t p, in_t t, in_t effort, in_t A_F, in_t x_F, in_t v_F,
     in_t w_F, in_t A_T, in_t x_T, in_t v_T, in_t w_T, in_t d_t, in_t d_effort, in_t d_A_F,
     in_t d_x_F, in_t d_v_F, in_t d_w_F, in_t d_A_T, in_t d_x_T, in_t d_v_T, in_t d_w_T, out_t d_F,
     out_t d_M)

@@ -20,7 +20,7 @@
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[7] coordinate rates
  */
-int mstmm_hinge_free_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+static int mstmm_hinge_free_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
     out_t c, out_t qdot)
 {
   (void)p;
@@ -104,7 +104,7 @@ MSTMM_CALL(mstmm_hinge_free_hinge, (in[0], in[1], in[2], out[0], out[1], out[2],
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[7] coordinate rates
  */
-int mstmm_hinge_free_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+static int mstmm_hinge_free_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
     out_t Rc, out_t r, out_t motion, out_t qdot)
 {
   (void)p;
@@ -216,7 +216,7 @@ MSTMM_CALL(mstmm_hinge_free_forward, (in[0], in[1], in[2], in[3], in[4], in[5], 
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_free_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+static int mstmm_hinge_free_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
     in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
   (void)p;
@@ -427,7 +427,7 @@ MSTMM_CALL(mstmm_hinge_free_condense, (in[0], in[1], in[2], in[3], in[4], in[5],
  * out udot[6] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_free_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+static int mstmm_hinge_free_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
     out_t udot, out_t delta)
 {
   (void)p;
@@ -483,7 +483,7 @@ MSTMM_CALL(mstmm_hinge_free_recover, (in[0], in[1], in[2], in[3], in[4], in[5], 
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[7] derivative of qdot
  */
-int mstmm_hinge_free_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
+static int mstmm_hinge_free_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R, out_t d_d,
     out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
   (void)p;
@@ -583,7 +583,7 @@ MSTMM_CALL(mstmm_hinge_free_hinge_slope, (in[0], in[1], in[2], in[3], in[4], out
  * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * out J[7][7] qdot by q, transposed
  */
-int mstmm_hinge_free_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
+static int mstmm_hinge_free_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
   (void)p;
   J[0] = J[1] = J[2] = J[3] = J[4] = J[5] = J[6] = J[7] = J[8] = J[9] = J[10] = J[11] = J[12] =
@@ -676,7 +676,7 @@ MSTMM_CALL(mstmm_hinge_free_rates_by_coordinates, (in[0], in[1], in[2], out[0]))
  * in  u[6] speeds: vx [m/s], vy [m/s], vz [m/s], wx [rad/s], wy [rad/s], wz [rad/s]
  * out J[6][7] qdot by u, transposed
  */
-int mstmm_hinge_free_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
+static int mstmm_hinge_free_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
   (void)p;
   (void)u;
@@ -747,7 +747,7 @@ MSTMM_CALL(mstmm_hinge_free_rates_by_speeds, (in[0], in[1], in[2], out[0]))
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_free_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
+static int mstmm_hinge_free_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s, in_t motion_I,
     out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc, out_t r,
     out_t motion)
 {
@@ -900,7 +900,7 @@ MSTMM_CALL(mstmm_hinge_free_body_motion, (in[0], in[1], in[2], in[3], in[4], in[
  * out W[6][6] slopes of the rows by load, rotors and laws
  * out H[6][6] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_free_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+static int mstmm_hinge_free_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
     in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
   (void)p;

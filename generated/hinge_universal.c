@@ -20,7 +20,7 @@
  * out c[6] (m/s2, rad/s2) relative acceleration at udot = 0, P axes
  * out qdot[2] coordinate rates
  */
-int mstmm_hinge_universal_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
+static int mstmm_hinge_universal_hinge(in_t p, in_t q, in_t u, out_t R, out_t d, out_t H, out_t v, out_t w,
     out_t c, out_t qdot)
 {
   real t0 = cos(q[0]);
@@ -81,7 +81,7 @@ MSTMM_CALL(mstmm_hinge_universal_hinge, (in[0], in[1], in[2], out[0], out[1], ou
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  * out qdot[2] coordinate rates
  */
-int mstmm_hinge_universal_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
+static int mstmm_hinge_universal_forward(in_t Rt, in_t ro, in_t p, in_t q, in_t u, in_t s, in_t motion_I,
     out_t Rc, out_t r, out_t motion, out_t qdot)
 {
   real t0 = cos(q[0]);
@@ -174,7 +174,7 @@ MSTMM_CALL(mstmm_hinge_universal_forward, (in[0], in[1], in[2], in[3], in[4], in
  * out S_I[21] contribution to the parent's S, added to what is there
  * out e_I[6] (N, N*m) contribution to the parent's e, added to what is there
  */
-int mstmm_hinge_universal_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
+static int mstmm_hinge_universal_condense(in_t Rc, in_t r, in_t p, in_t q, in_t floor_, in_t S, in_t e,
     in_t tau, out_t G, out_t g, out_t S_I, out_t e_I)
 {
   real t0 = sin(p[0]);
@@ -350,7 +350,7 @@ MSTMM_CALL(mstmm_hinge_universal_condense, (in[0], in[1], in[2], in[3], in[4], i
  * out udot[2] accelerations of the free coordinates
  * out delta[6] deviation of the body's acceleration, at P
  */
-int mstmm_hinge_universal_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
+static int mstmm_hinge_universal_recover(in_t Rc, in_t r, in_t p, in_t q, in_t G, in_t g, in_t delta_I,
     out_t udot, out_t delta)
 {
   real t3 = delta_I[0] + (r[2] * delta_I[4] - r[1] * delta_I[5]);
@@ -393,7 +393,7 @@ MSTMM_CALL(mstmm_hinge_universal_recover, (in[0], in[1], in[2], in[3], in[4], in
  * out d_c[6] (m/s2, rad/s2) derivative of c
  * out d_qdot[2] derivative of qdot
  */
-int mstmm_hinge_universal_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R,
+static int mstmm_hinge_universal_hinge_slope(in_t p, in_t q, in_t u, in_t d_q, in_t d_u, out_t d_R,
     out_t d_d, out_t d_H, out_t d_v, out_t d_w, out_t d_c, out_t d_qdot)
 {
   real t0 = cos(p[0]);
@@ -448,7 +448,7 @@ MSTMM_CALL(mstmm_hinge_universal_hinge_slope, (in[0], in[1], in[2], in[3], in[4]
  * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * out J[2][2] qdot by q, transposed
  */
-int mstmm_hinge_universal_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
+static int mstmm_hinge_universal_rates_by_coordinates(in_t p, in_t q, in_t u, out_t J)
 {
   (void)p;
   (void)q;
@@ -465,7 +465,7 @@ MSTMM_CALL(mstmm_hinge_universal_rates_by_coordinates, (in[0], in[1], in[2], out
  * in  u[2] speeds: angle1_rate [rad/s], angle2_rate [rad/s]
  * out J[2][2] qdot by u, transposed
  */
-int mstmm_hinge_universal_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
+static int mstmm_hinge_universal_rates_by_speeds(in_t p, in_t q, in_t u, out_t J)
 {
   (void)p;
   (void)q;
@@ -497,7 +497,7 @@ MSTMM_CALL(mstmm_hinge_universal_rates_by_speeds, (in[0], in[1], in[2], out[0]))
  * out r[3] (m) P of the body from P of the parent, parent axes
  * out motion[9] bias motion of the body: w, wd, rdd of its P, own axes
  */
-int mstmm_hinge_universal_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s,
+static int mstmm_hinge_universal_body_motion(in_t p, in_t q, in_t u, in_t Rt, in_t ro, in_t s,
     in_t motion_I, out_t R, out_t d, out_t H, out_t v, out_t w, out_t c, out_t qdot, out_t Rc,
     out_t r, out_t motion)
 {
@@ -621,7 +621,7 @@ MSTMM_CALL(mstmm_hinge_universal_body_motion, (in[0], in[1], in[2], in[3], in[4]
  * out W[2][2] slopes of the rows by load, rotors and laws
  * out H[6][2] motion subspace, rows v then w, P axes
  */
-int mstmm_hinge_universal_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
+static int mstmm_hinge_universal_directions(in_t p, in_t q, in_t u, in_t s, in_t motion, in_t f, in_t J,
     in_t laws, in_t along, in_t rate, in_t scale, in_t sq, out_t B, out_t G, out_t W, out_t H)
 {
   (void)along;

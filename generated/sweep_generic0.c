@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* bias motion outboard of a hinge with 0 speeds
  * in  Rt[3][3] rotation, inboard hinge axes to parent axes

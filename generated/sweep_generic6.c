@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 #ifndef MSTMM_TWO
 #define MSTMM_TWO

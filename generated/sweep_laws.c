@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* law of one hinge coordinate
  * in  p[3] stiffness, rest, damping

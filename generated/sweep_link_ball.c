@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* rotation of the ball hinge
  * in  link[12] rotation, inboard hinge axes to parent axes; inboard point (m)

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* angle of the cylindrical hinge
  * in  link[5] screw about x: cosine, sine, shift (m); angle and shift of z at q = 0

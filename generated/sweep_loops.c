@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 /* the two sides of a cut hinge
  * source: Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349 (multipliers in the sweep)

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "mstmm.h"
+#include "elements.h"
 
 #ifndef MSTMM_SOLVE_LDL
 #define MSTMM_SOLVE_LDL

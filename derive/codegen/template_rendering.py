@@ -259,6 +259,7 @@ def _element_view(spec: ElementSpec) -> dict[str, Any]:
         "title": spec.title,
         "sources": list(spec.sources),
         "hash": spec.hash(),
+        "header": "mstmm.h" if spec.kind in _KINDS_BY_DESCRIPTOR else "elements.h",
         "replayed": [kernel.name for kernel in spec.kernels if kernel not in kernels],
         "solvers": sorted(
             {
@@ -313,6 +314,7 @@ def _kernel_view(
         "name": kernel.name,
         "function": abi.kernel_symbol(spec.kind, spec.name, kernel.name),
         "prototype": abi.prototype(spec.kind, spec.name, kernel, plain=plain),
+        "is_static": spec.kind in _KINDS_BY_DESCRIPTOR,
         "sized": _sized_view(spec, kernel, plain) if kernel.size_symbol else None,
         "purpose": kernel.purpose,
         "sources": [s for s in kernel.sources if plain or s not in spec.sources],
