@@ -13,7 +13,7 @@ from mstmm.derive.classical.state_vector import PLANAR, SPATIAL
 from mstmm.derive.definition.derivation import Derivation, Equation, tilde
 from mstmm.derive.definition.notation import Matrix, explicit
 from mstmm.derive.equations import newton_euler as ne
-from mstmm.derive.equations.rigid_body import from_inertia_tensor
+from mstmm.derive.equations.newton_euler import from_inertia_tensor
 from tests.support.classical.classical_kernels import (
     PLANAR_ROWS,
     kernel,

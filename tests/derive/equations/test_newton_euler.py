@@ -15,13 +15,8 @@ from mstmm.derive.definition.element import Symbols
 from mstmm.derive.definition.notation import Matrix
 from mstmm.derive.elements.body_rigid import RigidBody
 from mstmm.derive.equations import newton_euler as ne
-from mstmm.derive.equations.rigid_body import (
-    POINT,
-    from_inertia_tensor,
-    general,
-    point_masses,
-    rigid_body,
-)
+from mstmm.derive.equations.newton_euler import POINT, from_inertia_tensor, general, point_masses
+from mstmm.derive.equations.rigid_body import rigid_body
 from mstmm.derive.lower.kernel_lowering import lower
 from mstmm.ir.interpreter import evaluate_floats
 from tests.support.book_formulas.formulas import (

@@ -9,8 +9,16 @@ import sympy as sp
 from mstmm.derive.definition.derivation import tilde
 from mstmm.derive.definition.notation import Matrix
 from mstmm.derive.equations import newton_euler as ne
-from mstmm.derive.equations.newton_euler import A0, OMEGA, OMEGADOT, V0, X0
-from mstmm.derive.equations.rigid_body import POINT, MassDistribution, general
+from mstmm.derive.equations.newton_euler import (
+    A0,
+    OMEGA,
+    OMEGADOT,
+    POINT,
+    V0,
+    X0,
+    MassDistribution,
+    general,
+)
 from tests.support.book_formulas import transcripts as printed
 
 

@@ -8,8 +8,14 @@ from __future__ import annotations
 import sympy as sp
 
 from mstmm.derive.definition.notation import Matrix
-from mstmm.derive.equations.newton_euler import A0, OMEGA, OMEGADOT
-from mstmm.derive.equations.rigid_body import POINT, MassDistribution, general
+from mstmm.derive.equations.newton_euler import (
+    A0,
+    OMEGA,
+    OMEGADOT,
+    POINT,
+    MassDistribution,
+    general,
+)
 
 #: Position of the moving origin (X', Y', Z') and its second derivatives, inertial axes.
 ORIGIN = Matrix(sp.symbols("X_o Y_o Z_o", real=True))
