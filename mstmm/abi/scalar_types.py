@@ -1,4 +1,4 @@
-"""Scalar types in which any kernel can be compiled and called (`kernel_compilation`)."""
+"""Scalar types in which any kernel can be compiled and called (`mstmm.pipeline.extended_precision`)."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ _CYCLIC = ((1, 2), (2, 0), (0, 1))
 def moment_inputs(body: Moments) -> dict[str, Array]:
     """Inputs p, C, P, B, Z_xx.., Y_x.., G_x.., M of the kernels of ("sweep", "modal").
 
-    They are defined in `derive.flexible.modal_symbols`.
+    They are defined in `derive.flexible.modal_residual`.
     """
     e, f, g, x = body.E, body.F, body.G, body.X
     inputs = {
