@@ -240,9 +240,7 @@ class KernelText:
             return self._solve(statement)
         return {"kind": "text", "lines": self._lines(statement, args, INDENT)}
 
-    def _lines(
-        self, statement: Assign | Sum | Store, args: Sequence[Nested], indent: str
-    ) -> list[str]:
+    def _lines(self, statement: Statement, args: Sequence[Nested], indent: str) -> list[str]:
         """C lines of an assignment, a sum or a store."""
         if isinstance(statement, Assign):
             self._define(statement, args)
@@ -250,24 +248,26 @@ class KernelText:
             is_real = self._is_complex and statement.number in self._real_numbers
             scalar = REAL if is_real else "real"
             return wrapped_lines(f"{scalar} t{statement.number} = {value};", indent)
+        head: list[str] = []
         if isinstance(statement, Sum):
             start = "z_plain(0)" if self._is_complex else "0"
             head = [f"{indent}real t{statement.number} = {start};"]
-            loops, target, sign = (statement.over,), f"t{statement.number}", "+"
+            loops, target, sign = statement.over, f"t{statement.number}", "+"
         else:
+            assert isinstance(statement, Store)
             port = self.ports[statement.port]
-            head, loops, target = [], statement.loops, self._entry(port, statement.index)
+            loops, target = "".join(statement.loops), self._entry(port, statement.index)
             sign = "+" if port.accumulate else ""
             if args:
                 return wrapped_lines(self._assignment(target, sign, args[0]), indent)
-        body, value = self._nesting.body(statement)
+        body, result = self._nesting.body(statement)
         inner = indent + INDENT * len(loops)
         lines = [
             f"{indent}{INDENT * depth}for (int {k} = 0; {k} < n; ++{k}) {{"
             for depth, k in enumerate(loops)
         ]
         lines += [line for part in body for line in self._lines(*part, inner)]
-        lines += wrapped_lines(self._assignment(target, sign, value), inner)
+        lines += wrapped_lines(self._assignment(target, sign, result), inner)
         lines += [f"{indent}{INDENT * depth}}}" for depth in reversed(range(len(loops)))]
         return head + lines
 

@@ -1,4 +1,4 @@
-"""Scalar types in which any kernel can be compiled and called (`mstmm.pipeline.extended_precision`)."""
+"""Scalar types in which any kernel can be compiled and called (`compile_kernel`)."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ class Solve:
 Statement = Assign | Sum | Store | Guard | Solve
 
 
-def operands(statement: Statement) -> tuple[Operand, ...]:
+def operands(statement: object) -> tuple[Operand, ...]:
     """Operands that a statement reads, those of its body first."""
     if isinstance(statement, Assign):
         return statement.args

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from mstmm.derive.fuse.instruction_scheduling import Line, interleave, operands, order_for_registers
+from mstmm.derive.fuse.instruction_scheduling import Line, interleave, order_for_registers
 from mstmm.derive.fuse.sum_balancing import gather
 from mstmm.ir import Assign, Guard, KernelIR, Port, Store, Temporary
 from mstmm.ir.graph import Graph
 from mstmm.ir.interpreter import evaluate_floats
+from mstmm.ir.statements import operands
 from tests.support.kernels.random_kernels import random_inputs, random_kernel
 
 
