@@ -21,7 +21,7 @@ from tests.support.draws import draws
 from tests.support.paths import ROOT
 from tests.support.scenes.results import rod
 
-from .test_inverse_dynamics import beams
+from .test_scene_kernels_inverse_dynamics import beams
 
 KINDS = {"positions": "q", "poses": "q", "velocities": "qu", "jacobian": "q", "jacobian_rate": "qu"}
 
