@@ -144,8 +144,8 @@ def test_the_descriptor_says_how_long_arrays_are(library: CLibrary) -> None:
 
 def test_prototype_has_the_size_first_and_the_work_array_last() -> None:
     text = " ".join(abi.prototype("hinge", "modal", KERNEL).split())
-    assert text.startswith("int mstmm_hinge_modal_modal(int n, const real *restrict scale,")
-    assert text.endswith("real *restrict work)")
+    assert text.startswith("int mstmm_hinge_modal_modal(int n, in_t scale,")
+    assert text.endswith("out_t work)")
 
 
 def test_stored_form_gives_the_kernel_back() -> None:
