@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -58,13 +58,25 @@ def _list_entries(folder: Path, json: bool, verify: bool) -> None:
     if json:
         print_json({
             "ok": not damaged, "folder": str(folder), "bytes": size, "limit": size_limit(),
-            "unfinished": unfinished_count, "entries": [_entry_data(entry) for entry in entries],
+            "unfinished": unfinished_count,
+            "entries": [
+                {"name": entry.folder.name, "bytes": entry.bytes, "last_used": entry.used,
+                 "problem": entry.problem, **entry.about}
+                for entry in entries
+            ],
         })  # fmt: skip
     else:
         if not verify and entries:
             columns = ("library", "kB>", "last used", "compiled in s>", "compiler", "state")
             table_console().print(build_table("", columns, map(_entry_row, entries)))
-        _print_summary(folder, entries, size, size_limit(), unfinished_count)
+        intact = sum(not entry.problem for entry in entries)
+        print_lines(
+            f"{folder}: {count_text(len(entries), 'library', 'libraries')}, {intact} intact; "
+            f"{size / 1e6:.1f} of {size_limit() / 1e6:.0f} MB"
+        )
+        if unfinished_count:
+            builds = count_text(unfinished_count, "build", "builds")
+            print_lines(f"{builds} in progress or interrupted")
         for entry in damaged:
             print_error(
                 f"{entry.folder.name} is corrupt: {entry.problem}; it is rebuilt when used; "
@@ -72,18 +84,6 @@ def _list_entries(folder: Path, json: bool, verify: bool) -> None:
             )
     if verify and damaged:
         raise typer.Exit(ENVIRONMENT)
-
-
-def _print_summary(
-    folder: Path, entries: list[ListedEntry], size: int, limit: int, cut_off: int
-) -> None:
-    intact_count = sum(1 for entry in entries if not entry.problem)
-    print_lines(
-        f"{folder}: {count_text(len(entries), 'library', 'libraries')}, {intact_count} intact; "
-        f"{size / 1e6:.1f} of {limit / 1e6:.0f} MB"
-    )
-    if cut_off:
-        print_lines(f"{count_text(cut_off, 'build', 'builds')} in progress or interrupted")
 
 
 def _delete_entries(folder: Path, unused: float, json: bool) -> None:
@@ -108,10 +108,3 @@ def _entry_row(entry: ListedEntry) -> tuple[str, ...]:
         str(entry.about.get("compiler_version", "")),
         entry.problem or "intact",
     )
-
-
-def _entry_data(entry: ListedEntry) -> dict[str, Any]:
-    return {
-        "name": entry.folder.name, "bytes": entry.bytes, "last_used": entry.used,
-        "problem": entry.problem, **entry.about,
-    }  # fmt: skip

@@ -20,9 +20,7 @@ from .terminal_output import print_error, print_json, print_lines
 if TYPE_CHECKING:
     from mstmm.pipeline.crosscheck import CrossCheckReport as Crosscheck
     from mstmm.runtime.engine.loops.loop_analysis import LoopAnalysis
-    from mstmm.runtime.model.model import Model
     from mstmm.scene import Scene
-    from mstmm.scene.checks.topology import Topology
 
 Report = dict[str, Any]
 
@@ -54,7 +52,9 @@ def check(
             report = _check_function(name)(name)
             text, model = report.pop("text"), report.pop("model", None)
             if assembled and model is not None:
-                report["toml"] = _assembled_toml(model)
+                from mstmm.pipeline.assembled_scene import assembled_scene
+
+                report["toml"] = assembled_scene(model).to_toml()
             if (echo or assembled) and "toml" in report:
                 text = report["toml"].rstrip("\n")
             if not json:
@@ -111,10 +111,8 @@ def _check_scene(path: str) -> Report:
         f"{name}: {note}" for name, body in model.flexible_bodies.items() for note in body.notes
     ]
     notes += [str(one) for one in model.simplifications if one.kind in COUNT_TEXTS]
-    warnings = [
-        *scene.warnings,
-        *(w for body in model.flexible_bodies.values() for w in body.warnings),
-    ]
+    warnings = list(scene.warnings)
+    warnings += (text for body in model.flexible_bodies.values() for text in body.warnings)
     is_examined = model.nu <= _MAX_EXAMINED_SPEEDS
     fastest = find_fastest_motion(model.looped, *model.initial_state()) if is_examined else None
     report = {
@@ -144,30 +142,17 @@ def _fastest_line(rate: float, element: str) -> str:
     return f"{line}; explicit methods need at least {rate / 6:.1g} steps per second: --method auto"
 
 
-def _assembled_toml(model: Model) -> str:
-    from mstmm.pipeline.assembled_scene import assembled_scene
-
-    return assembled_scene(model).to_toml()
-
-
-_SINGULAR_NOUNS = {
-    "bodies": "body", "beams": "beam", "elastic": "elastic body", "hinges": "hinge",
-    "coordinates": "coordinate", "speeds": "speed", "springs": "spring", "bushings": "bushing",
-    "loads": "load", "events": "event",
-}  # fmt: skip
-
-
-_PLURAL_NOUNS = {"elastic": "elastic bodies"}
+#: Nouns that are not the plural without its s: singular, and the plural where it differs.
+_NOUNS = {"bodies": ("body", "bodies"), "elastic": ("elastic body", "elastic bodies")}
 
 
 def _scene_text(
     path: str, scene: Scene, sizes: dict[str, int], warnings: list[str], choices: list[str]
 ) -> str:
     counts = ", ".join(
-        count_text(number, _SINGULAR_NOUNS[name], _PLURAL_NOUNS.get(name, name))
-        for name, number in sizes.items()
-        if number
-    )
+        count_text(number, *_NOUNS.get(name, (name.removesuffix("s"),)))
+        for name, number in sizes.items() if number
+    )  # fmt: skip
     lines = [f"{path}: ok; {counts or 'empty scene'}", *(f"  note: {w}" for w in warnings)]
     lines += [f"  {choice}" for choice in choices]
     return "\n".join(lines + _tree_lines(scene))
@@ -183,13 +168,14 @@ def _tree_lines(scene: Scene) -> list[str]:
 
     skeleton = scene.skeleton
     tree = build_topology(skeleton)
-    depth: dict[int, int] = {-1: 0}  # of bodies that may carry others
+    depth: dict[int, int] = {-1: 0}  # of the first body of every run
     lines = ["  ground"] if tree.runs else []
     shown_count = 0
     for run in tree.runs:
         if len(lines) > _MAX_SHOWN:
             break
-        first = 1 + _tree_depth(tree, depth, run.parent)
+        run_start = max((p for p in depth if p <= run.parent), default=-1)
+        first = 1 + (depth[run_start] + run.parent - run_start if run_start >= 0 else 0)
         depth[run.position] = first
         hinge, body = skeleton.hinges[run.hinge], skeleton.bodies[run.body]
         description = f"{body.name}  ({hinge.name}: {hinge.type})"
@@ -217,12 +203,8 @@ def _loop_data(loops: LoopAnalysis) -> Report | None:
         "rows": len(loops.constraint_rows), "rank": loops.rank, "mobility": loops.mobility,
         "shapes": loops.flexible_mobility, "cut": list(loops.cut_hinges),
         "dropped": [
-            {
-                "of": owner,
-                "direction": word,
-                "momentary": (owner, word) in loops.redundant_in_this_pose,
-            }
-            for owner, word in loops.redundant_rows
+            {"of": row[0], "direction": row[1], "momentary": row in loops.redundant_in_this_pose}
+            for row in loops.redundant_rows
         ],
         "singular": loops.singular, "nearby": loops.generic_rank,
         "misfit": {"gap": gap, "of": name, "direction": direction} if name else None,
@@ -265,12 +247,6 @@ def _pose_lines(path: str, error: LoopClosureError) -> list[str]:
     rest_count = len(error.pose) - len(lines)
     lines += [f"  ... and {rest_count} more"] if rest_count > 0 else []
     return [*lines, f"  to display it: mstmm view {quote(path)}"]
-
-
-def _tree_depth(tree: Topology, depth: dict[int, int], place: int) -> int:
-    """Depth of a body in the tree; `depth` has that of the first body of every run."""
-    run_start = max((p for p in depth if p <= place), default=-1)
-    return depth[run_start] + place - run_start if run_start >= 0 else 0
 
 
 # --- elements -------------------------------------------------------------------------------------

@@ -26,12 +26,8 @@ T_END, SAMPLES = 5.0, 501
 TABLE_QUANTITIES = ("body3.tip.x", "body3.tip.y", "body3.tip.z", "ball0.fz", "energy")
 TRAIL_END = "body3.tip"
 PLOT_QUANTITIES = (
-    "body3.tip.position",
-    "ball0.force",
-    "energy.kinetic",
-    "energy.gravity",
-    "energy",
-)
+    "body3.tip.position", "ball0.force", "energy.kinetic", "energy.gravity", "energy",
+)  # fmt: skip
 
 INTRODUCTION = """\
 Three bodies on ball hinges, a chain swinging in space under gravity:
@@ -78,10 +74,11 @@ def demo(json: Json = False) -> None:
         result_file: f"the result: {len(result.t)} samples of every quantity",
         table_file: "this text",
         scene: "the scene" if kept_note is None else kept_note,
-    } | ({} if picture is None else {picture: "plots of the result"})
-    descriptions |= (
-        {} if animation is None else {animation: "an animation of the chain, for any browser"}
-    )
+    }
+    if picture is not None:
+        descriptions[picture] = "plots of the result"
+    if animation is not None:
+        descriptions[animation] = "an animation of the chain, for any browser"
     if json:
         data = run_summary.to_json(result, seconds, verdict)
         print_json({**data, "files": [str(path) for path in descriptions]})

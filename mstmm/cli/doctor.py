@@ -117,10 +117,8 @@ def _check_processor() -> Iterator[Diagnosis]:
         name for name in ("avx512f", "avx2", "fma", "asimd", "sve") if name in flags
     ]
     name = features.get("model name") or features.get("CPU part") or features["machine"]
-    text = (
-        f"{name} ({features['machine']}; "
-        f"{', '.join(vector_extensions) or 'no vector extensions found'})"
-    )
+    extensions = ", ".join(vector_extensions) or "no vector extensions found"
+    text = f"{name} ({features['machine']}; {extensions})"
     yield Diagnosis("processor", True, text, dict(features))
 
 
@@ -152,10 +150,8 @@ def _check_cache() -> Iterator[Diagnosis]:
         yield Diagnosis("cache", False, str(error))
         return
     except OSError as error:
-        text = (
-            f"{cache_path} is not writable ({error.strerror}); free disk space or change "
-            f"permissions"
-        )
+        reason = f"not writable ({error.strerror})"
+        text = f"{cache_path} is {reason}; free disk space or change permissions"
         yield Diagnosis("cache", False, f"{text}, or set {cache_files.VARIABLE}")
         return
     entries = list_entries(cache_path)
@@ -219,10 +215,8 @@ def _run_trial(subject: str, trial: Callable[[], str]) -> Diagnosis:
 
 
 def _failed_trial(subject: str, error: Exception) -> Diagnosis:
-    if isinstance(error, MstmmError):
-        return Diagnosis(subject, False, str(error))
     text = f"{type(error).__name__}: {error}; reinstall mstmm"
-    return Diagnosis(subject, False, text)
+    return Diagnosis(subject, False, str(error) if isinstance(error, MstmmError) else text)
 
 
 def _test_library(flags: Sequence[str], optional: Sequence[str]) -> str:
@@ -237,14 +231,9 @@ def _test_library(flags: Sequence[str], optional: Sequence[str]) -> str:
     )
     with tempfile.TemporaryDirectory(prefix="mstmm-doctor-") as folder:
         order = BuildOrder(
-            "trial",
-            "0" * 64,
-            lambda key: {"trial.c": text},
-            tuple(flags),
-            ("trial",),
-            "TMPDIR",
+            "trial", "0" * 64, lambda key: {"trial.c": text}, tuple(flags), ("trial",), "TMPDIR",
             optional=tuple(optional),
-        )
+        )  # fmt: skip
         built = get_or_build(Path(folder) / "trial", order, min(TIMEOUT, 60.0))
         largest_error = _trial_error(built.path)
     if not largest_error <= 1e-15:

@@ -16,7 +16,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mstmm import signal_handling
 from mstmm.errors import EnvironmentFailure, Interrupted, MstmmError
@@ -50,7 +50,8 @@ def run_and_exit(arguments: Sequence[str]) -> NoReturn:
 def run(arguments: Sequence[str]) -> int:
     """Run one command; return its exit code, with exceptions as messages on stderr or JSON."""
     try:
-        code = _run_command(list(arguments))
+        code = _command_group()(args=list(arguments), prog_name="mstmm", standalone_mode=False)
+        code = code if isinstance(code, int) else SUCCESS
         if (
             code == INTERRUPTED and signal_handling.interrupt_received()
         ):  # typer took it for an exit
@@ -75,18 +76,13 @@ def run(arguments: Sequence[str]) -> int:
 
 
 @cache
-def _command_group() -> Callable[..., object]:
+def _command_group() -> Callable[..., Any]:
     """Group of all commands with their options, built once per process."""
     from typer.main import get_command
 
     from .app import app
 
     return get_command(app)
-
-
-def _run_command(arguments: list[str]) -> int:
-    code = _command_group()(args=arguments, prog_name="mstmm", standalone_mode=False)
-    return code if isinstance(code, int) else SUCCESS
 
 
 def is_debugging() -> bool:

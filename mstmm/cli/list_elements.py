@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -40,13 +40,10 @@ def _hinge_section() -> Section:
     ]  # fmt: skip
     rows = [(e.name, e.title, _join_names(e.coordinates), ", ".join(e.parameters)) for e in entries]
     columns = ("hinge", "allowed motions", "coordinates q", "additional keys")
-    return Section("hinges", columns, rows, [_hinge_data(e) for e in entries])
-
-
-def _hinge_data(entry: Entry) -> dict[str, Any]:
-    data = entry.to_json()
-    data["keys"] = data.pop("parameters")
-    return data
+    data = [entry.to_json() for entry in entries]
+    for one in data:
+        one["keys"] = one.pop("parameters")
+    return Section("hinges", columns, rows, data)
 
 
 #: Parameters of the built-in body in a scene; its kernels use moments derived from these.
@@ -66,30 +63,34 @@ def _flexible_section() -> Section:
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.elastic import Elastic
 
-    return _key_section("flexible bodies", (("beam", Beam), ("elastic", Elastic)))
+    return _key_section("flexible bodies", {"beam": Beam, "elastic": Elastic})
 
 
 def _law_section() -> Section:
     from mstmm.scene.tables.law import Friction, Law, Limits, SpringLaw
 
-    owners = (
-        ("law", Law),
-        ("friction", Friction),
-        ("limits", Limits),
-        ("law of a spring", SpringLaw),
-    )
+    owners: dict[str, type[BaseModel]] = {
+        "law": Law, "friction": Friction, "limits": Limits, "law of a spring": SpringLaw,
+    }  # fmt: skip
     return _key_section("laws on coordinates", owners)
 
 
-def _key_section(title: str, owners: Sequence[tuple[str, type[BaseModel]]]) -> Section:
+def _key_section(title: str, owners: Mapping[str, type[BaseModel]]) -> Section:
     """Section of keys of tables of a scene, with their expected values."""
     rows = [
         (owner, key, str(entry.get("description") or "a table, see the scene format"))
-        for owner, model in owners
+        for owner, model in owners.items()
         for key, entry in model.model_json_schema()["properties"].items()
     ]
-    data = [dict(zip(("table", "key", "expected"), row, strict=True)) for row in rows]
-    return Section(title, ("table", "key", "expected"), rows, data)
+    columns = ("table", "key", "expected")
+    return _plain_section(title, columns, columns, rows)
+
+
+def _plain_section(
+    title: str, columns: tuple[str, ...], keys: tuple[str, ...], rows: Sequence[tuple[str, ...]]
+) -> Section:
+    """Section whose data are its rows, with keys for the columns."""
+    return Section(title, columns, rows, [dict(zip(keys, row, strict=True)) for row in rows])
 
 
 def _matrix_section() -> Section:
@@ -97,44 +98,40 @@ def _matrix_section() -> Section:
         (f"classical_{entry.name}", entry.title, "; ".join(entry.sources))
         for entry in builtin_entries("classical")
     ]
-    data = [dict(zip(("name", "title", "sources"), row, strict=True)) for row in rows]
-    return Section("classical transfer matrices", ("matrix", "description", "source"), rows, data)
+    columns, keys = ("matrix", "description", "source"), ("name", "title", "sources")
+    return _plain_section("classical transfer matrices", columns, keys, rows)
 
 
 def _sweep_section() -> Section:
     rows = [(f"sweep_{e.name}", e.title) for e in builtin_entries("sweep")]
-    data = [{"name": name, "title": title} for name, title in rows]
-    return Section("steps of the sweep", ("name", "description"), rows, data)
+    return _plain_section("steps of the sweep", ("name", "description"), ("name", "title"), rows)
 
 
 def _method_section() -> Section:
     from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get, names
     from mstmm.runtime.run import classical_run, sundials
 
-    rows, data = [], []
+    methods: list[tuple[str, int | None, str, str]] = []
     for name in names():
         method = get(name)
         steps = "adaptive or fixed" if method.adaptive else "fixed"
-        rows.append((name, str(method.order), steps, method.source))
-        data.append({"name": name, "order": method.order, "steps": steps, "source": method.source})
+        methods.append((name, method.order, steps, method.source))
     choice = f"{AUTO_EXPLICIT}, and rodas4p2 or rodas5p where stability limits its steps"
-    rows.append((AUTO, "", "adaptive", choice))
-    data.append({"name": AUTO, "order": None, "steps": "adaptive", "source": choice})
-    scipy = "scipy-NAME"
-    description = "solve_ivp of SciPy on the same kernels: RK23, RK45, DOP853, Radau, BDF or LSODA"
-    rows.append((scipy, "", "adaptive", description))
-    data.append({"name": scipy, "order": None, "steps": "adaptive", "source": "scipy.integrate"})
-    for name in sundials.METHODS:
-        description = "CVODE of SUNDIALS on the same kernels (extra stiff)"
-        rows.append((name, "", "adaptive", description))
-        data.append({"name": name, "order": None, "steps": "adaptive", "source": description})
+    methods += [(AUTO, None, "adaptive", choice), ("scipy-NAME", None, "adaptive", _SCIPY_TEXT)]
+    methods += ((name, None, "adaptive", _SUNDIALS_TEXT) for name in sundials.METHODS)
     for name, product in classical_run.METHODS.items():
         solution = "product of the matrices" if product else "Riccati on the matrices"
-        description = f"Rui, Wang, Zhang, ch. 7 and 8: absolute coordinates, {solution}"
-        rows.append((name, "2", "fixed", description))
-        data.append({"name": name, "order": 2, "steps": "fixed", "source": description})
-    columns = ("method", "order>", "steps", "source")
-    return Section("integration methods", columns, rows, data)
+        methods.append((name, 2, "fixed", f"{_CLASSICAL_TEXT}, {solution}"))
+    rows = [(name, str(order or ""), steps, source) for name, order, steps, source in methods]
+    data = [dict(zip(("name", "order", "steps", "source"), one, strict=True)) for one in methods]
+    for one in data:
+        one["source"] = "scipy.integrate" if one["source"] == _SCIPY_TEXT else one["source"]
+    return Section("integration methods", ("method", "order>", "steps", "source"), rows, data)
+
+
+_SCIPY_TEXT = "solve_ivp of SciPy on the same kernels: RK23, RK45, DOP853, Radau, BDF or LSODA"
+_SUNDIALS_TEXT = "CVODE of SUNDIALS on the same kernels (extra stiff)"
+_CLASSICAL_TEXT = "Rui, Wang, Zhang, ch. 7 and 8: absolute coordinates"
 
 
 def _user_section() -> Section:
@@ -156,13 +153,11 @@ def _installed_section() -> Section:
 
     from mstmm.ir.element_spec import ENTRY_POINTS
 
-    entry_points_found = sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name)
-    rows = [
-        (e.name, e.dist.name if e.dist is not None else "", e.value) for e in entry_points_found
-    ]
-    data = [dict(zip(("name", "package", "where"), row, strict=True)) for row in rows]
+    found = sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name)
+    rows = [(e.name, e.dist.name if e.dist is not None else "", e.value) for e in found]
     title = "elements of installed packages; to use them: mstmm generate --installed"
-    return Section(title, ("name", "package", "where"), rows, data)
+    columns = ("name", "package", "where")
+    return _plain_section(title, columns, columns, rows)
 
 
 def _join_names(names: tuple[str, ...]) -> str:
@@ -183,13 +178,6 @@ SECTIONS: dict[str, Callable[[], Section]] = {
 }
 
 
-def _select_parts(parts: Sequence[str]) -> list[str]:
-    for part in parts:
-        if part not in SECTIONS:
-            raise typer.BadParameter(f"{quote(part)}: expected {', '.join(SECTIONS)}")
-    return list(dict.fromkeys(parts)) or list(SECTIONS)
-
-
 def list_elements(
     parts: Annotated[
         list[str] | None,
@@ -198,7 +186,10 @@ def list_elements(
     json: Json = False,
 ) -> None:
     """List hinges, bodies, forces, laws, transfer matrices, methods and user elements."""
-    sections = {part: SECTIONS[part]() for part in _select_parts(parts or [])}
+    for part in parts or ():
+        if part not in SECTIONS:
+            raise typer.BadParameter(f"{quote(part)}: expected {', '.join(SECTIONS)}")
+    sections = {part: SECTIONS[part]() for part in dict.fromkeys(parts or SECTIONS)}
     if json:
         print_json({part: section.data for part, section in sections.items()})
         return

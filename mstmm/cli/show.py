@@ -129,10 +129,8 @@ def _element_views(element: str, at: str) -> list[ElementView]:
     full_name = f"{kind}_{name}"
     if name not in (entry.name for entry in stored_elements.builtin_entries(kind)):
         return [_view_from_store(kind, name, at)]
-    kernels, source = (
-        stored_elements.generated_text(full_name, ".json"),
-        stored_elements.generated_text(full_name, ".c"),
-    )
+    kernels = stored_elements.generated_text(full_name, ".json")
+    source = stored_elements.generated_text(full_name, ".c")
     if kernels is None or at not in ("ir", "c"):
         return [views.element_view(full_name)]
     if at == "c" and source is None:
@@ -142,9 +140,8 @@ def _element_views(element: str, at: str) -> list[ElementView]:
         )
     from mstmm.ir.element_spec import element_from_json
 
-    return [
-        _view_from_spec(element_from_json(kernels), source or "")
-    ]  # without deriving them again
+    # Without deriving them again.
+    return [_view_from_spec(element_from_json(kernels), source or "")]
 
 
 def _view_from_file(file: Path, kind: str, name: str) -> ElementView:
@@ -174,12 +171,6 @@ def _view_from_spec(spec: ElementSpec, source: str) -> ElementView:
     from mstmm.derive.show.symbol_names import spec_names
 
     return ElementView(
-        f"{spec.kind}_{spec.name}",
-        spec.title,
-        (),
-        lambda: spec.kernels,
-        lambda: source,
-        spec.sources,
-        spec_names(spec),
-        spec.kind in ("hinge", "body", "force"),
-    )
+        f"{spec.kind}_{spec.name}", spec.title, (), lambda: spec.kernels, lambda: source,
+        spec.sources, spec_names(spec), spec.kind in ("hinge", "body", "force"),
+    )  # fmt: skip

@@ -20,7 +20,6 @@ from mstmm.errors import (
     RiskRefused,
     SceneError,
 )
-from mstmm.runtime.experiments.run_request import Execution
 
 from . import run_summary
 from .model_loading import compile_file, generate_elements, load_method
@@ -103,6 +102,8 @@ def _simulate_plan(
     plan: RunOptions, model: Model, progress: ProgressBar
 ) -> tuple[Result, RiskRefused | None]:
     """Simulate; returns the result, and the exception of --on-risk refuse, if any."""
+    from mstmm.runtime.experiments.run_request import Execution
+
     if plan.resume and not plan.checkpoint.is_file():
         raise MstmmError(
             f"--resume: there is no checkpoint {plan.checkpoint}; it is written to the folder of "

@@ -69,10 +69,7 @@ def _list_cases(wanted: list[str] | None, json: bool) -> None:
         ]
         print_json({"cases": rows})
         return
-    lines = [
-        (definition.name, definition.title, definition.parameter, definition.remedy.name)
-        for definition in definitions
-    ]
+    lines = [(case.name, case.title, case.parameter, case.remedy.name) for case in definitions]
     table_console().print(build_table("", ("case", "what", "parameter", "remedy"), lines))
 
 
@@ -93,14 +90,8 @@ def _print_atlas(atlas: Atlas) -> None:
 
     columns = ("case", "parameter", "fails", "limit>", "remedy", "holds to>")
     rows = [
-        (
-            case.name,
-            parameter_with_unit(case),
-            frontier_text(case),
-            limit_text(case),
-            case.remedy,
-            remedy_range(case),
-        )
+        (case.name, parameter_with_unit(case), frontier_text(case), limit_text(case), case.remedy,
+         remedy_range(case))
         for case in atlas.cases
-    ]
+    ]  # fmt: skip
     table_console().print(build_table("", columns, rows))

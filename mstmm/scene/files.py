@@ -99,9 +99,8 @@ def _read_bytes(path: Path, where: str, limits: Mapping[str, int]) -> bytes:
         with path.open("rb") as file:
             return file.read(limit * 2**20 + 1)
     except FileNotFoundError:
-        raise SceneError(
-            f"{where}: there is no such file{_similar_file_hint(path, limits)}"
-        ) from None
+        hint = _similar_file_hint(path, limits)
+        raise SceneError(f"{where}: there is no such file{hint}") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SceneError(f"{where}: cannot be read: {reason}") from None
@@ -217,16 +216,11 @@ def _toml_value(value: Any, evaluated: bool) -> str:
     if isinstance(value, str):
         return _toml_string(value)
     if isinstance(value, dict):
-        entries_text = ", ".join(
-            f"{k} = {_toml_value(v, evaluated)}" for k, v in value.items() if _is_written(v)
-        )
+        # TOML has no null, and an empty list is always the default.
+        written = {k: v for k, v in value.items() if v is not None and v != ()}
+        entries_text = ", ".join(f"{k} = {_toml_value(v, evaluated)}" for k, v in written.items())
         return "{ " + entries_text + " }" if entries_text else "{}"
     return "[" + ", ".join(_toml_value(v, evaluated) for v in value) + "]"
-
-
-def _is_written(value: Any) -> bool:
-    """Whether a value is written: TOML has no null, and an empty list is always the default."""
-    return value is not None and value != ()
 
 
 def _toml_string(text: str) -> str:

@@ -60,13 +60,9 @@ def read_mjcf(path: str, where: str, places: Locations | None = None) -> Robot:
     try:
         model = mujoco.MjModel.from_xml_path(path)
     except (ValueError, OSError, RuntimeError, MemoryError) as error:
-        error_text = " ".join(str(error).split())
-        error_text = (
-            error_text
-            if len(error_text) <= _MAX_QUOTED_LENGTH
-            else f"{error_text[:_MAX_QUOTED_LENGTH]}..."
-        )
-        raise SceneError(f"{where}: MuJoCo cannot read the file: {error_text}") from None
+        text = " ".join(str(error).split())
+        text = text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}..."
+        raise SceneError(f"{where}: MuJoCo cannot read the file: {text}") from None
     return _MjcfReader(mujoco, model, where, places or {}).robot()
 
 
@@ -110,10 +106,8 @@ class _MjcfReader:
         )
 
     def _name(self, kind: str, number: int) -> str:
-        element_name = self._mujoco.mj_id2name(
-            self._m, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), number
-        )
-        return element_name or f"{kind}{number}"
+        object_type = getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return self._mujoco.mj_id2name(self._m, object_type, number) or f"{kind}{number}"
 
     def _link_of(self, body: int) -> str:
         return "world" if body == 0 else self._name("body", body)
@@ -134,18 +128,14 @@ class _MjcfReader:
             yield self._mass(body, name), weld_joint
             return
         if count > 1:
-            note_text = (
-                f"its {count} joints are hinges in series, with massless bodies between them"
-            )
-            self._add_note(f"body {name!r}", note_text, self._location_of("body", name))
+            text = f"its {count} joints are hinges in series, with massless bodies between them"
+            self._add_note(f"body {name!r}", text, self._location_of("body", name))
         for number in range(first_joint, first_joint + count):
             joint_type, is_last = int(m.jnt_type[number]), number == first_joint + count - 1
-            joint_anchor = ZERO if joint_type == _FREE else _vector(m.jnt_pos[number])
-            joint_pose = (
-                IDENTITY_POSE
-                if joint_type == _FREE
-                else pose.compose(Pose(_subtract(joint_anchor, previous_anchor)))
-            )
+            joint_anchor, joint_pose = ZERO, IDENTITY_POSE
+            if joint_type != _FREE:
+                joint_anchor = _vector(m.jnt_pos[number])
+                joint_pose = pose.compose(Pose(_subtract(joint_anchor, previous_anchor)))
             joint = self._name("joint", number)
             link_name = name if is_last else f"{name}/{joint}"
             joint_pose = joint_pose.compose(self._zero_pose(number, joint_type))
@@ -153,11 +143,8 @@ class _MjcfReader:
                 self._frame[body] = Pose(_subtract(ZERO, joint_anchor))
             where = self._location_of("joint", joint, "freejoint")
             link = self._mass(body, link_name) if is_last else Link(link_name, where=where)
-            keys = self._keys(number, joint_type, joint, where)
-            yield (
-                link,
-                Joint(joint, _HINGES[joint_type], holder, link_name, joint_pose, keys, where),
-            )
+            keys, hinge = self._keys(number, joint_type, joint, where), _HINGES[joint_type]
+            yield link, Joint(joint, hinge, holder, link_name, joint_pose, keys, where)
             holder, pose, previous_anchor = link_name, IDENTITY_POSE, joint_anchor
         if any(previous_anchor):
             frame, at_body = f"{name}/frame", self._location_of("body", name)
@@ -194,11 +181,8 @@ class _MjcfReader:
         return Pose(rotation=rotation_about(axis, -reference))
 
     def _keys(self, number: int, kind: int, joint: str, where: str) -> dict[str, Any]:
-        m, dof, first_value = (
-            self._m,
-            int(self._m.jnt_dofadr[number]),
-            int(self._m.jnt_qposadr[number]),
-        )
+        m = self._m
+        dof, first_value = int(m.jnt_dofadr[number]), int(m.jnt_qposadr[number])
         dof_end, value_end = dof + (6, 3, 1, 1)[kind], first_value + (7, 4, 1, 1)[kind]
         law: dict[str, Any] = {}
         for key, numbers in (("damping", m.dof_damping), ("inertia", m.dof_armature)):
@@ -213,9 +197,8 @@ class _MjcfReader:
             if kind == _FREE:
                 text = "its friction acts along the axes of the body, in MuJoCo along world axes"
                 self._add_note(f"joint {joint!r}", text, where)
-        stiffness = (
-            0.0 if self._is_switched_off("spring") else float(m.jnt_stiffness[number].flat[0])
-        )
+        has_spring = not self._is_switched_off("spring")
+        stiffness = float(m.jnt_stiffness[number].flat[0]) if has_spring else 0.0
         if stiffness and kind in (_FREE, _BALL):
             text = "its spring is left out; define it in the law of the hinge"
             self._add_note(f"joint {joint!r}", text, where)
@@ -243,10 +226,8 @@ class _MjcfReader:
 
     def _note_nonlinear_terms(self, number: int, dof: int, joint: str, where: str) -> None:
         """Add notes about nonlinear terms of springs and dampers, where MuJoCo has them."""
-        for feature, key, index in (
-            ("spring", "jnt_stiffness", number),
-            ("damper", "dof_damping", dof),
-        ):
+        features = (("spring", "jnt_stiffness", number), ("damper", "dof_damping", dof))
+        for feature, key, index in features:
             terms = getattr(self._m, f"{key}poly", None)
             if terms is not None and terms[index].any() and not self._is_switched_off(feature):
                 text = f"the nonlinear terms of its {feature} are left out"
@@ -264,17 +245,11 @@ class _MjcfReader:
             if m.eq_type[number] != _JOINT_EQUALITY or second_joint < 0 or any(coefficients[2:]):
                 self._leave_equality(number)
                 continue
-            first_value, second_value = (
-                float(m.qpos0[m.jnt_qposadr[joint_number]])
-                for joint_number in (first_joint, second_joint)
-            )
+            joints = (first_joint, second_joint)
+            first_value, second_value = (float(m.qpos0[m.jnt_qposadr[one]]) for one in joints)
             offset = first_value + coefficients[0] - coefficients[1] * second_value
-            yield Mimic(
-                self._name("joint", first_joint),
-                self._name("joint", second_joint),
-                coefficients[1],
-                offset,
-            )
+            follower, leader = (self._name("joint", one) for one in joints)
+            yield Mimic(follower, leader, coefficients[1], offset)
 
     def _leave_equality(self, number: int, what: str = "left out") -> None:
         name, type_enum = self._name("equality", number), self._mujoco.mjtEq
@@ -286,14 +261,11 @@ class _MjcfReader:
     def _visuals(self) -> Iterator[Visual]:
         m, geom_types, undrawn_count = self._m, self._mujoco.mjtGeom, 0
         for number in range(m.ngeom):
-            if (
-                m.geom_group[number] >= _DRAWN_GROUP_COUNT
-                or m.geom_type[number] == geom_types.mjGEOM_PLANE
-            ):
+            is_plane = m.geom_type[number] == geom_types.mjGEOM_PLANE
+            if is_plane or m.geom_group[number] >= _DRAWN_GROUP_COUNT:
                 continue
-            keys = _shape_keys(
-                geom_types, int(m.geom_type[number]), [float(x) for x in m.geom_size[number]]
-            )
+            size = [float(x) for x in m.geom_size[number]]
+            keys = _shape_keys(geom_types, int(m.geom_type[number]), size)
             if keys is None:
                 undrawn_count += 1
                 continue
@@ -302,9 +274,8 @@ class _MjcfReader:
             keys["color"] = color(m.geom_rgba[number][:3])
             yield Visual(self._link_of(body), self._frame[body].compose(geom_pose), keys)
         if undrawn_count:
-            self._add_note(
-                "geom", f"{undrawn_count} of them are not drawn (meshes, ellipsoids, heights)"
-            )
+            text = f"{undrawn_count} of them are not drawn (meshes, ellipsoids, heights)"
+            self._add_note("geom", text)
 
     def _note_omissions(self) -> None:
         m = self._m
@@ -314,9 +285,8 @@ class _MjcfReader:
         for description, (key, section) in _NAMED_UNSUPPORTED.items():
             for number in range(int(getattr(m, key, 0))):
                 name = self._name(description, number)
-                self._add_note(
-                    f"{description} {name!r}", "left out", self._location_of(section, name)
-                )
+                where = self._location_of(section, name)
+                self._add_note(f"{description} {name!r}", "left out", where)
         if m.ngeom and (m.geom_contype.any() or m.geom_conaffinity.any()):
             self._add_note("contacts", "left out: bodies pass through each other and the ground")
         if m.body_gravcomp.any():

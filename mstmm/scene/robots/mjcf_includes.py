@@ -53,9 +53,7 @@ def check_included_files(content: bytes, path: Path, where: str) -> Locations:
                     f"{element.where}: <{element.tag}>: the model has more than "
                     f"{_MAX_ELEMENT_COUNT} elements including copies; leave some out"
                 )
-            folders.update(
-                element.attributes[key] for key in _FOLDER_KEYS if key in element.attributes
-            )
+            folders.update(element.attributes.get(key, "") for key in _FOLDER_KEYS)
             if element.tag not in _INCLUDING_TAGS:
                 asset_elements.append((element, path.parent))
             if name := element.attributes.get("name"):
@@ -91,12 +89,9 @@ def _check_assets(one: Element, folder: Path, beside: Path, folders: Collection[
 
 
 def _referenced_files(
-    one: Element,
-    folder: Path,
-    beside: Path,
-    key: str = "file",
+    one: Element, folder: Path, beside: Path, key: str = "file",
     folders: Collection[str] | None = None,
-) -> Iterator[Path]:
+) -> Iterator[Path]:  # fmt: skip
     """Existing files that an element may refer to, in the folder of the model or its file.
 
     MuJoCo reads a backslash as a slash, and may ignore folders.
@@ -113,11 +108,8 @@ def _referenced_files(
         for candidate_name in sorted(names):
             try:
                 referenced_file = (start / candidate_name).resolve()
-                mode = (
-                    referenced_file.stat().st_mode
-                    if referenced_file.is_relative_to(folder)
-                    else None
-                )
+                is_inside = referenced_file.is_relative_to(folder)
+                mode = referenced_file.stat().st_mode if is_inside else None
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except (OSError, RuntimeError, ValueError) as error:  # long names, cyclic links

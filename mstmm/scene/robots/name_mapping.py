@@ -31,8 +31,10 @@ class NameRegistry:
         """
         file_names, scene_names = list(names), dict[str, str]()
         for keep_valid in (True, False):
-            selected_names = [name for name in file_names if _is_valid_name(name) == keep_valid]
-            scene_names |= {name: self.register(name, instead) for name in selected_names}
+            for name in file_names:
+                is_valid = bool(_VALID_NAME.fullmatch(name)) and name != GROUND
+                if is_valid == keep_valid:
+                    scene_names[name] = self.register(name, instead)
             self._used_names.update(others)
         return {name: scene_names[name] for name in file_names}
 
@@ -52,10 +54,6 @@ class NameRegistry:
         return unique_name
 
 
-def _is_valid_name(name: str) -> bool:
-    return bool(_VALID_NAME.fullmatch(name)) and name != GROUND
-
-
 def reference_names(
     links: Mapping[str, str], joints: Mapping[str, str], references: Container[str]
 ) -> dict[str, dict[str, str]]:
@@ -64,20 +62,16 @@ def reference_names(
     Where several links are one body, the first of them is the name of the body.  `references` are
     the bodies and ends of the scene.
     """
-    shared_references = {
-        scene_name for scene_name, count in Counter(links.values()).items() if count > 1
-    }
+    counts = Counter(links.values())
     bodies = {
-        name: scene_name
-        for name, scene_name in links.items()
+        name: scene_name for name, scene_name in links.items()
         if is_external_name(name)
-        and (scene_name in shared_references if name == scene_name else name not in references)
-    }
+        and (counts[scene_name] > 1 if name == scene_name else name not in references)
+    }  # fmt: skip
     hinges = {
-        name: scene_name
-        for name, scene_name in joints.items()
+        name: scene_name for name, scene_name in joints.items()
         if is_external_name(name) and name != scene_name
-    }
+    }  # fmt: skip
     tables = {"body": bodies, "hinge": hinges}
     return {table: name_table for table, name_table in tables.items() if name_table}
 
@@ -113,9 +107,7 @@ class MeshFinder:
 
     def _package(self, name: str) -> str | None:
         if name not in self._packages:
-            candidates = (
-                os.path.join(parent_folder, name)
-                for parent_folder in (self.folder, *self.folder.parents)
-            )
+            folders = (self.folder, *self.folder.parents)
+            candidates = (os.path.join(folder, name) for folder in folders)
             self._packages[name] = next(filter(os.path.isdir, candidates), None)
         return self._packages[name]

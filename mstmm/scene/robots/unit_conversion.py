@@ -84,9 +84,7 @@ def _convert_joint(joint: Joint, units: Units) -> Joint:
     keys, facts = dict(joint.keys), builtin_hinges()[joint.type]
     if law := keys.get("law"):
         powers = tuple(int(speed.unit == "m/s") for speed in facts.speeds)
-        keys["law"] = {
-            key: _convert_law_entry(key, law_entry, powers, units) for key, law_entry in law.items()
-        }
+        keys["law"] = {key: _convert_law_entry(key, x, powers, units) for key, x in law.items()}
     if "rated" in keys:
         length_factor = units.length ** int(facts.speeds[0].unit == "m/s")
         effort = units.mass * units.length**2 / length_factor
@@ -105,10 +103,8 @@ def _convert_law_entry(key: str, given: Any, powers: tuple[int, ...], units: Uni
     """Convert an entry of a law: a number, a table, or a list of these by speed."""
     if isinstance(given, list):
         speed_powers = powers if len(powers) == len(given) else powers[:1] * len(given)
-        return [
-            _convert_law_entry(key, entry, (power,), units)
-            for entry, power in zip(given, speed_powers, strict=True)
-        ]
+        pairs = zip(given, speed_powers, strict=True)
+        return [_convert_law_entry(key, entry, (power,), units) for entry, power in pairs]
     power = powers[0]
     if isinstance(given, Mapping):
         length_factor = units.length**power
@@ -119,12 +115,8 @@ def _convert_law_entry(key: str, given: Any, powers: tuple[int, ...], units: Uni
 
 def _convert_mimic(mimic: Mimic, lengths: Mapping[str, float]) -> Mimic:
     """Convert a mimic relation; `lengths` are the factors of joints whose value is a length."""
-    own_factor, other_factor = lengths.get(mimic.follower, 1.0), lengths.get(mimic.leader, 1.0)
-    return replace(
-        mimic,
-        multiplier=mimic.multiplier * own_factor / other_factor,
-        offset=mimic.offset * own_factor,
-    )
+    own, other = lengths.get(mimic.follower, 1.0), lengths.get(mimic.leader, 1.0)
+    return replace(mimic, multiplier=mimic.multiplier * own / other, offset=mimic.offset * own)
 
 
 def _convert_visual(look: Visual, length: float) -> Visual:
@@ -162,9 +154,8 @@ def unit_notes(robot: Robot, tree: LinkTree) -> Iterator[ImportNote]:
         typical_radius = median(radius for _, radius in masses_and_radii)
         mass_ratio = median(mass / radius**3 for mass, radius in masses_and_radii)
         if reach > 0 and not _MIN_GYRATION_RATIO < typical_radius / reach < _MAX_GYRATION_RATIO:
-            evidence.append(
-                f"radii of gyration of {typical_radius:.3g} m with a reach of {reach:.3g} m"
-            )
+            radii = f"radii of gyration of {typical_radius:.3g} m"
+            evidence.append(f"{radii} with a reach of {reach:.3g} m")
         if not _MIN_MASS_RATIO < mass_ratio < _MAX_MASS_RATIO:
             evidence.append(f"mass over radius of gyration cubed of {mass_ratio:.3g} kg/m^3")
     if evidence:
@@ -177,9 +168,9 @@ def _largest_reach(tree: LinkTree) -> float:
     path_lengths, longest = dict[str, float](), 0.0
     for link in tree.outward:
         joint = tree.holder.get(link.name)
-        parent_length = (
-            0.0 if joint is None else path_lengths[joint.parent] + math.hypot(*joint.pose.position)
-        )
-        path_lengths[link.name] = parent_length
-        longest = max(longest, parent_length + (math.hypot(*link.center) if link.mass > 0 else 0.0))
+        length = 0.0
+        if joint is not None:
+            length = path_lengths[joint.parent] + math.hypot(*joint.pose.position)
+        path_lengths[link.name] = length
+        longest = max(longest, length + (math.hypot(*link.center) if link.mass > 0 else 0.0))
     return longest

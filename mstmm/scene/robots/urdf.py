@@ -101,10 +101,8 @@ def read_urdf(content: bytes, where: str) -> Robot:
     reader = _UrdfReader(root)
     links = tuple(map(reader.link, root.children_with_tag("link")))
     joints = tuple(map(reader.joint, root.children_with_tag("joint")))
-    ignored_counts = Counter(
-        child.tag for child in root.children if child.tag not in _SUPPORTED_TAGS
-    )
-    for tag, count in ignored_counts.items():
+    tags = Counter(child.tag for child in root.children if child.tag not in _SUPPORTED_TAGS)
+    for tag, count in tags.items():
         reader.note(root, f"<{tag}>", f"left out, {count} of them" if count > 1 else "left out")
     name = root.attributes.get("name", "")
     return Robot(
@@ -134,20 +132,15 @@ class _UrdfReader:
             return
         unknown_keys = [key[:40] for key in one.attributes if key not in supported.attributes]
         if unknown_keys:
-            more_text = f" and {len(unknown_keys) - 6} more" if len(unknown_keys) > 6 else ""
-            note_text = (
-                f"unknown attributes of <{one.tag}> left out: "
-                f"{', '.join(unknown_keys[:6])}{more_text}"
-            )
-            self.note(one, owner, note_text)
+            more = f" and {len(unknown_keys) - 6} more" if len(unknown_keys) > 6 else ""
+            names = ", ".join(unknown_keys[:6])
+            self.note(one, owner, f"unknown attributes of <{one.tag}> left out: {names}{more}")
         for tag, count in Counter(child.tag for child in one.children).items():
             if tag not in (*supported.unique_tags, *supported.repeatable_tags):
                 self.note(one, owner, f"<{tag[:40]}> in <{one.tag}> left out")
             elif count > 1 and tag in supported.unique_tags:
-                note_text = (
-                    f"<{tag}> is given {count} times; the first applies, the others are left out"
-                )
-                self.note(one, owner, note_text)
+                text = f"<{tag}> is given {count} times; the first applies, the others are left out"
+                self.note(one, owner, text)
         for child in one.children:
             self._note_unread(child, owner)
 
@@ -195,9 +188,9 @@ class _UrdfReader:
         keys = dict[str, Any]()
         if joint_type.axis:
             axis = self._axis(one, name)
-            keys = {joint_type.axis: axis} | (
-                {} if joint_type.unit else {"axis2": perpendicular_vector(axis)}
-            )
+            keys[joint_type.axis] = axis
+            if not joint_type.unit:
+                keys["axis2"] = perpendicular_vector(axis)
         if joint_type.unit:
             keys |= self._law(one, name, joint_type.unit, limited=type_name != _UNLIMITED_TYPE)
         mimic = one.first_with_tag("mimic")
@@ -250,11 +243,7 @@ class _UrdfReader:
                     given_limits[key] = limit.number(key, 0.0, unit)
                 except SceneError:
                     unread_texts.append(f"{key} {abbreviate(limit.attributes[key])}")
-        ratings = {
-            key: number
-            for key, number in given_limits.items()
-            if number >= 0 and number != NO_LIMIT
-        }
+        ratings = {key: x for key, x in given_limits.items() if x >= 0 and x != NO_LIMIT}
         if ratings:
             note_text = "limits of effort and velocity have no effect; they are kept as rated"
             self.note(limit, f"joint {name!r}", note_text)
@@ -265,25 +254,15 @@ class _UrdfReader:
             self.note(limit, f"joint {name!r}", "limits of effort or velocity below 0 left out")
         return ratings
 
-    def _collect_visuals(self, one: Element, link: str) -> None:
+    def _collect_visuals(self, element: Element, link: str) -> None:
         """Collect the visuals of a link, or its collision shapes where none can be drawn."""
-        is_drawn = [
-            self._collect_visual(link, visual) for visual in one.children_with_tag("visual")
-        ]
-        if all(is_drawn):
+        drawn = [self._collect_visual(link, one) for one in element.children_with_tag("visual")]
+        if all(drawn):
             return
-        collision_drawn = (
-            []
-            if any(is_drawn)
-            else [
-                self._collect_visual(link, collision)
-                for collision in one.children_with_tag("collision")
-            ]
-        )
-        note_text = (
-            "drawn by its collision shapes" if any(collision_drawn) else "not all of it is drawn"
-        )
-        self.note(one, f"link {link!r}", note_text)
+        collisions = () if any(drawn) else element.children_with_tag("collision")
+        shapes = [self._collect_visual(link, collision) for collision in collisions]
+        text = "drawn by its collision shapes" if any(shapes) else "not all of it is drawn"
+        self.note(element, f"link {link!r}", text)
 
     def _collect_visual(self, link: str, visual: Element) -> bool:
         """Collect a visual; return whether it is drawn.
@@ -304,9 +283,8 @@ class _UrdfReader:
         if keys is None:
             return False
         if (material := visual.first_with_tag(_MATERIAL_TAG)) is not None:
-            colour = _material_colour(material) or self._colors.get(
-                material.attributes.get("name", "")
-            )
+            name = material.attributes.get("name", "")
+            colour = _material_colour(material) or self._colors.get(name)
             keys |= {"color": colour} if colour else {}
         self.visuals.append(Visual(link, _origin_pose(visual), keys))
         return True
@@ -359,12 +337,10 @@ def _mesh_keys(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] |
 
 
 def _material_colour(material: Element) -> str | None:
-    colour_element = material.first_with_tag("color")
-    return (
-        None
-        if colour_element is None
-        else color(colour_element.numbers("rgba", (0.5, 0.5, 0.5, 1.0), "0 to 1")[:3])
-    )
+    one = material.first_with_tag("color")
+    if one is None:
+        return None
+    return color(one.numbers("rgba", (0.5, 0.5, 0.5, 1.0), "0 to 1")[:3])
 
 
 # --- writer ---------------------------------------------------------------------------------------
@@ -377,9 +353,8 @@ def as_urdf(robot: Robot) -> str:
     for visual in robot.visuals:
         visuals_by_link.setdefault(visual.link, []).append(visual)
     for link in robot.links:
-        _fill_link(
-            SubElement(root, "link", name=link.name), link, visuals_by_link.get(link.name, ())
-        )
+        element = SubElement(root, "link", name=link.name)
+        _fill_link(element, link, visuals_by_link.get(link.name, ()))
     mimics = {mimic.follower: mimic for mimic in robot.mimics}
     for joint in robot.joints:
         _add_joint(root, joint, mimics.get(joint.name))
@@ -394,9 +369,8 @@ def _numbers_text(values: Iterable[float]) -> str:
 def _add_origin(parent: ElementTree.Element, pose: Pose) -> None:
     if pose == IDENTITY_POSE:
         return
-    SubElement(
-        parent, "origin", xyz=_numbers_text(pose.position), rpy=_numbers_text(to_rpy(pose.rotation))
-    )
+    xyz, rpy = _numbers_text(pose.position), _numbers_text(to_rpy(pose.rotation))
+    SubElement(parent, "origin", xyz=xyz, rpy=rpy)
 
 
 def _fill_link(one: ElementTree.Element, link: Link, looks: Iterable[Visual]) -> None:
@@ -434,9 +408,9 @@ def _add_joint(root: ElementTree.Element, joint: Joint, mimic: Mimic | None) -> 
     joint_type, law = JOINT_TYPES_BY_HINGE[joint.type], joint.keys.get("law", {})
     limits = joint.keys.get("rated", {})
     range_keys = {"lower", "upper"} & limits.keys()
-    urdf_type = (
-        LIMITED_TYPES.get(joint_type.joint, joint_type.joint) if range_keys else joint_type.joint
-    )
+    urdf_type = joint_type.joint
+    if range_keys:
+        urdf_type = LIMITED_TYPES.get(urdf_type, urdf_type)
     element = SubElement(root, "joint", name=joint.name, type=urdf_type)
     _add_origin(element, joint.pose)
     SubElement(element, "parent", link=joint.parent)

@@ -200,13 +200,10 @@ class Members(Sequence[T], Generic[T]):
         table_index = self._index.get(name)
         if table_index is not None or not self.chains or not name.endswith(self.behind):
             return table_index
-        chain_position = self.place(name.removesuffix(self.behind) if self.behind else name)
-        if (
-            chain_position is None
-            or not 0 <= chain_position[1] < self.chains[chain_position[0]].count
-        ):
+        found = self.place(name.removesuffix(self.behind))
+        if found is None or not 0 <= found[1] < self.chains[found[0]].count:
             return None
-        return self.starts[chain_position[0]] + chain_position[1]
+        return self.starts[found[0]] + found[1]
 
     def place(self, name: str) -> tuple[int, int] | None:
         """Chain and k of the name "rope[k]" of an existing chain; k may exceed its length."""
@@ -223,7 +220,7 @@ class Members(Sequence[T], Generic[T]):
     def missing(self, name: str, shown: str = "") -> str:
         """Message about a missing name, with a suggestion; `shown` is the name in quotes."""
         shown = shown or f'"{name}"'
-        member_name = name.removesuffix(self.behind) if self.behind else name
+        member_name = name.removesuffix(self.behind)
         chain_position = self.place(member_name)
         owner = member_name.partition("[")[0].partition(".")[0]
         if chain_position is None and owner in self._chain:
@@ -231,13 +228,8 @@ class Members(Sequence[T], Generic[T]):
         if chain_position is None:
             return f"there is no {self.word} {shown}{did_you_mean(name, self.names())}"
         chain = self.chains[chain_position[0]]
-        first_member, last_member = (
-            f"{chain.name}[{k}]{self.behind}" for k in (0, chain.count - 1)
-        )
-        return (
-            f'there is no {self.word} {shown}; the chain "{chain.name}" has {first_member} to '
-            f"{last_member}"
-        )
+        first, last = (f"{chain.name}[{k}]{self.behind}" for k in (0, chain.count - 1))
+        return f'there is no {self.word} {shown}; the chain "{chain.name}" has {first} to {last}'
 
     def names(self) -> Iterator[str]:
         """Yield all names in order."""
