@@ -236,6 +236,19 @@ def test_a_folder_is_seen_at_one_glance(room: str) -> None:
     assert not {folder: count for folder, count in flat.items() if count > 23}
 
 
+@pytest.mark.parametrize("room", ["mstmm", "derive", "runtime"])
+def test_a_function_is_seen_at_one_glance(room: str) -> None:
+    """At most 60 lines, signature and docstring included."""
+    long = [
+        f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
+        for path in python_files(room)
+        for node in nodes(path)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (node.end_lineno or 0) - node.lineno >= 60
+    ]
+    assert not long
+
+
 def test_private_names_stay_in_their_module() -> None:
     taken = [
         (path.name, name)

@@ -216,53 +216,54 @@ def condense(
     identically and are not computed, and the same rows of e_Q are the efforts tau.
     """
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
-    gain, offset = gains(nu)
-    equations: list[Equation] = []
-    specialised = subspace is not None
-    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
-    h: sp.Basic = sp.ImmutableDenseMatrix(subspace) if specialised else h_given.symbol
     reduced, load = symbol("S_Q", 6, 6), symbol("e_Q", 6)
-    if nu:
-        push, pivot = symbol("U", 6, nu), symbol("D", nu, nu)
-        inertia = h.T * push
-        if not specialised:
-            inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
-        units = unit_directions(subspace) if specialised else {}
-        zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
-        inboard_load = E.symbol + push * offset.symbol
-        equations = [
-            Equation("U = S H", push, S.symbol * h),
-            Equation("D = H^T U + J", pivot, inertia),
-            Equation("G = D^-1 U^T", gain.symbol, Solve(pivot, push.T, symmetric=True)),
-            Equation(
-                "g = D^-1 (tau - H^T e)",
-                offset.symbol,
-                Solve(pivot, tau.symbol - h.T * E.symbol, symmetric=True),
-            ),
-            Equation(
-                "S_Q = S - U G", reduced, S.symbol - push * gain.symbol, zeros=zeros, symmetric=True
-            ),
-            Equation("e_Q = e + U g", symbol("e_full", 6), inboard_load),
-            Equation("e_Q", load, replace_rows(symbol("e_full", 6), tau.symbol, units)),
-        ]
-    else:
+    if not nu:
         equations = [Equation("S_Q = S", reduced, S.symbol), Equation("e_Q = e", load, E.symbol)]
+    elif subspace is None:
+        equations = _elimination(tau, h.symbol, {}, rotor.symbol)
+    else:
+        explicit = sp.ImmutableDenseMatrix(subspace)
+        equations = _elimination(tau, explicit, unit_directions(subspace), None)
     steps, transported = congruence("S_Q")
-    equations += [
-        *steps,
-        Equation("X^T S_Q X", PARENT_S.symbol, transported),
-        Equation("X^T e_Q", PARENT_E.symbol, transport(load)),
-    ]
-    extra_inputs = inputs if specialised else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
         f"S and e carried across a hinge with {free_speeds(nu)}",
-        (R, SHIFT, *extra_inputs, FLOOR, S, E, tau),
-        (gain, offset, PARENT_S, PARENT_E),
-        tuple(equations),
+        (R, SHIFT, *((h, rotor) if subspace is None else inputs), FLOOR, S, E, tau),
+        (*gains(nu), PARENT_S, PARENT_E),
+        (
+            *equations,
+            *steps,
+            Equation("X^T S_Q X", PARENT_S.symbol, transported),
+            Equation("X^T e_Q", PARENT_E.symbol, transport(load)),
+        ),
         sources=SOURCES,
     )
+
+
+def _elimination(
+    tau: Quantity, h: sp.Basic, units: dict[int, int], rotor: sp.MatrixSymbol | None
+) -> list[Equation]:
+    """G, g, S_Q and e_Q; `units` are the unit directions {row: column} of an explicit H."""
+    nu = tau.symbol.rows
+    gain, offset = (one.symbol for one in gains(nu))
+    push, pivot = symbol("U", 6, nu), symbol("D", nu, nu)
+    inertia = h.T * push
+    if rotor is not None:
+        inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor)))
+    right_side = tau.symbol - h.T * E.symbol
+    reduced, load, full_load = symbol("S_Q", 6, 6), symbol("e_Q", 6), symbol("e_full", 6)
+    zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
+    return [
+        Equation("U = S H", push, S.symbol * h),
+        Equation("D = H^T U + J", pivot, inertia),
+        Equation("G = D^-1 U^T", gain, Solve(pivot, push.T, symmetric=True)),
+        Equation("g = D^-1 (tau - H^T e)", offset, Solve(pivot, right_side, symmetric=True)),
+        Equation("S_Q = S - U G", reduced, S.symbol - push * gain, zeros=zeros, symmetric=True),
+        Equation("e_Q = e + U g", full_load, E.symbol + push * offset),
+        Equation("e_Q", load, replace_rows(full_load, tau.symbol, units)),
+    ]
 
 
 def replace_rows(

@@ -1,4 +1,16 @@
-"""TODO"""
+"""A rigid body outboard of a hinge that rotates about a point: four kernels.
+
+The link of a ball hinge.  Its speeds are given in the body's axes, so these cannot be chosen, and
+the transformation from the parent is a general rotation and position, Rt and ro of `riccati_sweep`:
+
+    turn       rotation to the parent, from the coordinates
+    forward    bias motion of the body and the load that it requires
+    condense   own inertia and outboard bodies; elimination; transport to the parent
+    recover    accelerations
+
+Ports have the names and meanings of `axial_links`: `turn` is the part of the transformation that
+depends on the coordinates, and G and g hold the factors of `ldl_elimination` for back-substitution.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""TODO"""
+"""Kernels of bodies and force elements: mass matrix, inertia force, energy, wrench."""
 
 from __future__ import annotations
 
@@ -185,6 +185,11 @@ def _velocity_equations(
 #: Failure code of a force element whose direction is undefined (`domain`).
 UNDEFINED = 2
 
+FORCE = Quantity(vector("F", 3), "N", "force on T at its point, inertial axes")
+MOMENT = Quantity(vector("M", 3), "N*m", "moment on T, inertial axes")
+STORED = Quantity(vector("V", 1), "J", "stored energy")
+POWER = Quantity(vector("P", 1), "W", "power of non-conservative forces")
+
 
 def _matrix(name: str) -> sp.MatrixSymbol:
     return sp.MatrixSymbol(name, 3, 3)
@@ -217,7 +222,7 @@ def wrench(element: ForceElement) -> Derivation:
     p = Symbols("p", tuple(x.name for x in element.parameters))
     parameters = vector("p", len(p))
     effort, t = sp.Symbol("effort", real=True), sp.Symbol("t", real=True)
-    equations, arrays = relative_motion()
+    motion_equations, arrays = relative_motion()
     x, v, rotation, w = (_explicit(a) for a in arrays)
     force, moment = element.wrench(x, v, rotation, w, p, effort, t)
     beyond, rates = sp.Matrix([*force, *moment]), sp.Matrix([*v, *w])
@@ -236,13 +241,16 @@ def wrench(element: ForceElement) -> Derivation:
     def final(value: sp.Matrix) -> sp.ImmutableDenseMatrix:
         return sp.ImmutableDenseMatrix(value.xreplace(replace))
 
-    a_f, local = _matrix("A_F"), vector("f_local", 3)
-    turning = vector("m_local", 3)
-    outputs = (
-        Quantity(vector("F", 3), "N", "force on T at its point, inertial axes"),
-        Quantity(vector("M", 3), "N*m", "moment on T, inertial axes"),
-        Quantity(vector("V", 1), "J", "stored energy"),
-        Quantity(vector("P", 1), "W", "power of non-conservative forces"),
+    local, turning = vector("f_local", 3), vector("m_local", 3)
+    equations = (
+        *motion_equations,
+        *(Equation(step.name, step.left, final(step.right)) for step in steps),
+        Equation("force, F axes", local, final(load[:3, :])),
+        Equation("moment, F axes", turning, final(load[3:, :])),
+        Equation("force", FORCE.symbol, _matrix("A_F") * local),
+        Equation("moment", MOMENT.symbol, _matrix("A_F") * turning),
+        Equation("stored energy", STORED.symbol, final(sp.Matrix([energy]))),
+        Equation("power", POWER.symbol, final(sp.Matrix([lost]))),
     )
     return Derivation(
         element.name,
@@ -251,29 +259,22 @@ def wrench(element: ForceElement) -> Derivation:
             Quantity(parameters, "", describe_array("parameters", element.parameters)),
             Quantity(vector("t", 1), "s", "time"),
             Quantity(vector("effort", 1), "", "given effort"),
-            *(
-                Quantity(_matrix(f"A_{end}") if k == "A" else vector(f"{k}_{end}", 3), "", meaning)
-                for end in ("F", "T")
-                for k, meaning in (
-                    ("A", "rotation, end axes to inertial axes"),
-                    ("x", "position"),
-                    ("v", "velocity, inertial axes"),
-                    ("w", "angular velocity, inertial axes"),
-                )
-            ),
+            *_end_motion("F"),
+            *_end_motion("T"),
         ),
-        outputs,
-        (
-            *equations,
-            *(Equation(step.name, step.left, final(step.right)) for step in steps),
-            Equation("force, F axes", local, final(load[:3, :])),
-            Equation("moment, F axes", turning, final(load[3:, :])),
-            Equation("force", outputs[0].symbol, a_f * local),
-            Equation("moment", outputs[1].symbol, a_f * turning),
-            Equation("stored energy", outputs[2].symbol, final(sp.Matrix([energy]))),
-            Equation("power", outputs[3].symbol, final(sp.Matrix([lost]))),
-        ),
+        (FORCE, MOMENT, STORED, POWER),
+        equations,
         sources=element.sources,
+    )
+
+
+def _end_motion(end: str) -> tuple[Quantity, ...]:
+    """Motion of an end, F or T."""
+    return (
+        Quantity(_matrix(f"A_{end}"), "", "rotation, end axes to inertial axes"),
+        Quantity(vector(f"x_{end}", 3), "", "position"),
+        Quantity(vector(f"v_{end}", 3), "", "velocity, inertial axes"),
+        Quantity(vector(f"w_{end}", 3), "", "angular velocity, inertial axes"),
     )
 
 

@@ -1,4 +1,4 @@
-"""TODO"""
+"""Statement order of straight-line code, for latencies (short code) or registers (long code)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""TODO"""
+"""Regrouped sums of a straight-line kernel: shorter dependency chains.
+
+A sum written term by term is a chain of additions; its last term may be ready long before the chain
+reaches it.  Each maximal sum whose partial sums have no other reader is split and rebuilt with
+early terms first.  Values change by rounding only.  Sines and cosines are gathered in levels that
+can be computed together.
+"""
 
 from __future__ import annotations
 

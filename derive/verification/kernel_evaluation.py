@@ -173,73 +173,66 @@ class _BoundedArithmetic:
     """The operations of the IR on `BoundedValue` numbers."""
 
     def __init__(self) -> None:
-        self._exact = exact = PreciseArithmetic(_DIGITS)
-        operations = exact.operations
-
-        def call(name: str, *args: Any) -> Any:
-            return operations[name](*args)
-
-        def carried_error(slope: Slope, value: Any, a: BoundedValue) -> Any:
-            # An exact operand adds no error, even where the slope is unbounded.
-            try:
-                return a.error and abs(slope(call, value, (a.value,), (a.error,)))
-            except ZeroDivisionError:
-                return operations["div"](a.error, exact.number(0))
-
-        def smooth(name: str, slope: Slope) -> Callable[[BoundedValue], BoundedValue]:
-            def bounded_result(a: BoundedValue) -> BoundedValue:
-                value = operations[name](a.value)
-                return _round_value(value, carried_error(slope, value, a), 2)
-
-            return bounded_result
-
-        def divide(a: BoundedValue, b: BoundedValue) -> BoundedValue:
-            value = operations["div"](a.value, b.value)
-            return _round_value(
-                value, operations["div"](a.error + abs(value) * b.error, abs(b.value))
-            )
-
-        def power(a: BoundedValue, b: BoundedValue) -> BoundedValue:
-            value = operations["pow"](a.value, b.value)
-            propagated_error = (
-                a.error and abs(operations["div"](b.value * value, a.value)) * a.error
-            )
-            propagated_error += b.error and abs(operations["log"](a.value) * value) * b.error
-            return _round_value(value, propagated_error, 2)
-
-        def angle(a: BoundedValue, b: BoundedValue) -> BoundedValue:
-            propagated_error = abs(b.value) * a.error + abs(a.value) * b.error
-            propagated_error = propagated_error and propagated_error / (
-                a.value * a.value + b.value * b.value
-            )
-            return _round_value(operations["atan2"](a.value, b.value), propagated_error, 2)
-
-        def exactly(name: str) -> Callable[..., BoundedValue]:
-            return lambda *args: BoundedValue(
-                operations[name](*(a.value for a in args)), exact.number(0)
-            )
-
-        def choose(c: BoundedValue, a: BoundedValue, b: BoundedValue) -> BoundedValue:
-            return a if self.true(c) else b
-
+        self._exact = PreciseArithmetic(_DIGITS)
         rows = OPERATIONS.values()
         self.operations: dict[str, Callable[..., BoundedValue]] = {
-            **{r.name: exactly(r.name) for r in rows if r.slope is None},
+            **{r.name: self._exactly(r.name) for r in rows if r.slope is None},
             **{
-                r.name: smooth(r.name, r.slope) for r in rows if r.slope and r.is_c_library_function
+                r.name: self._smooth(r.name, r.slope)
+                for r in rows
+                if r.slope and r.is_c_library_function
             },
             "neg": lambda a: -a,
             "add": lambda a, b: a + b,
             "sub": lambda a, b: a - b,
             "mul": lambda a, b: a * b,
-            "div": divide,
-            "pow": power,
-            "atan2": angle,
+            "div": self._divide,
+            "pow": self._power,
+            "atan2": self._angle,
             "abs": abs,
             "min": lambda a, b: a if b > a else b,
             "max": lambda a, b: b if b > a else a,
-            "select": choose,
+            "select": lambda c, a, b: a if self.true(c) else b,
         }
+
+    def _value(self, name: str, *operands: Any) -> Any:
+        return self._exact.operations[name](*operands)
+
+    def _exactly(self, name: str) -> Callable[..., BoundedValue]:
+        return lambda *args: BoundedValue(
+            self._value(name, *(a.value for a in args)), self._exact.number(0)
+        )
+
+    def _smooth(self, name: str, slope: Slope) -> Callable[[BoundedValue], BoundedValue]:
+        def carried_error(value: Any, a: BoundedValue) -> Any:
+            # An exact operand adds no error, even where the slope is unbounded.
+            try:
+                return a.error and abs(slope(self._value, value, (a.value,), (a.error,)))
+            except ZeroDivisionError:
+                return self._value("div", a.error, self._exact.number(0))
+
+        def bounded_result(a: BoundedValue) -> BoundedValue:
+            value = self._value(name, a.value)
+            return _round_value(value, carried_error(value, a), 2)
+
+        return bounded_result
+
+    def _divide(self, a: BoundedValue, b: BoundedValue) -> BoundedValue:
+        value = self._value("div", a.value, b.value)
+        return _round_value(value, self._value("div", a.error + abs(value) * b.error, abs(b.value)))
+
+    def _power(self, a: BoundedValue, b: BoundedValue) -> BoundedValue:
+        value = self._value("pow", a.value, b.value)
+        base_slope = a.error and abs(self._value("div", b.value * value, a.value))
+        exponent_slope = b.error and abs(self._value("log", a.value) * value)
+        return _round_value(value, base_slope * a.error + exponent_slope * b.error, 2)
+
+    def _angle(self, a: BoundedValue, b: BoundedValue) -> BoundedValue:
+        propagated_error = abs(b.value) * a.error + abs(a.value) * b.error
+        propagated_error = propagated_error and propagated_error / (
+            a.value * a.value + b.value * b.value
+        )
+        return _round_value(self._value("atan2", a.value, b.value), propagated_error, 2)
 
     def number(self, value: Any) -> BoundedValue:
         exact = self._exact.number(value)

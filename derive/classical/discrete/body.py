@@ -47,8 +47,7 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
     lever, shift = vector("rho", shifts), sp.MatrixSymbol("rho_z", shifts, n)
     force, moment = sp.MatrixSymbol("Q_O", shifts, n), sp.MatrixSymbol("M_O", turns, n)
     q_p, impedance = vector("q_p", shifts), sp.MatrixSymbol("Z", size, size)
-    turn, last = row_block(step, shifts, turns), rows_of(state, "1")
-    end_equations = _end_equations(statement)
+    turn = row_block(step, shifts, turns)
     end_displacement = space.rotate(lever, turn)
     if modes:
         end_displacement = end_displacement + sp.MatrixSymbol("P", shifts, modes) * row_block(
@@ -60,14 +59,6 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
         - space.moment(lever, force)
         - space.change_moment(shift, q_p)
     )
-    blocks = [
-        [rows_of(state, "r") + shift + constant_rows(lever, state)],
-        [rows_of(state, space.angle)],
-        [moment],
-        [force],
-        *([[rows_of(state, "eta")]] if modes else []),
-        [last],
-    ]
     definitions = [
         Equation(
             "step from the predictor", step, _predictor_step(space, modes), "", "y - y_p = Y z_I"
@@ -75,11 +66,11 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
         Equation(
             "inertia and elasticity",
             balance,
-            impedance * step + vector("F", size) * last,
+            impedance * step + vector("F", size) * rows_of(state, "1"),
             "",
             "rows of the frame and of the modes on z_I",
         ),
-        *end_equations,
+        *_end_equations(statement),
         Equation("change of the output end", shift, end_displacement, "", "of r_O - r_I"),
         Equation(
             "force at the output end", force, rows_of(state, "q") - row_block(balance, 0, shifts)
@@ -88,13 +79,31 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
         Equation(
             "transfer matrix",
             sp.MatrixSymbol("U", n, n),
-            sp.BlockMatrix(blocks),
+            _transfer_matrix(statement, shift + constant_rows(lever, state), moment, force),
             statement.equation,
         ),
     ]
     if modes:
         definitions.append(_modal_row_equation(space, modes))
     return tuple(definitions)
+
+
+def _transfer_matrix(
+    statement: BodyStatement, displacement: sp.Basic, moment: sp.Basic, force: sp.Basic
+) -> sp.BlockMatrix:
+    """U from the rows of r_O - r_I and of the loads at the output end, all on z_I."""
+    space, state = statement.space, statement.space.state(statement.modes)
+    modal_rows = [[rows_of(state, "eta")]] if statement.modes else []
+    return sp.BlockMatrix(
+        [
+            [rows_of(state, "r") + displacement],
+            [rows_of(state, space.angle)],
+            [moment],
+            [force],
+            *modal_rows,
+            [rows_of(state, "1")],
+        ]
+    )
 
 
 def _predictor_step(space: Space, modes: int) -> Matrix:
