@@ -107,21 +107,8 @@ static int project_inside(mstmm_scene_run *run, real t, const real **y)
 static int scene_events(void *context, double t, const double *y, double *g)
 {
     mstmm_scene_run *run = context;
-    int code = project_inside(run, t, &y);
-    const real *u = y + run->model->nq;
-    mstmm_state state = {.model = run->model,
-                         .workspace = run->workspace,
-                         .t = t,
-                         .memory = run->memory,
-                         .observed = 1,
-                         .failure = &run->failure};
-    if (!code) code = mstmm_probes_seen(run, t, y, u);
-    if (code) return code;
-    const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
-    real *outputs[] = {g};
-    return mstmm_tape_run(run->event_tape, inputs, mstmm_slots(&state), outputs)
-               ? MSTMM_FAILED_EXPRESSION
-               : 0;
+    const int code = project_inside(run, t, &y);
+    return code ? code : mstmm_probes_tape(run, run->event_tape, t, y, g);
 }
 
 static int scene_fire(void *context, int event, double t, double *y)

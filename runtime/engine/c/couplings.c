@@ -27,7 +27,8 @@ int mstmm_hook_evaluate_couplings(mstmm_state *state)
         real *numbers = loops + one->numbers;
         numbers[MSTMM_COUPLING_GAP] -= one->kept;
         if (one->row < 0) continue;
-        loops[MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN] = numbers[known_number_index(state)];
+        mstmm_row_numbers(model, state->workspace, one->row)[MSTMM_ROW_KNOWN] =
+            numbers[known_number_index(state)];
     }
     return 0;
 }
@@ -44,7 +45,7 @@ int mstmm_hook_coupling_slopes(mstmm_state *state)
     for (int k = 0; k < model->n_couplings; k++) {
         const mstmm_coupling *one = &model->couplings[k];
         if (one->row >= 0)
-            loops[MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN] =
+            mstmm_row_numbers(model, slope->workspace, one->row)[MSTMM_ROW_KNOWN] =
                 loops[one->numbers + MSTMM_COUPLING_DRIFT];
     }
     return 0;

@@ -6,6 +6,16 @@
 #include "sweep.h"
 #include "sweep_steps.h"
 
+/* Accelerations with their balance, refined where digits are lost. */
+static int run_refined(mstmm_state *state)
+{
+    const real *q = state->q, *u = state->u; /* the passes fill in what is driven */
+    if (state->balance) state->balance->power = state->balance->potential = 0;
+    mstmm_ground(state);
+    const int code = mstmm_run_accelerations(state);
+    return code || !state->model->refines ? code : mstmm_refine(state, q, u);
+}
+
 int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const real *q,
                         const real *u, const real *memory, const real *efforts, real *qdot,
                         real *udot, mstmm_balance *balance, mstmm_failure *failure)
@@ -35,14 +45,11 @@ int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const
                          .refined = 0,
                          .asked = NULL,
                          .strike = NULL};
-    if (balance) balance->power = balance->potential = 0;
     if (model->flat && !balance && !(model->refines || model->product || model->qr)) {
         mstmm_flat_ground(&state);
         return mstmm_run_accelerations_in_plane(&state);
     }
-    mstmm_ground(&state);
-    const int code = mstmm_run_accelerations(&state);
-    return code || !model->refines ? code : mstmm_refine(&state, q, u);
+    return run_refined(&state);
 }
 
 int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, const real *q,
@@ -60,10 +67,7 @@ int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, 
                          .balance = balance,
                          .observed = 1,
                          .failure = failure};
-    if (balance) balance->power = balance->potential = 0;
-    mstmm_ground(&state);
-    const int code = mstmm_run_accelerations(&state);
-    return code || !model->refines ? code : mstmm_refine(&state, q, u);
+    return run_refined(&state);
 }
 
 int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,

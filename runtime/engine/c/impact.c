@@ -8,7 +8,7 @@
 
 #include "impact.h"
 #include "kernel_calls.h"
-#include "sweep_steps.h"
+#include "loop_closure.h"
 
 /* Rebound speed, relative to the largest one of this event so far, that counts as rest. */
 #define AT_REST 1e-6
@@ -71,16 +71,11 @@ static int speed_change(mstmm_scene_run *run, const mstmm_strike *strike, real t
                          .q = y,
                          .u = y + model->nq,
                          .memory = run->memory,
-                         .udot = change,
                          .observed = 1,
                          .level = MSTMM_SLIP,
                          .strike = strike,
                          .failure = &run->failure};
-    memset(change, 0, (size_t)model->nu * sizeof(real));
-    state.given = change;
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    return mstmm_run_correction(&state);
+    return mstmm_run_correction_from_zero(&state, change);
 }
 
 /* How the event is met with other speeds than those of y. */
@@ -101,21 +96,6 @@ static int approach_at(mstmm_scene_run *run, const mstmm_event_action *action, c
         found->reach += fabs(slopes[1 + k]) * fmax(1, fabs(far));
     }
     return 0;
-}
-
-static int slopes_at(mstmm_scene_run *run, const mstmm_event_action *action, real t, const real *y,
-                     real *slopes)
-{
-    mstmm_state state = {
-        .model = run->model, .workspace = run->workspace, .t = t, .memory = run->memory};
-    const real *u = y + run->model->nq;
-    const int code = mstmm_probes_seen(run, t, y, u);
-    if (code) return code;
-    const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
-    real *outputs[] = {slopes};
-    return mstmm_tape_run(action->slopes, inputs, mstmm_slots(&state), outputs)
-               ? MSTMM_FAILED_EXPRESSION
-               : 0;
 }
 
 /* w = M^-1 A^T with closed loops, and the correction of their velocity errors without impact. */
@@ -141,7 +121,7 @@ int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, con
                      mstmm_meeting *found)
 {
     const mstmm_event_action *action = &run->events[event];
-    const int code = slopes_at(run, action, t, y, action->numbers);
+    const int code = mstmm_probes_tape(run, action->slopes, t, y, action->numbers);
     return code ? code : approach_at(run, action, action->numbers, t, y, u, found);
 }
 

@@ -17,7 +17,7 @@
 
 static real *row_numbers(const mstmm_state *state, int row)
 {
-    return state->workspace + state->model->loops + MSTMM_ROW * (int64_t)row;
+    return mstmm_row_numbers(state->model, state->workspace, row);
 }
 
 /* True if a row is inactive now. */
@@ -69,12 +69,8 @@ int mstmm_self_stress(const mstmm_model *model, real *workspace, real give, cons
                          .give = give,
                          .asked = asked,
                          .failure = failure};
-    real *still = mstmm_spare_udot(&state);
-    memset(still, 0, (size_t)model->nu * sizeof(real));
-    state.u = state.given = state.udot = still;
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    const int code = mstmm_run_correction(&state);
+    state.u = mstmm_spare_udot(&state);
+    const int code = mstmm_run_correction_from_zero(&state, mstmm_spare_udot(&state));
     for (int r = 0; r < model->n_rows; r++) multipliers[r] = row_numbers(&state, r)[MSTMM_ROW_X];
     return code;
 }
@@ -129,16 +125,10 @@ int mstmm_correction(const mstmm_model *model, real *workspace, int level, real 
                          .q = q,
                          .u = u,
                          .memory = memory,
-                         .udot = change,
-                         .observed = 0,
                          .level = level,
                          .give = give,
                          .failure = failure};
-    memset(change, 0, (size_t)model->nu * sizeof(real));
-    state.given = change; /* only constant values are prescribed */
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    const int code = mstmm_run_correction(&state);
+    const int code = mstmm_run_correction_from_zero(&state, change);
     if (!code && missing) mstmm_missing(&state, missing);
     return code;
 }

@@ -2,7 +2,26 @@
 #ifndef MSTMM_LOOP_CLOSURE_H
 #define MSTMM_LOOP_CLOSURE_H
 
+#include <string.h>
+
 #include "sweep.h"
+#include "sweep_steps.h"
+
+/* Numbers of a row of the loops in a workspace. */
+static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace, int row)
+{
+    return workspace + model->loops + MSTMM_ROW * (int64_t)row;
+}
+
+/* Runs the passes of a correction; `change` receives it, and begins as zero. */
+static inline int mstmm_run_correction_from_zero(mstmm_state *state, real *change)
+{
+    memset(change, 0, (size_t)state->model->nu * sizeof(real));
+    state->given = state->udot = change; /* only constant values are prescribed */
+    state->qdot = mstmm_spare_qdot(state);
+    mstmm_ground(state);
+    return mstmm_run_correction(state);
+}
 
 /* Solves for the residual of the accelerations just found and adds the correction. */
 int mstmm_refine(mstmm_state *state, const real *q, const real *u);

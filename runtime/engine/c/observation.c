@@ -147,7 +147,7 @@ int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real 
     if (wanted->loads || wanted->efforts) observe_hinges(&state, udot, wanted);
     if (wanted->sums) observe_sums(&state, &balance, wanted->sums);
     for (int r = 0; wanted->rows && r < model->n_rows; r++)
-        wanted->rows[r] = workspace[model->loops + MSTMM_ROW * (int64_t)r + MSTMM_ROW_X];
+        wanted->rows[r] = mstmm_row_numbers(model, workspace, r)[MSTMM_ROW_X];
     return 0;
 }
 
@@ -240,4 +240,17 @@ int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *
     for (int i = 0; i < run->model->n_bodies && !code; i++)
         *energy += kinetic_energy(&state, i, inertia, momentum);
     return code;
+}
+
+int mstmm_probes_tape(mstmm_scene_run *run, const mstmm_tape *tape, real t, const real *y,
+                      real *values)
+{
+    const mstmm_state state = {
+        .model = run->model, .workspace = run->workspace, .t = t, .memory = run->memory};
+    const real *u = y + run->model->nq;
+    const int code = mstmm_probes_seen(run, t, y, u);
+    if (code) return code;
+    const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
+    real *outputs[] = {values};
+    return mstmm_tape_run(tape, inputs, mstmm_slots(&state), outputs) ? MSTMM_FAILED_EXPRESSION : 0;
 }

@@ -191,12 +191,7 @@ static int solve_tree(mstmm_tangent *at, const real *r, const mstmm_known *known
 {
     const mstmm_parts parts = tangent_parts(at);
     const mstmm_couplings *all = at->couplings;
-    mstmm_tangents step = {.numbers = at->numbers,
-                           .rate = at->rate,
-                           .s = at->s,
-                           .sq = at->sq,
-                           .kappa = at->kappa,
-                           .kept = at->kept};
+    mstmm_tangents step = tangent_steps(at);
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;

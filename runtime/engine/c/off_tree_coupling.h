@@ -5,6 +5,7 @@
 #define MSTMM_OFF_TREE_COUPLING_H
 
 #include "band_lu.h"
+#include "loop_closure.h"
 #include "tangent_workspace.h"
 
 /* Unit solutions of all unknowns and their coupling matrix, for the factored tangent.  `negative`:
@@ -23,12 +24,6 @@ void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own);
 void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows);
 /* Instead of efforts: errors of the accelerations of closing hinges. */
 void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own, real *required);
-
-/* Numbers of a row of the loops in a workspace. */
-static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace, int row)
-{
-    return workspace + model->loops + MSTMM_ROW * (int64_t)row;
-}
 
 /* `closure`: factored matrix, its row exchanges, changes, errors of rows, and changes in the order
  * of the matrix. */

@@ -5,7 +5,6 @@
 
 #include "loop_closure.h"
 #include "sweep.h"
-#include "sweep_steps.h"
 
 #define MOST 6
 /* A choice is kept while its smallest pivot exceeds this fraction of the best one's, and if even
@@ -26,7 +25,8 @@ static void scaled_entries(const mstmm_state *state, const mstmm_choice *one, re
     const real *loops = state->workspace + state->model->loops;
     real scale[MOST];
     for (int i = 0; i < one->n; i++) {
-        const real own = loops[MSTMM_ROW * (int64_t)one->rows[i] + MSTMM_ROW_PIVOT];
+        const real own =
+            mstmm_row_numbers(state->model, state->workspace, one->rows[i])[MSTMM_ROW_PIVOT];
         const real mobility = state->model->rows[one->rows[i]].mobility;
         scale[i] = isfinite(own) && mobility > 0 ? 1 / sqrt(mobility) : 0;
         found[i][i] = isfinite(own) ? own * scale[i] * scale[i] : 0;
@@ -98,8 +98,8 @@ static void choose_independent_rows(mstmm_state *state, const mstmm_choice *one)
     const int *met = stays ? now : best;
     for (int i = 0; i < one->n; i++) {
         const mstmm_loop_row *row = &model->rows[one->rows[i]];
-        real *line = state->workspace + model->loops + MSTMM_ROW * (int64_t)one->rows[i];
-        if (!met[i]) line[MSTMM_ROW_PIVOT] = INFINITY;
+        if (!met[i])
+            mstmm_row_numbers(model, state->workspace, one->rows[i])[MSTMM_ROW_PIVOT] = INFINITY;
         if (state->chosen) state->chosen[row->rest] = !met[i];
     }
     state->changed |= !stays || !known;
@@ -132,12 +132,8 @@ int mstmm_choose_rows(const mstmm_model *model, real *workspace, real t, const r
                          .chosen = memory};
     *changed = 0;
     if (!model->n_choices) return 0;
-    real *still = mstmm_spare_udot(&state);
-    memset(still, 0, (size_t)model->nu * sizeof(real));
-    state.u = state.given = state.udot = still;
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    const int code = mstmm_run_correction(&state);
+    state.u = mstmm_spare_udot(&state);
+    const int code = mstmm_run_correction_from_zero(&state, mstmm_spare_udot(&state));
     *changed = state.changed;
     return code;
 }

@@ -159,6 +159,9 @@ int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const do
 
 /* Places and velocities of the probes of a state with speeds u, to `probe_values`. */
 int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u);
+/* Values of a tape of t, q, u, probes and inputs at a state; returns 0 or a reason. */
+int mstmm_probes_tape(mstmm_scene_run *run, const mstmm_tape *tape, real t, const real *y,
+                      real *values);
 /* Kinetic energy of a state with speeds u, including rotors and modes of flexible bodies. */
 int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *u, real *energy);
 /* Interface of `run` to the integrator, evaluated by the looped engine. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "is_finite.h"
+#include "loop_closure.h"
 #include "sweep_steps.h"
 
 static int is_finite_state(const mstmm_model *model, real t, const real *const *rows)
@@ -95,15 +96,11 @@ int mstmm_alone_momentum(const void *record, real t, const real *const *rows, re
     return failed;
 }
 
-static real quaternion_length(const real *four)
-{
-    return sqrt(four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]);
-}
-
 /* Unit quaternion after dt at its rate, which is perpendicular to it. */
 static void turn_quaternion(real dt, const real *rate, real *four)
 {
-    const real speed = quaternion_length(rate);
+    const real speed =
+        sqrt(rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2] + rate[3] * rate[3]);
     for (int k = 0; speed > 0 && k < 4; k++)
         four[k] = cos(speed * dt) * four[k] + sin(speed * dt) / speed * rate[k];
 }
@@ -116,11 +113,7 @@ int mstmm_alone_moved(const void *record, real dt, const real *const *rows, real
     mstmm_failure failure;
     if (!is_finite_state(model, dt, rows)) return 1;
     memcpy(q, rows[0], (size_t)model->nq * sizeof(real));
-    for (int k = 0; k < alone->n_quaternions; k++) {
-        real *four = q + alone->quaternions[k];
-        const real size = quaternion_length(four);
-        for (int i = 0; i < 4; i++) four[i] /= size;
-    }
+    mstmm_unit_quaternions(alone->n_quaternions, alone->quaternions, q);
     mstmm_state state = {.model = model,
                          .workspace = alone->workspace,
                          .memory = alone->memory,

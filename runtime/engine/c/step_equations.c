@@ -95,23 +95,15 @@ static void set_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 /* Passes of the tangent from no direction at all; `negative` is that of mstmm_tangents. */
 static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negative, int kept)
 {
-    const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
-    mstmm_tangents step = {.numbers = at->numbers,
-                           .rate = at->rate,
-                           .s = at->s,
-                           .sq = at->sq,
-                           .kappa = at->kappa,
-                           .negative = negative,
-                           .kept = kept};
+    at->approximate = 0;
+    at->kept = kept;
+    mstmm_tangents step = tangent_steps(at);
+    step.negative = negative;
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
-    at->approximate = 0;
-    at->kept = kept;
-    memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
-    memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
-    memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
+    clear_direction(at->model, &parts);
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real)); /* the ground's */
     return run(&state);
 }
@@ -148,7 +140,6 @@ static mstmm_tangents laws_steps(const mstmm_tangent *at)
 
 int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
-    const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
     set_steps(at, rate, s, sq, kappa);
     at->approximate = 1;
@@ -156,9 +147,7 @@ int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
-    memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
-    memset(parts.d_u, 0, (size_t)model->nu * sizeof(real));
-    memset(parts.d_a, 0, (size_t)model->nu * sizeof(real));
+    clear_direction(at->model, &parts);
     return mstmm_run_approximate_tangent(&state);
 }
 
@@ -205,12 +194,10 @@ int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *kno
 
 int mstmm_accelerations_rate(mstmm_tangent *at, real *rate)
 {
-    const int nq = at->model->nq, nu = at->model->nu;
+    const int nu = at->model->nu;
     const mstmm_parts parts = tangent_parts(at);
     real *missing = mstmm_across_missing(at);
-    memset(parts.d_q, 0, (size_t)nq * sizeof(real));
-    memset(parts.d_u, 0, (size_t)nu * sizeof(real));
-    memset(parts.d_a, 0, (size_t)nu * sizeof(real));
+    clear_direction(at->model, &parts);
     int code = mstmm_residual_slope(at, 1, parts.d_q, parts.d_u, parts.d_a, parts.still_efforts);
     if (code) return code;
     mstmm_rows_along(at, parts.shadow, parts.answer, missing);

@@ -172,13 +172,9 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
-    mstmm_tangents step = {.numbers = at->numbers,
-                           .rate = at->rate,
-                           .s = at->s,
-                           .sq = at->sq,
-                           .kappa = at->kappa,
-                           .rho = rho ? rho : parts.still,
-                           .change = dq};
+    mstmm_tangents step = tangent_steps(at);
+    step.rho = rho ? rho : parts.still;
+    step.change = dq;
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
