@@ -98,16 +98,8 @@ def _spatial_premises(free: tuple[str, ...]) -> Parts:
         *_effort_conditions("force", next_axes, q_n, translations, tau, 0),
         *_effort_conditions("moment", next_axes, next_moment, rotations, tau, len(translations)),
     )
-    inputs = (
-        Quantity(axes, "1", "hinge axes (columns) in inertial axes"),
-        Quantity(offset, "m", "outboard from inboard point, inertial axes"),
-        Quantity(eta_v, "m/s2", "relative acceleration at rest of the speeds, inertial axes"),
-        Quantity(eta_w, "rad/s2", "relative angular acceleration at rest of the speeds"),
-        Quantity(next_axes, "1", "axes (columns) of the next hinge in inertial axes"),
-        Quantity(next_offset, "m", "offset of the next hinge, inertial axes"),
-        Quantity(tau, "N, N*m", "efforts of the next hinge along its free directions"),
-    )
-    return _select_used_inputs(inputs, premises, conditions), premises, conditions
+    symbols = (axes, offset, eta_v, eta_w, next_axes, next_offset, tau)
+    return _parts(symbols, premises, conditions)
 
 
 def _planar_premises(free: tuple[str, ...]) -> Parts:
@@ -136,16 +128,39 @@ def _planar_premises(free: tuple[str, ...]) -> Parts:
         effort = Matrix([[tau[len(translations), 0]]])
         next_moment = m_n - Perp(next_offset).T * q_n
         conditions += (Equation("next hinge's moment", next_moment, effort, "(5.67)"),)
-    inputs = (
-        Quantity(axes, "1", "hinge axes (columns) in inertial axes"),
-        Quantity(offset, "m", "outboard from inboard point, inertial axes"),
-        Quantity(eta_v, "m/s2", "relative acceleration at rest of the speeds, inertial axes"),
-        Quantity(eta_w, "rad/s2", "relative angular acceleration at rest of the speeds"),
-        Quantity(next_axes, "1", "axes (columns) of the next hinge in inertial axes"),
-        Quantity(next_offset, "m", "offset of the next hinge, inertial axes"),
-        Quantity(tau, "N, N*m", "efforts of the next hinge along its free directions"),
+    symbols = (axes, offset, eta_v, eta_w, next_axes, next_offset, tau)
+    return _parts(symbols, premises, conditions)
+
+
+_INPUTS = (
+    ("1", "hinge axes (columns) in inertial axes"),
+    ("m", "outboard from inboard point, inertial axes"),
+    ("m/s2", "relative acceleration at rest of the speeds, inertial axes"),
+    ("rad/s2", "relative angular acceleration at rest of the speeds"),
+    ("1", "axes (columns) of the next hinge in inertial axes"),
+    ("m", "offset of the next hinge, inertial axes"),
+    ("N, N*m", "efforts of the next hinge along its free directions"),
+)
+
+
+def _parts(
+    symbols: tuple[sp.MatrixSymbol, ...],
+    premises: tuple[Equation, ...],
+    conditions: tuple[Equation, ...],
+) -> Parts:
+    """Inputs (complete sets of directions need no axes), premises and conditions.
+
+    `symbols` are those of `_INPUTS`.
+    """
+    used_symbols: set[sp.MatrixSymbol] = set()
+    for equation in (*premises, *conditions):
+        used_symbols |= matrix_symbols(equation.left) | matrix_symbols(equation.right)
+    inputs = tuple(
+        Quantity(symbol, unit, meaning)
+        for symbol, (unit, meaning) in zip(symbols, _INPUTS, strict=True)
+        if symbol in used_symbols
     )
-    return _select_used_inputs(inputs, premises, conditions), premises, conditions
+    return inputs, premises, conditions
 
 
 def _split_directions(
@@ -195,13 +210,3 @@ def _effort_conditions(
         return (Equation(f"next hinge's {kind}", load, efforts, number),)
     selection = Matrix(len(free), int(axes.rows), lambda i, j: int(j == free[i]))
     return (Equation(f"next hinge's {kind}", selection * axes.T * load, efforts, number),)
-
-
-def _select_used_inputs(
-    inputs: tuple[Quantity, ...], premises: tuple[Equation, ...], conditions: tuple[Equation, ...]
-) -> tuple[Quantity, ...]:
-    """Inputs that occur in some equation (complete sets of directions need no axes)."""
-    used_symbols: set[sp.MatrixSymbol] = set()
-    for equation in (*premises, *conditions):
-        used_symbols |= matrix_symbols(equation.left) | matrix_symbols(equation.right)
-    return tuple(quantity for quantity in inputs if quantity.symbol in used_symbols)

@@ -8,13 +8,18 @@ from ..definition.notation import rotation_vector
 _SIX = range(6)
 #: Symmetric matrices are given by the upper triangle, row by row.
 _PAIRS = tuple((i, j) for i in _SIX for j in _SIX if i <= j)
-_UNITS = (("N/m", "N/rad", "N*m/rad"), ("N*s/m", "N*s/rad", "N*m*s/rad"))
+#: Units between two translations, a translation and a rotation, two rotations.
+STIFFNESS_UNITS = ("N/m", "N/rad", "N*m/rad")
+DAMPING_UNITS = ("N*s/m", "N*s/rad", "N*m*s/rad")
 
 
-def _entries(letter: str, units: tuple[str, str, str], meaning: str) -> tuple[Param, ...]:
+def matrix_entries(
+    letter: str, units: tuple[str, str, str], meaning: str, pairs: tuple[tuple[int, int], ...]
+) -> tuple[Param, ...]:
+    """Parameters for the given entries of a 6 x 6 matrix."""
     return tuple(
         Param(f"{letter}{i + 1}{j + 1}", units[(i > 2) + (j > 2)], meaning, default=0.0)
-        for i, j in _PAIRS
+        for i, j in pairs
     )
 
 
@@ -33,8 +38,8 @@ class Bushing(ForceElement):
     name = "bushing6"
     title = "bushing in six directions"
     parameters = (
-        *_entries("k", _UNITS[0], "stiffness"),
-        *_entries("c", _UNITS[1], "damping"),
+        *matrix_entries("k", STIFFNESS_UNITS, "stiffness", _PAIRS),
+        *matrix_entries("c", DAMPING_UNITS, "damping", _PAIRS),
         *(
             Param(f"preload{k + 1}", "N" if k < 3 else "N*m", "load on T at rest", default=0.0)
             for k in _SIX

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, vector
-from ..definition.notation import rate_of, rotation_of
+from ..definition.notation import column, part, rate_of, rotation_of
 
 LINEAR = ("stiffness", "rest", "damping")
 FRICTION = ("coulomb", "static", "stribeck_velocity", "regularisation_velocity")
@@ -144,10 +144,10 @@ def _replace_function(
 ) -> sp.Expr:
     """Expression with F(share) and its derivative replaced by named values."""
     expression = expression.doit()
-    for part in expression.atoms(sp.Subs):
-        expression = expression.xreplace({part: slope[0, 0]})
-    for part in expression.atoms(sp.Derivative):
-        expression = expression.xreplace({part: slope[0, 0]})
+    for term in expression.atoms(sp.Subs):
+        expression = expression.xreplace({term: slope[0, 0]})
+    for term in expression.atoms(sp.Derivative):
+        expression = expression.xreplace({term: slope[0, 0]})
     return expression.xreplace({swing(share): factor[0, 0]})
 
 
@@ -192,10 +192,8 @@ def rotation_law() -> Derivation:
     """Law of a ball hinge: swing-twist potential, damping (outboard axes), given torques."""
     p, q, u = vector("p", 7), vector("q", 4), vector("u", 3)
     axes, effort = sp.MatrixSymbol("B", 3, 3), vector("effort", 3)
-    spin = sp.Matrix([u[i, 0] for i in range(3)])
-    quaternion = sp.Matrix([q[i, 0] for i in range(4)])
-    equations, torque, energy, lost = _swing_twist_law(quaternion, p, 0, axes, spin)
-    efforts = sp.Matrix([effort[i, 0] for i in range(3)])
+    spin, efforts = column(u), column(effort)
+    equations, torque, energy, lost = _swing_twist_law(column(q), p, 0, axes, spin)
     outputs = (
         (vector("tau", 3), torque + efforts),
         (V.symbol, sp.Matrix([energy])),
@@ -231,26 +229,25 @@ def six_direction_law() -> Derivation:
     """Law of a free or elastic hinge: V = d^T K d/2 in inboard axes plus swing and twist."""
     p, q, u = vector("p", len(SIX)), vector("q", 7), vector("u", 6)
     axes, given = sp.MatrixSymbol("B", 3, 3), vector("effort", 6)
-    spin = sp.Matrix([u[i, 0] for i in range(3, 6)])
-    quaternion = sp.Matrix([q[i, 0] for i in range(3, 7)])
+    spin, quaternion = part(u, 3), part(q, 3, 4)
     equations, torque, energy, lost = _swing_twist_law(quaternion, p, 9, axes, spin)
     rotation, d_rate = sp.MatrixSymbol("R", 3, 3), vector("law_rate", 3)
     rotation_entries = sp.Matrix(3, 3, lambda i, j: rotation[i, j])
     stretch = sp.Matrix([q[i, 0] - p[3 + i, 0] for i in range(3)])
-    rate = sp.Matrix([d_rate[i, 0] for i in range(3)])
+    rate = column(d_rate)
     spring = sp.Matrix([-p[i, 0] * stretch[i] for i in range(3)])
     damper = sp.Matrix([-p[6 + i, 0] * rate[i] for i in range(3)])
     energy += sum(p[i, 0] * stretch[i] ** 2 for i in range(3)) / 2
     force = rotation_entries.T * (spring + damper)
-    efforts = sp.Matrix([given[i, 0] for i in range(6)])
+    efforts = column(given)
     tau = sp.Matrix.vstack(force, torque) + efforts
-    speeds = sp.Matrix([u[i, 0] for i in range(6)])
-    velocity = sp.Matrix([u[i, 0] for i in range(3)])
-    power = lost + damper.dot(rate) + efforts.dot(speeds)
+    power = lost + damper.dot(rate) + efforts.dot(column(u))
     equations += [
         Equation("rotation", rotation, sp.ImmutableDenseMatrix(rotation_of(*quaternion))),
         Equation(
-            "rate of d in hinge axes", d_rate, sp.ImmutableDenseMatrix(rotation_entries * velocity)
+            "rate of d in hinge axes",
+            d_rate,
+            sp.ImmutableDenseMatrix(rotation_entries * part(u, 0)),
         ),
         Equation("efforts", vector("tau", 6), sp.ImmutableDenseMatrix(tau)),
         Equation("stored energy", V.symbol, sp.ImmutableDenseMatrix([energy])),

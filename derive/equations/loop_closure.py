@@ -179,8 +179,7 @@ def row() -> Derivation:
     carried to P of either.
     """
     direction = Quantity(symbol("w", 6), "", "the direction: a row of W")
-    force = sp.ImmutableDenseMatrix([direction.symbol[i, 0] for i in range(3)])
-    moment = sp.ImmutableDenseMatrix([direction.symbol[i, 0] for i in range(3, 6)])
+    force, moment = part(direction.symbol, 0), part(direction.symbol, 3)
     outboard = _carried_load(ROTATION.symbol, END.symbol, force, moment)
     inboard = _carried_load(R.symbol, LEVER.symbol, -force, -moment)
     return Derivation(
@@ -320,14 +319,19 @@ def update_column() -> Derivation:
     )  # fmt: skip
 
 
+def _part_of_closed_row(number: Quantity) -> sp.ImmutableDenseMatrix:
+    """-L_rp / L_rr times a number: what the elimination of row r adds."""
+    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * number.symbol[0, 0]
+    return sp.ImmutableDenseMatrix([value])
+
+
 def update_known_part() -> Derivation:
     """Known part of an open row p after row r is closed."""
     known_p = _accumulating("l_p", 1, "known part of row p")
-    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * KNOWN_PART.symbol[0, 0]
     return Derivation(
         "loops", "known part of a remaining row while another is eliminated",
         (INVERSE, KNOWN_PART, COUPLING), (known_p,),
-        (Equation("l_p -= l_r L_rp / L_rr", known_p.symbol, sp.ImmutableDenseMatrix([value])),),
+        (Equation("l_p -= l_r L_rp / L_rr", known_p.symbol, _part_of_closed_row(KNOWN_PART)),),
         sources=SOURCES,
     )  # fmt: skip
 
@@ -336,11 +340,10 @@ def update_coupling() -> Derivation:
     """Entry of L of two open rows after row r is closed."""
     second = Quantity(symbol("L_q", 1), "", "entry of L of the eliminated row and the second")
     entry = _accumulating("L_pq", 1, "entry of L of both")
-    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * second.symbol[0, 0]
     return Derivation(
         "loops", "two remaining rows while another is eliminated", (INVERSE, COUPLING, second),
         (entry,),
-        (Equation("L_pq -= L_rp L_rq / L_rr", entry.symbol, sp.ImmutableDenseMatrix([value])),),
+        (Equation("L_pq -= L_rp L_rq / L_rr", entry.symbol, _part_of_closed_row(second)),),
         sources=SOURCES,
     )  # fmt: skip
 
@@ -371,11 +374,10 @@ def multiplier_of_row() -> Derivation:
     """Contribution of a row p that was open then."""
     multiplier_p = Quantity(symbol("x_p", 1), "N, N*m", "multiplier of row p")
     result = _accumulating("x", 1, "multiplier of row r")
-    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * multiplier_p.symbol[0, 0]
     return Derivation(
         "loops", "contribution of another row to a multiplier", (INVERSE, COUPLING, multiplier_p),
         (result,),
-        (Equation("x_r -= L_rp x_p / L_rr", result.symbol, sp.ImmutableDenseMatrix([value])),),
+        (Equation("x_r -= L_rp x_p / L_rr", result.symbol, _part_of_closed_row(multiplier_p)),),
         sources=SOURCES,
     )  # fmt: skip
 

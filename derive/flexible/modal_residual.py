@@ -15,6 +15,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..definition.notation import part, stack
 from ..equations.riccati_sweep import MOTION, E, S
 
 # --- arrays shared by the kernels -----------------------------------------------------------------
@@ -77,16 +78,6 @@ ETAD = modal_vector("etad", "modal speeds")
 MOMENTS = (RIGID, C, P, B, *Z, *Y, *G, MASS)
 
 
-def row_entries(array: sp.Basic, first: int, count: int = 3) -> sp.ImmutableDenseMatrix:
-    """Rows first .. first + count of a column, entry by entry."""
-    return sp.ImmutableDenseMatrix([array[i, 0] for i in range(first, first + count)])
-
-
-def stack_rows(*rows: sp.Basic) -> sp.BlockMatrix:
-    """Stacked matrices."""
-    return sp.BlockMatrix([[row] for row in rows])
-
-
 def symmetric_matrix(symmetric: sp.Basic) -> sp.ImmutableDenseMatrix:
     """Symmetric 3 x 3 matrix from a column xx xy xz yy yz zz."""
     xx, xy, xz, yy, yz, zz = (symmetric[i, 0] for i in range(6))
@@ -120,18 +111,16 @@ def _geometry_equations() -> tuple[Equation, ...]:
     rows += [P.symbol[i, :] + eta.T * y.symbol for i, y in enumerate(Y)]
     second_moments = [B.symbol[k, :] + eta.T * z.symbol for k, z in enumerate(Z)]
     return (
-        Equation("[Ct; Gt]", S_RF.symbol, stack_rows(*rows)),
-        Equation("A = dR / deta", SECOND_MOMENT_DERIVATIVES.symbol, stack_rows(*second_moments)),
+        Equation("[Ct; Gt]", S_RF.symbol, stack(*rows)),
+        Equation("A = dR / deta", SECOND_MOMENT_DERIVATIVES.symbol, stack(*second_moments)),
         Equation("(C + Ct) eta / 2", vector("c_s", 3), _half_sum(C.symbol, S_RF.symbol[:3, :])),
-        Equation("first moments", vector("c", 3), row_entries(RIGID.symbol, 1) + vector("c_s", 3)),
+        Equation("first moments", vector("c", 3), part(RIGID.symbol, 1) + vector("c_s", 3)),
         Equation(
             "(B + A) eta / 2",
             vector("R_s", 6),
             _half_sum(B.symbol, SECOND_MOMENT_DERIVATIVES.symbol),
         ),
-        Equation(
-            "second moments", vector("R", 6), row_entries(RIGID.symbol, 4, 6) + vector("R_s", 6)
-        ),
+        Equation("second moments", vector("R", 6), part(RIGID.symbol, 4, 6) + vector("R_s", 6)),
     )
 
 
@@ -140,7 +129,7 @@ def _half_sum(at_rest: sp.Basic, now: sp.Basic) -> sp.Basic:
 
 
 def _mass_equation() -> Equation:
-    c, m = row_entries(vector("c", 3), 0), RIGID.symbol[0, 0]
+    c, m = part(vector("c", 3), 0), RIGID.symbol[0, 0]
     lever = tilde(c)
     blocks = sp.BlockMatrix(
         [
@@ -160,9 +149,7 @@ def _rate_equations() -> tuple[Equation, ...]:
         Equation("Gt etad", vector("l_s", 3), S_RF.symbol[3:, :] * etad),
         Equation("rate of R", vector("Rd", 6), SECOND_MOMENT_DERIVATIVES.symbol * etad),
         Equation(
-            "(rate of [Ct; Gt]) etad",
-            vector("s_s", 6),
-            stack_rows(*translation_terms, *rotation_terms),
+            "(rate of [Ct; Gt]) etad", vector("s_s", 6), stack(*translation_terms, *rotation_terms)
         ),
     )
 
@@ -182,13 +169,11 @@ def residual() -> Derivation:
     h_f = sum_i w_i (Y_i^T - Y_i) etad - 1/2 A^T (coefficients of R in w^T J w) + K eta + D etad
     """
     motion = MOTION.symbol
-    w, wd, a = (row_entries(motion, k) for k in (0, 3, 6))
+    w, wd, a = (part(motion, k) for k in (0, 3, 6))
     spin = tilde(w)
-    c, cd = row_entries(vector("c", 3), 0), row_entries(vector("cd", 3), 0)
-    angular_momentum = inertia_of_second_moments(vector("R", 6)) * w + row_entries(
-        vector("l_s", 3), 0
-    )
-    rate_terms = row_entries(vector("s_s", 6), 0, 6)
+    c, cd = part(vector("c", 3), 0), part(vector("cd", 3), 0)
+    angular_momentum = inertia_of_second_moments(vector("R", 6)) * w + part(vector("l_s", 3), 0)
+    rate_terms = part(vector("s_s", 6), 0, 6)
     frame_acceleration = sp.ImmutableDenseMatrix([*a, *wd])
     force = spin * (spin * c) + 2 * spin * cd + rate_terms[:3, :]
     moment = (
@@ -238,9 +223,7 @@ def momentum() -> Derivation:
     frame_momentum = Quantity(vector("h", 6), "N*s, N*m*s", "momentum, moment of momentum about o")
     modal_momentum = modal_vector("h_f", "modal momentum")
     energy = Quantity(vector("T", 1), "J", "kinetic energy")
-    twist = sp.ImmutableDenseMatrix(
-        [*row_entries(V_FRAME.symbol, 0), *row_entries(W_FRAME.symbol, 0)]
-    )
+    twist = sp.ImmutableDenseMatrix([*part(V_FRAME.symbol, 0), *part(W_FRAME.symbol, 0)])
     twice = twist.T * frame_momentum.symbol + modal_momentum.symbol.T * etad
     return Derivation(
         "modal",

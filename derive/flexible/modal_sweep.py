@@ -14,6 +14,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from ..definition.notation import part, stack
 from ..equations.riccati_sweep import DELTA, SHIFT, SOURCES, E, R, S
 from .modal_residual import (
     DAMPING,
@@ -26,8 +27,6 @@ from .modal_residual import (
     N,
     modal_columns,
     modal_vector,
-    row_entries,
-    stack_rows,
 )
 
 MODAL_SUBSPACE = modal_columns("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
@@ -45,7 +44,7 @@ def _accumulating(quantity: Quantity) -> Quantity:
 def assemble_port() -> Derivation:
     """Modal rows of the bodies outboard of a port; its frame rows are carried as by a weld."""
     force, moment = WORK.symbol[:3, :], WORK.symbol[3:, :]
-    lever = tilde(row_entries(SHIFT.symbol, 0))
+    lever = tilde(part(SHIFT.symbol, 0))
     rotated_force = R.symbol * force
     return Derivation(
         "modal",
@@ -57,7 +56,7 @@ def assemble_port() -> Derivation:
             Equation(
                 "X^T U",
                 S_RF.symbol,
-                stack_rows(rotated_force, R.symbol * moment + lever * rotated_force),
+                stack(rotated_force, R.symbol * moment + lever * rotated_force),
             ),
             Equation("H^T U", S_FF.symbol, MODAL_SUBSPACE.symbol.T * WORK.symbol),
             Equation("H^T e", E_F.symbol, MODAL_SUBSPACE.symbol.T * E.symbol),

@@ -16,16 +16,8 @@ from __future__ import annotations
 import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
-from .modal_residual import (
-    ETA,
-    ETAD,
-    SOURCES,
-    modal_columns,
-    modal_pair,
-    modal_vector,
-    row_entries,
-    stack_rows,
-)
+from ..definition.notation import part, stack
+from .modal_residual import ETA, ETAD, SOURCES, modal_columns, modal_pair, modal_vector
 
 eta, etad = ETA.symbol, ETAD.symbol
 
@@ -53,6 +45,14 @@ POSITION_RATE = Quantity(vector("xd", 3), "m/s", "rate of x")
 ROTATION_VECTOR_RATE = Quantity(vector("Psid", 3), "rad/s", "rate of Psi")
 POSITION_BIAS = Quantity(vector("xdd", 3), "m/s2", "second rate of x at etadd = 0")
 ROTATION_VECTOR_BIAS = Quantity(vector("Psidd", 3), "rad/s2", "second rate of Psi at etadd = 0")
+SECTION_MOTION = (
+    POSITION,
+    ROTATION_VECTOR,
+    POSITION_RATE,
+    ROTATION_VECTOR_RATE,
+    POSITION_BIAS,
+    ROTATION_VECTOR_BIAS,
+)
 
 
 def section() -> Derivation:
@@ -66,17 +66,9 @@ def section() -> Derivation:
         "modal",
         "section of a flexible body",
         (POINT, PHI, THETA, *SECOND_DISPLACEMENTS, *SECOND_ROTATIONS, ETA, ETAD),
+        (JACOBIAN, *SECTION_MOTION),
         (
-            JACOBIAN,
-            POSITION,
-            ROTATION_VECTOR,
-            POSITION_RATE,
-            ROTATION_VECTOR_RATE,
-            POSITION_BIAS,
-            ROTATION_VECTOR_BIAS,
-        ),
-        (
-            Equation("rates per mode", JACOBIAN.symbol, stack_rows(*rows)),
+            Equation("rates per mode", JACOBIAN.symbol, stack(*rows)),
             Equation(
                 "x = r + phi eta - eta^T g eta / 2",
                 POSITION.symbol,
@@ -87,8 +79,8 @@ def section() -> Derivation:
             ),
             Equation("xd", POSITION_RATE.symbol, point_rows * etad),
             Equation("Psid", ROTATION_VECTOR_RATE.symbol, rotation_rows * etad),
-            Equation("xdd", POSITION_BIAS.symbol, stack_rows(*second_rates[:3])),
-            Equation("Psidd", ROTATION_VECTOR_BIAS.symbol, stack_rows(*second_rates[3:])),
+            Equation("xdd", POSITION_BIAS.symbol, stack(*second_rates[:3])),
+            Equation("Psidd", ROTATION_VECTOR_BIAS.symbol, stack(*second_rates[3:])),
         ),
         sources=SOURCES,
     )
@@ -114,7 +106,7 @@ SQUARE, COEFFICIENTS = vector("s", 1), vector("abc", 5)
 
 
 def _coefficient_equations() -> tuple[Equation, ...]:
-    psi, psid = row_entries(ROTATION_VECTOR.symbol, 0), row_entries(ROTATION_VECTOR_RATE.symbol, 0)
+    psi, psid = part(ROTATION_VECTOR.symbol, 0), part(ROTATION_VECTOR_RATE.symbol, 0)
     s = SQUARE[0, 0]
     rate = 2 * sum(p * d for p, d in zip(psi, psid, strict=True))
     values = [even_series(k, s) for k in (1, 2, 3)]
@@ -127,14 +119,14 @@ def _coefficient_equations() -> tuple[Equation, ...]:
 
 def _rotation_matrix() -> sp.ImmutableDenseMatrix:
     a, b = COEFFICIENTS[0, 0], COEFFICIENTS[1, 0]
-    turn = tilde(row_entries(ROTATION_VECTOR.symbol, 0))
+    turn = tilde(part(ROTATION_VECTOR.symbol, 0))
     return sp.ImmutableDenseMatrix(sp.eye(3) + a * turn + b * (turn * turn))
 
 
 def _tangent_operator(sign: int) -> sp.ImmutableDenseMatrix:
     """T(sign Psi)."""
     b, c = COEFFICIENTS[1, 0], COEFFICIENTS[2, 0]
-    turn = tilde(row_entries(ROTATION_VECTOR.symbol, 0))
+    turn = tilde(part(ROTATION_VECTOR.symbol, 0))
     return sp.ImmutableDenseMatrix(sp.eye(3) - sign * b * turn + c * (turn * turn))
 
 
@@ -142,11 +134,11 @@ def _spin_rate(sign: int) -> sp.ImmutableDenseMatrix:
     """d/dt (T(sign Psi) Psid) at etadd = 0."""
     c, bd, cd = (COEFFICIENTS[k, 0] for k in (2, 3, 4))
     turn, rate = (
-        tilde(row_entries(ROTATION_VECTOR.symbol, 0)),
-        tilde(row_entries(ROTATION_VECTOR_RATE.symbol, 0)),
+        tilde(part(ROTATION_VECTOR.symbol, 0)),
+        tilde(part(ROTATION_VECTOR_RATE.symbol, 0)),
     )
-    cross_term = turn * row_entries(ROTATION_VECTOR_RATE.symbol, 0)
-    tangent_term = _tangent_operator(sign) * row_entries(ROTATION_VECTOR_BIAS.symbol, 0)
+    cross_term = turn * part(ROTATION_VECTOR_RATE.symbol, 0)
+    tangent_term = _tangent_operator(sign) * part(ROTATION_VECTOR_BIAS.symbol, 0)
     return sp.ImmutableDenseMatrix(
         tangent_term - sign * bd * cross_term + cd * (turn * cross_term) + c * (rate * cross_term)
     )
@@ -168,15 +160,7 @@ def _motion_derivation(title: str, definitions: tuple[Equation, ...]) -> Derivat
     return Derivation(
         "modal",
         title,
-        (
-            END_ROTATION,
-            POSITION,
-            ROTATION_VECTOR,
-            POSITION_RATE,
-            ROTATION_VECTOR_RATE,
-            POSITION_BIAS,
-            ROTATION_VECTOR_BIAS,
-        ),
+        (END_ROTATION, *SECTION_MOTION),
         _OUTPUTS,
         (*_coefficient_equations(), *definitions),
         sources=SOURCES,
@@ -185,13 +169,13 @@ def _motion_derivation(title: str, definitions: tuple[Equation, ...]) -> Derivat
 
 def _velocity_equations(subspace: sp.Basic) -> tuple[Equation, ...]:
     h6 = _OUTPUTS[2].symbol
-    rates = stack_rows(POSITION_RATE.symbol, ROTATION_VECTOR_RATE.symbol)
+    rates = stack(POSITION_RATE.symbol, ROTATION_VECTOR_RATE.symbol)
     velocities = vector("vw", 6)
     return (
         Equation("H6", h6, subspace),
         Equation("relative velocities", velocities, h6 * rates),
-        Equation("v", _OUTPUTS[3].symbol, row_entries(velocities, 0)),
-        Equation("w", _OUTPUTS[4].symbol, row_entries(velocities, 3)),
+        Equation("v", _OUTPUTS[3].symbol, part(velocities, 0)),
+        Equation("w", _OUTPUTS[4].symbol, part(velocities, 3)),
     )
 
 
@@ -206,12 +190,12 @@ def end_motion() -> Derivation:
         "end of a flexible body relative to its floating frame",
         (
             Equation("rotation", rotation, _rotation_matrix() * end_rotation),
-            Equation("place", _OUTPUTS[1].symbol, row_entries(POSITION.symbol, 0)),
+            Equation("place", _OUTPUTS[1].symbol, part(POSITION.symbol, 0)),
             *_velocity_equations(subspace),
             Equation(
                 "bias",
                 _OUTPUTS[5].symbol,
-                stack_rows(rotation.T * POSITION_BIAS.symbol, end_rotation.T * _spin_rate(1)),
+                stack(rotation.T * POSITION_BIAS.symbol, end_rotation.T * _spin_rate(1)),
             ),
         ),
     )
@@ -224,7 +208,7 @@ def frame_motion() -> Derivation:
     axes, v = W x x - xd.
     """
     rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
-    lever = tilde(row_entries(POSITION.symbol, 0))
+    lever = tilde(part(POSITION.symbol, 0))
     spin, rate = vector("W", 3), vector("Wd", 3)
     zero_block = sp.zeros(3, 3)
     subspace = sp.BlockMatrix(
@@ -233,12 +217,12 @@ def frame_motion() -> Derivation:
             [zero_block, -_tangent_operator(-1)],
         ]
     )
-    turn, x = tilde(row_entries(spin, 0)), row_entries(POSITION.symbol, 0)
+    turn, x = tilde(part(spin, 0)), part(POSITION.symbol, 0)
     relative_velocity = turn * x
     linear = (
-        tilde(row_entries(rate, 0)) * x
-        + 2 * turn * row_entries(POSITION_RATE.symbol, 0)
-        - row_entries(POSITION_BIAS.symbol, 0)
+        tilde(part(rate, 0)) * x
+        + 2 * turn * part(POSITION_RATE.symbol, 0)
+        - part(POSITION_BIAS.symbol, 0)
         - turn * relative_velocity
     )
     return _motion_derivation(
@@ -247,9 +231,9 @@ def frame_motion() -> Derivation:
             Equation("rotation", rotation, end_rotation.T * _rotation_matrix().T),
             Equation("place", _OUTPUTS[1].symbol, -rotation * POSITION.symbol),
             *_velocity_equations(subspace),
-            Equation("spin of the section", spin, -row_entries(_OUTPUTS[4].symbol, 0)),
+            Equation("spin of the section", spin, -part(_OUTPUTS[4].symbol, 0)),
             Equation("its rate", rate, _spin_rate(-1)),
-            Equation("bias", _OUTPUTS[5].symbol, stack_rows(linear, -row_entries(rate, 0))),
+            Equation("bias", _OUTPUTS[5].symbol, stack(linear, -part(rate, 0))),
         ),
     )
 

@@ -81,6 +81,19 @@ def _known_ports(structure: Structure) -> list[Port]:
     return [_slopes_port(structure), Port("r", (nu,)), Port("dq", (nq,)), Port("da", (nu,))]
 
 
+def _remainder_kernel(
+    graph: Graph, structure: Structure, ports: list[Port], remainder: list[Node]
+) -> KernelIR:
+    """Kernel of the right-hand side without the part of known increments."""
+    return graph.kernel(
+        "rest",
+        [*ports, *_known_ports(structure)],
+        [Port("rest", (structure.nu,))],
+        {"rest": remainder},
+        keep_order=True,
+    )
+
+
 def _solution_kernel(nu: int) -> KernelIR:
     graph = Graph()
     factors = [[graph.element("factors", i, j) for j in range(nu)] for i in range(nu)]
@@ -272,13 +285,7 @@ class _ResidualKernels:
         increments = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
         derivative = derivatives(self._r, dict(zip([*self._q, *self._a], increments, strict=True)))
         remainder = [a - b for a, b in zip(graph.vector("r", s.nu), derivative, strict=True)]
-        return graph.kernel(
-            "rest",
-            [*ports, *_known_ports(s)],
-            [Port("rest", (s.nu,))],
-            {"rest": remainder},
-            keep_order=True,
-        )
+        return _remainder_kernel(graph, s, ports, remainder)
 
     def matrix_kernels(self) -> list[KernelIR]:
         """Kernels that store K and M, and the tangent formed from them."""
@@ -322,10 +329,4 @@ class _ResidualKernels:
             nonzero = {k: increments[k] for k, slope in enumerate(row) if slope.value != 0}
             slopes = [graph.element("slopes", i, k) for k in range(len(row))]
             remainder.append(graph.element("r", i) - _product(graph, slopes, nonzero))
-        return graph.kernel(
-            "rest",
-            [*ports, *_known_ports(s)],
-            [Port("rest", (s.nu,))],
-            {"rest": remainder},
-            keep_order=True,
-        )
+        return _remainder_kernel(graph, s, ports, remainder)

@@ -317,9 +317,6 @@ SLOTS: dict[str, Slot] = {
     )
 }  # fmt: skip
 
-#: Slots of field moments, by the ports that read them.
-FIELDS = ("moments", "drag", "section")
-
 #: trait -> its condition.
 TRAITS: dict[str, str] = {
     "own": "the hinge is swept by its own kernels, one per pass",
