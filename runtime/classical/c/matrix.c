@@ -1,6 +1,5 @@
 /* Small dense matrices, row by row. */
 #include <math.h>
-#include <string.h>
 
 #include "parts.h"
 
@@ -50,42 +49,6 @@ int classical_solve(int n, int m, real *a, real *b)
         for (int j = 0; j < m; j++) {
             for (int i = k + 1; i < n; i++) b[m * k + j] -= a[n * k + i] * b[m * i + j];
             b[m * k + j] /= a[n * k + k];
-        }
-    return 0;
-}
-
-/* One reflection of Householder: zeros below the diagonal of column k of the n + m columns. */
-static int reflect(int rows, int width, int k, real *system)
-{
-    real norm = 0, square = 0, v[2 * WIDEST];
-    for (int i = k; i < rows; i++) norm = hypot(norm, system[width * i + k]);
-    if (!(norm > 0)) return 1;
-    const real alpha = system[width * k + k] > 0 ? -norm : norm;
-    for (int i = k; i < rows; i++) {
-        v[i] = system[width * i + k] - (i == k ? alpha : 0);
-        square += v[i] * v[i];
-    }
-    for (int j = k; j < width; j++) {
-        real dot = 0;
-        for (int i = k; i < rows; i++) dot += v[i] * system[width * i + j];
-        for (int i = k; i < rows; i++) system[width * i + j] -= 2 * dot / square * v[i];
-    }
-    return 0;
-}
-
-/* x (n x m): least squares of `rows` equations A x = b; system holds [A | b], destroyed.  Returns 1
- * for a rank below n. */
-int classical_least_squares(int rows, int n, int m, real *system, real *x)
-{
-    const int width = n + m;
-    if (rows < n) return 1;
-    for (int k = 0; k < n; k++)
-        if (reflect(rows, width, k, system)) return 1;
-    for (int k = n - 1; k >= 0; k--)
-        for (int j = 0; j < m; j++) {
-            x[m * k + j] = system[width * k + n + j];
-            for (int i = k + 1; i < n; i++) x[m * k + j] -= system[width * k + i] * x[m * i + j];
-            x[m * k + j] /= system[width * k + k];
         }
     return 0;
 }

@@ -75,7 +75,6 @@ static inline int fail(run_record *run, int reason, int body)
 /* matrix.c */
 void classical_multiply(int n, int k, int m, const real *a, const real *b, real *out);
 int classical_solve(int n, int m, real *a, real *b);
-int classical_least_squares(int rows, int n, int m, real *system, real *x);
 /* rotation.c */
 void classical_exponential(const real *vector, real *rotation);
 void classical_inverse_tangent(const real *vector, real *matrix);

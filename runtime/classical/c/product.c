@@ -8,9 +8,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "least_squares.h"
 #include "parts.h"
 
-#define ROWS (2 * WIDEST)
+#define ROWS MSTMM_LEAST_SQUARES_ROWS /* 2 WIDEST */
 
 /* The body's matrix to its main child, with the loads of the other branches in it. */
 static int add_branches(const step_record *step, int index)
@@ -185,8 +186,8 @@ static int close_chain(const step_record *step, int index)
     const int columns = columns_of(step, step->run->bodies[index].parent);
     real system[ROWS * 2 * WIDEST], x[WIDEST];
     const int rows = boundary(step, index, held, system);
-    if (held) return classical_least_squares(rows, rigid, columns, system, one->relation);
-    if (classical_least_squares(rows, rigid + modes, 1, system, x)) return 1;
+    if (held) return mstmm_least_squares(rows, rigid, columns, system, one->relation);
+    if (mstmm_least_squares(rows, rigid + modes, 1, system, x)) return 1;
     classical_let_go(step, index, x);
     return 0;
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "controllers.h"
+#include "is_finite.h"
 
 static const real SAME = 1e-9; /* of a sample time: a time so near to a sample is the sample */
 
@@ -45,13 +46,6 @@ static void add_product(int n, int columns, const real *m, const real *from, rea
         for (int j = 0; j < columns; j++) to[i] += m[i * columns + j] * from[j];
 }
 
-static int all_finite(int n, const real *x)
-{
-    for (int i = 0; i < n; i++)
-        if (!isfinite(x[i])) return 0;
-    return 1;
-}
-
 static int is_due(const mstmm_controller *one, real *memory, real t)
 {
     const real Ts = one->sample_time;
@@ -71,7 +65,7 @@ static int update_controller(const mstmm_controller *one, real *memory, real t)
     add_product(one->n_x, one->n_y, one->B, one->y, one->next);
     memcpy(x, one->next, (size_t)one->n_x * sizeof(real));
     memory[0] = floor(t / one->sample_time + SAME) + 1;
-    return all_finite(one->n_x + one->n_u, x);
+    return mstmm_finite(one->n_x + one->n_u, x);
 }
 
 static int note_controller_failure(mstmm_scene_run *run, int number)
@@ -88,7 +82,7 @@ int mstmm_controllers_act(mstmm_scene_run *run, real t, const real *y)
         if (!is_due(one, run->memory + one->memory, t)) continue;
         const int code = mstmm_evaluate_measure(run, one->measure, t, y, one->y);
         if (code) return code;
-        if (!all_finite(one->n_y, one->y)) return note_controller_failure(run, k);
+        if (!mstmm_finite(one->n_y, one->y)) return note_controller_failure(run, k);
         due = 1;
     }
     for (int k = 0; due && k < run->n_controllers; k++) {

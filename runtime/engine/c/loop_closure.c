@@ -115,6 +115,22 @@ int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real 
     return mstmm_run_accelerations(&state);
 }
 
+/* Errors of the rows in the last sweep, by row. */
+static void write_row_errors(const mstmm_state *state, real *missing)
+{
+    const mstmm_model *model = state->model;
+    for (int i = 0; i < model->n_bodies; i++) {
+        const mstmm_closure *closure = model->looped[i].closure;
+        if (!closure) continue;
+        const real *known = state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
+        for (int c = 0; c < 6; c++)
+            if (closure->rows[c] >= 0) missing[closure->rows[c]] = known[c];
+    }
+    for (int k = 0; k < model->n_couplings; k++)
+        if (model->couplings[k].row >= 0)
+            missing[model->couplings[k].row] = mstmm_coupling_lack(state, &model->couplings[k]);
+}
+
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
                      const real *q, const real *u, const real *memory, real *change, real *missing,
                      mstmm_failure *failure)
@@ -129,7 +145,7 @@ int mstmm_correction(const mstmm_model *model, real *workspace, int level, real 
                          .give = give,
                          .failure = failure};
     const int code = mstmm_run_correction_from_zero(&state, change);
-    if (!code && missing) mstmm_missing(&state, missing);
+    if (!code && missing) write_row_errors(&state, missing);
     return code;
 }
 
@@ -141,21 +157,6 @@ real mstmm_strain(const mstmm_model *model, const real *workspace)
         found = fmax(found, model->rows[r].floor * numbers[MSTMM_ROW_INVERSE]);
     }
     return found;
-}
-
-void mstmm_missing(const mstmm_state *state, real *missing)
-{
-    const mstmm_model *model = state->model;
-    for (int i = 0; i < model->n_bodies; i++) {
-        const mstmm_closure *closure = model->looped[i].closure;
-        if (!closure) continue;
-        const real *known = state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
-        for (int c = 0; c < 6; c++)
-            if (closure->rows[c] >= 0) missing[closure->rows[c]] = known[c];
-    }
-    for (int k = 0; k < model->n_couplings; k++)
-        if (model->couplings[k].row >= 0)
-            missing[model->couplings[k].row] = mstmm_coupling_lack(state, &model->couplings[k]);
 }
 
 int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,

@@ -33,8 +33,6 @@ int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real 
 /* Nearness to a singular pose in the last sweep: the largest ratio of a row's rounding level to its
  * pivot. */
 real mstmm_strain(const mstmm_model *model, const real *workspace);
-/* Errors of the rows in the last sweep, by row. */
-void mstmm_missing(const mstmm_state *state, real *missing);
 /* Error of a coupling in the last sweep; 0 if it is inactive. */
 real mstmm_coupling_lack(const mstmm_state *state, const mstmm_coupling *one);
 /* Efforts of the hinge of a body without those of couplings. */

@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "kernel_calls.h"
+#include "least_squares.h"
 #include "sweep.h"
 #include "sweep_steps.h"
 
@@ -110,35 +111,6 @@ static void scale_tip(real *system)
     for (int i = 0; size > 0 && i < 42; i++) system[i] /= size;
 }
 
-/* Least squares of `rows` equations in 6 unknowns; Householder.  system holds [A | b], 7 numbers a
- * row.  Returns 0, or 1 for a rank below 6. */
-static int solve_boundary(int rows, real *system, real *x)
-{
-    for (int k = 0; k < 6; k++) {
-        real norm = 0;
-        for (int i = k; i < rows; i++) norm = hypot(norm, system[7 * i + k]);
-        if (!(norm > 0)) return 1;
-        real alpha = system[7 * k + k] > 0 ? -norm : norm;
-        real v[ROWS], square = 0;
-        for (int i = k; i < rows; i++) {
-            v[i] = system[7 * i + k] - (i == k ? alpha : 0);
-            square += v[i] * v[i];
-        }
-        for (int j = k; j < 7 && square > 0; j++) {
-            real dot = 0;
-            for (int i = k; i < rows; i++) dot += v[i] * system[7 * i + j];
-            for (int i = k; i < rows; i++) system[7 * i + j] -= 2 * dot / square * v[i];
-        }
-    }
-    for (int k = 5; k >= 0; k--) {
-        x[k] = system[7 * k + 6];
-        for (int j = k + 1; j < 6; j++) x[k] -= system[7 * k + j] * x[j];
-        if (!(fabs(system[7 * k + k]) > 0)) return 1;
-        x[k] /= system[7 * k + k];
-    }
-    return 0;
-}
-
 /* The first hinge's own condition on (m, q) at the ground: rows of [A | b]. */
 static int root_condition(const mstmm_state *state, real *system)
 {
@@ -193,7 +165,7 @@ static int ground_state(const mstmm_state *state, const real *overall, int alone
     real *own = system + 7 * (6 - first);
     const int conditions = root_condition(state, own), rows = 6 - first + conditions;
     for (int i = 0; i < conditions && alone; i++) own[7 * i + 6] = 0;
-    if (solve_boundary(rows, system, forces)) return 1;
+    if (mstmm_least_squares(rows, 6, 1, system, forces)) return 1;
     memcpy(root + 6, forces, sizeof forces);
     return 0;
 }

@@ -84,6 +84,13 @@ int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const rea
 
 /* --- tangent --- */
 
+static void clear_direction(const mstmm_model *model, const mstmm_parts *parts)
+{
+    memset(parts->d_q, 0, (size_t)model->nq * sizeof(real));
+    memset(parts->d_u, 0, (size_t)model->nu * sizeof(real));
+    memset(parts->d_a, 0, (size_t)model->nu * sizeof(real));
+}
+
 static void set_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
     at->rate = rate;

@@ -88,13 +88,6 @@ static inline mstmm_tangents tangent_steps(const mstmm_tangent *at)
                             .kept = at->kept};
 }
 
-static inline void clear_direction(const mstmm_model *model, const mstmm_parts *parts)
-{
-    memset(parts->d_q, 0, (size_t)model->nq * sizeof(real));
-    memset(parts->d_u, 0, (size_t)model->nu * sizeof(real));
-    memset(parts->d_a, 0, (size_t)model->nu * sizeof(real));
-}
-
 static inline mstmm_state tangent_slope(mstmm_tangent *at, const mstmm_parts *parts, real *required)
 {
     mstmm_state slope = tangent_state(at, parts);

@@ -53,7 +53,6 @@ int mstmm_in_gap(const mstmm_run *run);
 /* Failure if the run ends here (at a pole, after too many steps, or with its end out of reach),
  * else 0. */
 int mstmm_no_further(mstmm_run *run);
-double mstmm_smallest_step(const mstmm_run *run);
 double mstmm_interval(const mstmm_run *run);
 int mstmm_output_inside(const mstmm_run *run);
 int mstmm_reject(mstmm_run *run, int failed, double error);

@@ -30,7 +30,7 @@ static double rounding(const mstmm_run *run)
     return 10.0 * (nextafter(run->real.t, INFINITY) - run->real.t);
 }
 
-double mstmm_smallest_step(const mstmm_run *run)
+static double smallest_step(const mstmm_run *run)
 {
     return fmax(run->min_step, fmax(rounding(run), HOPELESS * (run->t_end - run->t_start)));
 }
@@ -64,7 +64,7 @@ static double longest_step(mstmm_run *run, double h)
 
 static void aim_adaptive(mstmm_run *run, double stop, int is_break)
 {
-    const double wanted = fmax(run->real.h_next, mstmm_smallest_step(run));
+    const double wanted = fmax(run->real.h_next, smallest_step(run));
     const double most = longest_step(run, STRETCH * wanted), h = fmin(wanted, most);
     const int reaches = run->real.t + most >= stop;
     run->real.t_new = reaches ? stop : run->real.t + h;
@@ -112,7 +112,7 @@ int mstmm_reject(mstmm_run *run, int failed, double error)
     run->count.rejected++;
     run->count.rejected_last++;
     run->real.h_next = run->real.h * fmin(factor, 0.95);
-    const int small = run->real.h_next < mstmm_smallest_step(run);
+    const int small = run->real.h_next < smallest_step(run);
     const int enough = run->count.rejected_last > MOST_REJECTIONS;
     return run->fixed_step > 0.0 || small || enough ? (int)run->count.fail_status : 0;
 }
