@@ -4242,6 +4242,165 @@ static int mstmm_complex_sweep_tangent_assemble_port(int n, const double *restri
   }
 }
 
+/* outboard stations along the unknowns of their body
+ */
+static inline __attribute__((always_inline))
+int mstmm_complex_sweep_tangent_carry_columns_sized(int n, const double *restrict Rc,
+    const double *restrict r, const double *restrict w_I, const double *restrict v,
+    const double *restrict w, const double *restrict H, complex_in_t B, complex_in_t K_o, complex_in_t Z_o, complex_out_t K,
+    complex_out_t Z_z, complex_out_t Z_x)
+{
+  for (int k = 0; k < n; ++k) {
+    K[6 * k] = z_add(K[6 * k], z_add(z_add(z_scale(Rc[0], K_o[6 * k]), z_scale(Rc[1], K_o[6 * k +
+      1])), z_scale(Rc[2], K_o[6 * k + 2])));
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 1] = z_add(K[6 * k + 1], z_add(z_add(z_scale(Rc[3], K_o[6 * k]), z_scale(Rc[4], K_o[6
+      * k + 1])), z_scale(Rc[5], K_o[6 * k + 2])));
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 2] = z_add(K[6 * k + 2], z_add(z_add(z_scale(Rc[6], K_o[6 * k]), z_scale(Rc[7], K_o[6
+      * k + 1])), z_scale(Rc[8], K_o[6 * k + 2])));
+  }
+  double t22 = Rc[6] * r[1] - Rc[3] * r[2];
+  double t26 = Rc[7] * r[1] - Rc[4] * r[2];
+  double t31 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 3] = z_add(K[6 * k + 3], z_add(z_add(z_add(z_scale(Rc[0], K_o[6 * k + 3]),
+      z_scale(Rc[1], K_o[6 * k + 4])), z_scale(Rc[2], K_o[6 * k + 5])), z_add(z_add(z_scale(t22,
+      K_o[6 * k]), z_scale(t26, K_o[6 * k + 1])), z_scale(t31, K_o[6 * k + 2]))));
+  }
+  double t42 = Rc[0] * r[2] - Rc[6] * r[0];
+  double t46 = Rc[1] * r[2] - Rc[7] * r[0];
+  double t51 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 4] = z_add(K[6 * k + 4], z_add(z_add(z_add(z_scale(Rc[3], K_o[6 * k + 3]),
+      z_scale(Rc[4], K_o[6 * k + 4])), z_scale(Rc[5], K_o[6 * k + 5])), z_add(z_add(z_scale(t42,
+      K_o[6 * k]), z_scale(t46, K_o[6 * k + 1])), z_scale(t51, K_o[6 * k + 2]))));
+  }
+  double t62 = Rc[3] * r[0] - Rc[0] * r[1];
+  double t66 = Rc[4] * r[0] - Rc[1] * r[1];
+  double t71 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 5] = z_add(K[6 * k + 5], z_add(z_add(z_add(z_scale(Rc[6], K_o[6 * k + 3]),
+      z_scale(Rc[7], K_o[6 * k + 4])), z_scale(Rc[8], K_o[6 * k + 5])), z_add(z_add(z_scale(t62,
+      K_o[6 * k]), z_scale(t66, K_o[6 * k + 1])), z_scale(t71, K_o[6 * k + 2]))));
+  }
+  double t75 = v[1] * 2.0;
+  double t77 = v[2] * 2.0;
+  double t87 = v[0] * 2.0;
+  double t107 = r[1] * w_I[1];
+  double t108 = r[2] * w_I[2];
+  double t109 = t107 + t108;
+  double t111 = r[0] * w_I[1];
+  double t112 = r[1] * w_I[0];
+  double t114 = t111 - 2.0 * t112;
+  double t117 = r[0] * w_I[2];
+  double t118 = r[2] * w_I[0];
+  double t120 = t117 - 2.0 * t118;
+  double t122 = Rc[0] * t109 + Rc[3] * t114 + Rc[6] * t120;
+  double t128 = Rc[1] * t109 + Rc[4] * t114 + Rc[7] * t120;
+  double t135 = Rc[2] * t109 + Rc[5] * t114 + Rc[8] * t120;
+  for (int k = 0; k < n; ++k) {
+    Z_z[k] = z_add(Z_z[k], z_add(z_add(z_add(z_scale(Rc[0], z_add(Z_o[k], z_add(z_sub(z_scale(t75,
+      Z_o[8 * n + k]), z_scale(t77, Z_o[7 * n + k])), z_sub(z_scale(w[1], Z_o[5 * n + k]),
+      z_scale(w[2], Z_o[4 * n + k]))))), z_scale(Rc[1], z_add(Z_o[n + k], z_add(z_sub(z_scale(t77,
+      Z_o[6 * n + k]), z_scale(t87, Z_o[8 * n + k])), z_sub(z_scale(w[2], Z_o[3 * n + k]),
+      z_scale(w[0], Z_o[5 * n + k])))))), z_scale(Rc[2], z_add(Z_o[2 * n + k],
+      z_add(z_sub(z_scale(t87, Z_o[7 * n + k]), z_scale(t75, Z_o[6 * n + k])), z_sub(z_scale(w[0],
+      Z_o[4 * n + k]), z_scale(w[1], Z_o[3 * n + k])))))), z_add(z_add(z_scale(t122, Z_o[6 * n +
+      k]), z_scale(t128, Z_o[7 * n + k])), z_scale(t135, Z_o[8 * n + k]))));
+  }
+  double t169 = t112 - 2.0 * t111;
+  double t171 = r[0] * w_I[0];
+  double t172 = t108 + t171;
+  double t175 = r[1] * w_I[2];
+  double t176 = r[2] * w_I[1];
+  double t178 = t175 - 2.0 * t176;
+  double t180 = Rc[0] * t169 + Rc[3] * t172 + Rc[6] * t178;
+  double t186 = Rc[1] * t169 + Rc[4] * t172 + Rc[7] * t178;
+  double t193 = Rc[2] * t169 + Rc[5] * t172 + Rc[8] * t178;
+  for (int k = 0; k < n; ++k) {
+    Z_z[n + k] = z_add(Z_z[n + k], z_add(z_add(z_add(z_scale(Rc[3], z_add(Z_o[k],
+      z_add(z_sub(z_scale(t75, Z_o[8 * n + k]), z_scale(t77, Z_o[7 * n + k])), z_sub(z_scale(w[1],
+      Z_o[5 * n + k]), z_scale(w[2], Z_o[4 * n + k]))))), z_scale(Rc[4], z_add(Z_o[n + k],
+      z_add(z_sub(z_scale(t77, Z_o[6 * n + k]), z_scale(t87, Z_o[8 * n + k])), z_sub(z_scale(w[2],
+      Z_o[3 * n + k]), z_scale(w[0], Z_o[5 * n + k])))))), z_scale(Rc[5], z_add(Z_o[2 * n + k],
+      z_add(z_sub(z_scale(t87, Z_o[7 * n + k]), z_scale(t75, Z_o[6 * n + k])), z_sub(z_scale(w[0],
+      Z_o[4 * n + k]), z_scale(w[1], Z_o[3 * n + k])))))), z_add(z_add(z_scale(t180, Z_o[6 * n +
+      k]), z_scale(t186, Z_o[7 * n + k])), z_scale(t193, Z_o[8 * n + k]))));
+  }
+  double t227 = t118 - 2.0 * t117;
+  double t230 = t176 - 2.0 * t175;
+  double t233 = t107 + t171;
+  double t235 = Rc[0] * t227 + Rc[3] * t230 + Rc[6] * t233;
+  double t241 = Rc[1] * t227 + Rc[4] * t230 + Rc[7] * t233;
+  double t248 = Rc[2] * t227 + Rc[5] * t230 + Rc[8] * t233;
+  for (int k = 0; k < n; ++k) {
+    Z_z[2 * n + k] = z_add(Z_z[2 * n + k], z_add(z_add(z_add(z_scale(Rc[6], z_add(Z_o[k],
+      z_add(z_sub(z_scale(t75, Z_o[8 * n + k]), z_scale(t77, Z_o[7 * n + k])), z_sub(z_scale(w[1],
+      Z_o[5 * n + k]), z_scale(w[2], Z_o[4 * n + k]))))), z_scale(Rc[7], z_add(Z_o[n + k],
+      z_add(z_sub(z_scale(t77, Z_o[6 * n + k]), z_scale(t87, Z_o[8 * n + k])), z_sub(z_scale(w[2],
+      Z_o[3 * n + k]), z_scale(w[0], Z_o[5 * n + k])))))), z_scale(Rc[8], z_add(Z_o[2 * n + k],
+      z_add(z_sub(z_scale(t87, Z_o[7 * n + k]), z_scale(t75, Z_o[6 * n + k])), z_sub(z_scale(w[0],
+      Z_o[4 * n + k]), z_scale(w[1], Z_o[3 * n + k])))))), z_add(z_add(z_scale(t235, Z_o[6 * n +
+      k]), z_scale(t241, Z_o[7 * n + k])), z_scale(t248, Z_o[8 * n + k]))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[3 * n + k] = z_add(Z_z[3 * n + k], z_add(z_add(z_add(z_scale(Rc[0], Z_o[3 * n + k]),
+      z_scale(Rc[1], Z_o[4 * n + k])), z_scale(Rc[2], Z_o[5 * n + k])), z_add(z_add(z_scale(t22,
+      Z_o[6 * n + k]), z_scale(t26, Z_o[7 * n + k])), z_scale(t31, Z_o[8 * n + k]))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[4 * n + k] = z_add(Z_z[4 * n + k], z_add(z_add(z_add(z_scale(Rc[3], Z_o[3 * n + k]),
+      z_scale(Rc[4], Z_o[4 * n + k])), z_scale(Rc[5], Z_o[5 * n + k])), z_add(z_add(z_scale(t42,
+      Z_o[6 * n + k]), z_scale(t46, Z_o[7 * n + k])), z_scale(t51, Z_o[8 * n + k]))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[5 * n + k] = z_add(Z_z[5 * n + k], z_add(z_add(z_add(z_scale(Rc[6], Z_o[3 * n + k]),
+      z_scale(Rc[7], Z_o[4 * n + k])), z_scale(Rc[8], Z_o[5 * n + k])), z_add(z_add(z_scale(t62,
+      Z_o[6 * n + k]), z_scale(t66, Z_o[7 * n + k])), z_scale(t71, Z_o[8 * n + k]))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[6 * n + k] = z_add(Z_z[6 * n + k], z_add(z_add(z_scale(Rc[0], Z_o[6 * n + k]),
+      z_scale(Rc[1], Z_o[7 * n + k])), z_scale(Rc[2], Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[7 * n + k] = z_add(Z_z[7 * n + k], z_add(z_add(z_scale(Rc[3], Z_o[6 * n + k]),
+      z_scale(Rc[4], Z_o[7 * n + k])), z_scale(Rc[5], Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[8 * n + k] = z_add(Z_z[8 * n + k], z_add(z_add(z_scale(Rc[6], Z_o[6 * n + k]),
+      z_scale(Rc[7], Z_o[7 * n + k])), z_scale(Rc[8], Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] = z_add(Z_x[n * k + l],
+        z_add(z_add(z_add(z_add(z_add(z_add(z_add(z_add(z_add(z_mul(B[9 * k], Z_o[l]), z_mul(B[9 * k
+        + 1], Z_o[n + l])), z_mul(B[9 * k + 2], Z_o[2 * n + l])), z_mul(B[9 * k + 3], Z_o[3 * n +
+        l])), z_mul(B[9 * k + 4], Z_o[4 * n + l])), z_mul(B[9 * k + 5], Z_o[5 * n + l])), z_mul(B[9
+        * k + 6], Z_o[6 * n + l])), z_mul(B[9 * k + 7], Z_o[7 * n + l])), z_mul(B[9 * k + 8], Z_o[8
+        * n + l])), z_add(z_add(z_add(z_add(z_add(z_scale(H[l], K_o[6 * k]), z_scale(H[n + l], K_o[6
+        * k + 1])), z_scale(H[2 * n + l], K_o[6 * k + 2])), z_scale(H[3 * n + l], K_o[6 * k + 3])),
+        z_scale(H[4 * n + l], K_o[6 * k + 4])), z_scale(H[5 * n + l], K_o[6 * k + 5]))));
+    }
+  }
+  return 0;
+}
+
+static int mstmm_complex_sweep_tangent_carry_columns(int n, const double *restrict Rc, const double *restrict r,
+    const double *restrict w_I, const double *restrict v, const double *restrict w,
+    const double *restrict H, complex_in_t B, complex_in_t K_o, complex_in_t Z_o, complex_out_t K, complex_out_t Z_z, complex_out_t Z_x)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_complex_sweep_tangent_carry_columns_sized(1, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  case 2: return mstmm_complex_sweep_tangent_carry_columns_sized(2, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  case 3: return mstmm_complex_sweep_tangent_carry_columns_sized(3, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  case 4: return mstmm_complex_sweep_tangent_carry_columns_sized(4, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  default: return mstmm_complex_sweep_tangent_carry_columns_sized(n, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  }
+}
+
 /* unknowns eliminated from a right-hand side
  */
 static inline __attribute__((always_inline))
@@ -4805,6 +4964,115 @@ static int mstmm_complex_sweep_tangent_node(int n, const double *restrict H, com
   case 3: return mstmm_complex_sweep_tangent_node_sized(3, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
   case 4: return mstmm_complex_sweep_tangent_node_sized(4, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
   default: return mstmm_complex_sweep_tangent_node_sized(n, H, B, G, W, S, K, Z_z, Z_x, V, D, right, gain, S_c, work);
+  }
+}
+
+/* outboard stations by the pose, along the unknowns of their body
+ */
+static inline __attribute__((always_inline))
+int mstmm_complex_sweep_tangent_placed_carry_columns_sized(int n, const double *restrict Rc,
+    const double *restrict r, complex_in_t B_p, complex_in_t Z_o, complex_out_t Z_p, complex_out_t Z_z, complex_out_t Z_x)
+{
+  double t7 = Rc[6] * r[1] - Rc[3] * r[2];
+  double t11 = Rc[7] * r[1] - Rc[4] * r[2];
+  double t16 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    Z_p[k] = z_add(Z_p[k], z_add(z_add(z_add(z_scale(Rc[0], Z_o[k]), z_scale(Rc[1], Z_o[n + k])),
+      z_scale(Rc[2], Z_o[2 * n + k])), z_add(z_add(z_scale(t7, Z_o[3 * n + k]), z_scale(t11, Z_o[4 *
+      n + k])), z_scale(t16, Z_o[5 * n + k]))));
+  }
+  double t27 = Rc[0] * r[2] - Rc[6] * r[0];
+  double t31 = Rc[1] * r[2] - Rc[7] * r[0];
+  double t36 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    Z_p[n + k] = z_add(Z_p[n + k], z_add(z_add(z_add(z_scale(Rc[3], Z_o[k]), z_scale(Rc[4], Z_o[n +
+      k])), z_scale(Rc[5], Z_o[2 * n + k])), z_add(z_add(z_scale(t27, Z_o[3 * n + k]), z_scale(t31,
+      Z_o[4 * n + k])), z_scale(t36, Z_o[5 * n + k]))));
+  }
+  double t47 = Rc[3] * r[0] - Rc[0] * r[1];
+  double t51 = Rc[4] * r[0] - Rc[1] * r[1];
+  double t56 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    Z_p[2 * n + k] = z_add(Z_p[2 * n + k], z_add(z_add(z_add(z_scale(Rc[6], Z_o[k]), z_scale(Rc[7],
+      Z_o[n + k])), z_scale(Rc[8], Z_o[2 * n + k])), z_add(z_add(z_scale(t47, Z_o[3 * n + k]),
+      z_scale(t51, Z_o[4 * n + k])), z_scale(t56, Z_o[5 * n + k]))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[3 * n + k] = z_add(Z_p[3 * n + k], z_add(z_add(z_scale(Rc[0], Z_o[3 * n + k]),
+      z_scale(Rc[1], Z_o[4 * n + k])), z_scale(Rc[2], Z_o[5 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[4 * n + k] = z_add(Z_p[4 * n + k], z_add(z_add(z_scale(Rc[3], Z_o[3 * n + k]),
+      z_scale(Rc[4], Z_o[4 * n + k])), z_scale(Rc[5], Z_o[5 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[5 * n + k] = z_add(Z_p[5 * n + k], z_add(z_add(z_scale(Rc[6], Z_o[3 * n + k]),
+      z_scale(Rc[7], Z_o[4 * n + k])), z_scale(Rc[8], Z_o[5 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[6 * n + k] = z_add(Z_p[6 * n + k], z_add(z_add(z_scale(Rc[0], Z_o[6 * n + k]),
+      z_scale(Rc[1], Z_o[7 * n + k])), z_scale(Rc[2], Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[7 * n + k] = z_add(Z_p[7 * n + k], z_add(z_add(z_scale(Rc[3], Z_o[6 * n + k]),
+      z_scale(Rc[4], Z_o[7 * n + k])), z_scale(Rc[5], Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[8 * n + k] = z_add(Z_p[8 * n + k], z_add(z_add(z_scale(Rc[6], Z_o[6 * n + k]),
+      z_scale(Rc[7], Z_o[7 * n + k])), z_scale(Rc[8], Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[k] = z_add(Z_z[k], z_add(z_add(z_scale(t7, Z_o[6 * n + k]), z_scale(t11, Z_o[7 * n + k])),
+      z_scale(t16, Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[n + k] = z_add(Z_z[n + k], z_add(z_add(z_scale(t27, Z_o[6 * n + k]), z_scale(t31, Z_o[7 * n
+      + k])), z_scale(t36, Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[2 * n + k] = z_add(Z_z[2 * n + k], z_add(z_add(z_scale(t47, Z_o[6 * n + k]), z_scale(t51,
+      Z_o[7 * n + k])), z_scale(t56, Z_o[8 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[3 * n + k] = z_add(Z_z[3 * n + k], z_plain(0.0));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[4 * n + k] = z_add(Z_z[4 * n + k], z_plain(0.0));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[5 * n + k] = z_add(Z_z[5 * n + k], z_plain(0.0));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[6 * n + k] = z_add(Z_z[6 * n + k], z_plain(0.0));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[7 * n + k] = z_add(Z_z[7 * n + k], z_plain(0.0));
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[8 * n + k] = z_add(Z_z[8 * n + k], z_plain(0.0));
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] = z_add(Z_x[n * k + l],
+        z_add(z_add(z_add(z_add(z_add(z_add(z_add(z_add(z_mul(B_p[9 * k], Z_o[l]), z_mul(B_p[9 * k +
+        1], Z_o[n + l])), z_mul(B_p[9 * k + 2], Z_o[2 * n + l])), z_mul(B_p[9 * k + 3], Z_o[3 * n +
+        l])), z_mul(B_p[9 * k + 4], Z_o[4 * n + l])), z_mul(B_p[9 * k + 5], Z_o[5 * n + l])),
+        z_mul(B_p[9 * k + 6], Z_o[6 * n + l])), z_mul(B_p[9 * k + 7], Z_o[7 * n + l])), z_mul(B_p[9
+        * k + 8], Z_o[8 * n + l])));
+    }
+  }
+  return 0;
+}
+
+static int mstmm_complex_sweep_tangent_placed_carry_columns(int n, const double *restrict Rc,
+    const double *restrict r, complex_in_t B_p, complex_in_t Z_o, complex_out_t Z_p, complex_out_t Z_z, complex_out_t Z_x)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_complex_sweep_tangent_placed_carry_columns_sized(1, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  case 2: return mstmm_complex_sweep_tangent_placed_carry_columns_sized(2, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  case 3: return mstmm_complex_sweep_tangent_placed_carry_columns_sized(3, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  case 4: return mstmm_complex_sweep_tangent_placed_carry_columns_sized(4, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  default: return mstmm_complex_sweep_tangent_placed_carry_columns_sized(n, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
   }
 }
 
@@ -6091,6 +6359,19 @@ static inline int mstmm_complex_tangent_assemble_port_by(struct mstmm_complex_ta
 }
 #define mstmm_complex_tangent_assemble_port(...) MSTMM_NAMED(mstmm_complex_tangent_assemble_port, __VA_ARGS__)
 
+struct mstmm_complex_tangent_carry_columns {
+    int n;
+    const double *Rc, *r, *w_I, *v, *w, *H;
+    const complex_t *B, *K_o, *Z_o;
+    complex_t *K, *Z_z, *Z_x;
+};
+static inline int mstmm_complex_tangent_carry_columns_by(struct mstmm_complex_tangent_carry_columns to)
+{
+    return mstmm_complex_sweep_tangent_carry_columns(to.n, to.Rc, to.r, to.w_I, to.v, to.w, to.H, to.B,
+      to.K_o, to.Z_o, to.K, to.Z_z, to.Z_x);
+}
+#define mstmm_complex_tangent_carry_columns(...) MSTMM_NAMED(mstmm_complex_tangent_carry_columns, __VA_ARGS__)
+
 struct mstmm_complex_tangent_column_load {
     int n;
     const double *H;
@@ -6138,6 +6419,19 @@ static inline int mstmm_complex_tangent_node_by(struct mstmm_complex_tangent_nod
       to.D, to.right, to.gain, to.S_c, to.work);
 }
 #define mstmm_complex_tangent_node(...) MSTMM_NAMED(mstmm_complex_tangent_node, __VA_ARGS__)
+
+struct mstmm_complex_tangent_placed_carry_columns {
+    int n;
+    const double *Rc, *r;
+    const complex_t *B_p, *Z_o;
+    complex_t *Z_p, *Z_z, *Z_x;
+};
+static inline int mstmm_complex_tangent_placed_carry_columns_by(struct mstmm_complex_tangent_placed_carry_columns to)
+{
+    return mstmm_complex_sweep_tangent_placed_carry_columns(to.n, to.Rc, to.r, to.B_p, to.Z_o, to.Z_p,
+      to.Z_z, to.Z_x);
+}
+#define mstmm_complex_tangent_placed_carry_columns(...) MSTMM_NAMED(mstmm_complex_tangent_placed_carry_columns, __VA_ARGS__)
 
 struct mstmm_complex_tangent_placed_node {
     int n;
@@ -6413,7 +6707,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
             .S_wI = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     }
-    if (body->section && !body->section->inward) {
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -6428,7 +6722,33 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && !body->section->inward && body->placed) {
+    if (body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        double *laid = section ? state->workspace + section->place : NULL;
+        complex_t *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        complex_t *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_complex_tangent_assemble_port(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
+            .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
+            .K_x = port + MSTMM_PORT_K(n),
+            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+        mstmm_complex_tangent_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .H = laid + MSTMM_SECTION_H(n),
+            .B = port + MSTMM_PORT_B(n), .K_o = port + MSTMM_PORT_OUTBOARD_K(n),
+            .Z_o = port + MSTMM_PORT_OUTBOARD_Z_Z(n),
+            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->section && !body->section->inward && body->placed && !(body->section && body->section->shapes)) {
         complex_t *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -6441,6 +6761,28 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
             .K = bend + MSTMM_BEND_K(n), .Z_p = bend + MSTMM_BEND_PLACE_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->section && body->section->shapes && body->placed) {
+        complex_t *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        double *laid = section ? state->workspace + section->place : NULL;
+        complex_t *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        complex_t *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_complex_tangent_placed_port(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
+            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+        mstmm_complex_tangent_placed_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .B_p = port + MSTMM_PORT_PLACE_B(n), .Z_o = port + MSTMM_PORT_OUTBOARD_Z_P(n),
+            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     return 0;

@@ -755,12 +755,17 @@ int mstmm_sweep_modal_end_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psi
     in_t Psidd, out_t R, out_t d, out_t H6, out_t v, out_t w, out_t c);
 int mstmm_sweep_modal_frame_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
     in_t Psidd, out_t R, out_t d, out_t H6, out_t v, out_t w, out_t c);
+int mstmm_sweep_modal_segment(int n, in_t b, in_t Bm, in_t eta, in_t etad, out_t dC1, out_t dC2,
+    out_t Phi, out_t Om, out_t Omd, out_t Omdd);
+int mstmm_sweep_modal_segment_motion(in_t R_end, in_t Om, in_t Omd, in_t Omdd, out_t R, out_t d,
+    out_t H6, out_t v, out_t w, out_t c);
 int mstmm_sweep_modal_subspace(int n, in_t H6, in_t Phi, out_t H);
 int mstmm_sweep_modal_prescribed_bias(int n, in_t H, in_t s, in_t c, out_t c_s);
 int mstmm_sweep_modal_assemble_port(int n, in_t Rc, in_t r, in_t H, in_t S, in_t e, out_t U,
     out_t S_rf, out_t S_ff, out_t e_f);
 int mstmm_sweep_modal_rebase(int n, in_t H, in_t S, in_t e, in_t S_rf, out_t S_rf_I, out_t S_ff,
     out_t e_f);
+int mstmm_sweep_modal_carry_columns(int n, in_t Rc, in_t r, in_t S_rf_I, out_t S_rf);
 int mstmm_sweep_modal_condense(int n, in_t S, in_t e, in_t S_rf, in_t S_ff, in_t e_f, out_t right,
     out_t Gg, out_t S_c, out_t e_c, out_t work);
 int mstmm_sweep_modal_recover(int n, in_t Gg, in_t delta_I, out_t etadd);
@@ -794,6 +799,11 @@ int mstmm_sweep_modal_end_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, in
 int mstmm_sweep_modal_frame_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
     in_t Psidd, in_t d_x, in_t d_Psi, in_t d_xd, in_t d_Psid, in_t d_xdd, in_t d_Psidd, out_t d_R,
     out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c);
+int mstmm_sweep_modal_segment_slope(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1, in_t dC2,
+    in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_Phi, out_t d_Om, out_t d_Omd,
+    out_t d_Omdd);
+int mstmm_sweep_modal_segment_motion_slope(in_t R_end, in_t Om, in_t Omd, in_t Omdd, in_t d_Om,
+    in_t d_Omd, in_t d_Omdd, out_t d_R, out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c);
 int mstmm_sweep_modal_subspace_slope(int n, in_t H6, in_t Phi, in_t d_H6, in_t d_Phi, out_t d_H);
 int mstmm_sweep_modal_prescribed_bias_slope(int n, in_t H, in_t s, in_t c, in_t d_H, in_t d_s,
     in_t d_c, out_t d_c_s);
@@ -853,6 +863,9 @@ int mstmm_sweep_tangent_node(int n, in_t H, in_t B, in_t G, in_t W, in_t S, in_t
     in_t Z_x, out_t V, out_t D, out_t right, out_t gain, out_t S_c, out_t work);
 int mstmm_sweep_tangent_assemble_port(int n, in_t Rc, in_t r, in_t H, in_t B, in_t G, in_t W,
     in_t S, in_t T, out_t K_x, out_t K, out_t Z_z, out_t Z_x);
+int mstmm_sweep_tangent_carry_columns(int n, in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t H,
+    in_t B, in_t K_o, in_t Z_o, out_t K, out_t Z_z, out_t Z_x);
+int mstmm_sweep_tangent_outboard_rows(int n, in_t Z_o, in_t b, out_t e_f);
 int mstmm_sweep_tangent_column_load(int n, in_t H, in_t V, in_t D, in_t e, in_t e_f, out_t rest,
     out_t y, out_t e_c, out_t work);
 int mstmm_sweep_tangent_column_solution(int n, in_t B, in_t gain, in_t y, in_t z_c, out_t x,
@@ -868,6 +881,8 @@ int mstmm_sweep_tangent_placed_node(int n, in_t H, in_t V, in_t D, in_t S_p, in_
     out_t gain, out_t S_c, out_t work);
 int mstmm_sweep_tangent_placed_port(int n, in_t Rc, in_t r, in_t H, in_t B_p, in_t S_p, in_t T_p,
     out_t K, out_t Z_p, out_t Z_x);
+int mstmm_sweep_tangent_placed_carry_columns(int n, in_t Rc, in_t r, in_t B_p, in_t Z_o, out_t Z_p,
+    out_t Z_z, out_t Z_x);
 int mstmm_sweep_tangent_placed_remainder(int n, in_t gain, in_t p, out_t y);
 
 #endif

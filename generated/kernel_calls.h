@@ -500,6 +500,29 @@ static inline int mstmm_modal_frame_motion_by(struct mstmm_modal_frame_motion to
 }
 #define mstmm_modal_frame_motion(...) MSTMM_NAMED(mstmm_modal_frame_motion, __VA_ARGS__)
 
+struct mstmm_modal_segment {
+    int n;
+    const real *b, *Bm, *eta, *etad;
+    real *dC1, *dC2, *Phi, *Om, *Omd, *Omdd;
+};
+static inline int mstmm_modal_segment_by(struct mstmm_modal_segment to)
+{
+    return mstmm_sweep_modal_segment(to.n, to.b, to.Bm, to.eta, to.etad, to.dC1, to.dC2, to.Phi,
+      to.Om, to.Omd, to.Omdd);
+}
+#define mstmm_modal_segment(...) MSTMM_NAMED(mstmm_modal_segment, __VA_ARGS__)
+
+struct mstmm_modal_segment_motion {
+    const real *R_end, *Om, *Omd, *Omdd;
+    real *R, *d, *H6, *v, *w, *c;
+};
+static inline int mstmm_modal_segment_motion_by(struct mstmm_modal_segment_motion to)
+{
+    return mstmm_sweep_modal_segment_motion(to.R_end, to.Om, to.Omd, to.Omdd, to.R, to.d, to.H6,
+      to.v, to.w, to.c);
+}
+#define mstmm_modal_segment_motion(...) MSTMM_NAMED(mstmm_modal_segment_motion, __VA_ARGS__)
+
 struct mstmm_modal_subspace {
     int n;
     const real *H6, *Phi;
@@ -544,6 +567,17 @@ static inline int mstmm_modal_rebase_by(struct mstmm_modal_rebase to)
     return mstmm_sweep_modal_rebase(to.n, to.H, to.S, to.e, to.S_rf, to.S_rf_I, to.S_ff, to.e_f);
 }
 #define mstmm_modal_rebase(...) MSTMM_NAMED(mstmm_modal_rebase, __VA_ARGS__)
+
+struct mstmm_modal_carry_columns {
+    int n;
+    const real *Rc, *r, *S_rf_I;
+    real *S_rf;
+};
+static inline int mstmm_modal_carry_columns_by(struct mstmm_modal_carry_columns to)
+{
+    return mstmm_sweep_modal_carry_columns(to.n, to.Rc, to.r, to.S_rf_I, to.S_rf);
+}
+#define mstmm_modal_carry_columns(...) MSTMM_NAMED(mstmm_modal_carry_columns, __VA_ARGS__)
 
 struct mstmm_modal_condense {
     int n;
@@ -760,6 +794,29 @@ static inline int mstmm_modal_frame_motion_slope_by(struct mstmm_modal_frame_mot
 }
 #define mstmm_modal_frame_motion_slope(...) MSTMM_NAMED(mstmm_modal_frame_motion_slope, __VA_ARGS__)
 
+struct mstmm_modal_segment_slope {
+    int n;
+    const real *b, *Bm, *eta, *etad, *dC1, *dC2, *d_eta, *d_etad;
+    real *d_dC1, *d_dC2, *d_Phi, *d_Om, *d_Omd, *d_Omdd;
+};
+static inline int mstmm_modal_segment_slope_by(struct mstmm_modal_segment_slope to)
+{
+    return mstmm_sweep_modal_segment_slope(to.n, to.b, to.Bm, to.eta, to.etad, to.dC1, to.dC2,
+      to.d_eta, to.d_etad, to.d_dC1, to.d_dC2, to.d_Phi, to.d_Om, to.d_Omd, to.d_Omdd);
+}
+#define mstmm_modal_segment_slope(...) MSTMM_NAMED(mstmm_modal_segment_slope, __VA_ARGS__)
+
+struct mstmm_modal_segment_motion_slope {
+    const real *R_end, *Om, *Omd, *Omdd, *d_Om, *d_Omd, *d_Omdd;
+    real *d_R, *d_d, *d_H6, *d_v, *d_w, *d_c;
+};
+static inline int mstmm_modal_segment_motion_slope_by(struct mstmm_modal_segment_motion_slope to)
+{
+    return mstmm_sweep_modal_segment_motion_slope(to.R_end, to.Om, to.Omd, to.Omdd, to.d_Om,
+      to.d_Omd, to.d_Omdd, to.d_R, to.d_d, to.d_H6, to.d_v, to.d_w, to.d_c);
+}
+#define mstmm_modal_segment_motion_slope(...) MSTMM_NAMED(mstmm_modal_segment_motion_slope, __VA_ARGS__)
+
 struct mstmm_modal_subspace_slope {
     int n;
     const real *H6, *Phi, *d_H6, *d_Phi;
@@ -841,6 +898,29 @@ static inline int mstmm_tangent_assemble_port_by(struct mstmm_tangent_assemble_p
       to.K_x, to.K, to.Z_z, to.Z_x);
 }
 #define mstmm_tangent_assemble_port(...) MSTMM_NAMED(mstmm_tangent_assemble_port, __VA_ARGS__)
+
+struct mstmm_tangent_carry_columns {
+    int n;
+    const real *Rc, *r, *w_I, *v, *w, *H, *B, *K_o, *Z_o;
+    real *K, *Z_z, *Z_x;
+};
+static inline int mstmm_tangent_carry_columns_by(struct mstmm_tangent_carry_columns to)
+{
+    return mstmm_sweep_tangent_carry_columns(to.n, to.Rc, to.r, to.w_I, to.v, to.w, to.H, to.B,
+      to.K_o, to.Z_o, to.K, to.Z_z, to.Z_x);
+}
+#define mstmm_tangent_carry_columns(...) MSTMM_NAMED(mstmm_tangent_carry_columns, __VA_ARGS__)
+
+struct mstmm_tangent_outboard_rows {
+    int n;
+    const real *Z_o, *b;
+    real *e_f;
+};
+static inline int mstmm_tangent_outboard_rows_by(struct mstmm_tangent_outboard_rows to)
+{
+    return mstmm_sweep_tangent_outboard_rows(to.n, to.Z_o, to.b, to.e_f);
+}
+#define mstmm_tangent_outboard_rows(...) MSTMM_NAMED(mstmm_tangent_outboard_rows, __VA_ARGS__)
 
 struct mstmm_tangent_column_load {
     int n;
@@ -955,6 +1035,18 @@ static inline int mstmm_tangent_placed_port_by(struct mstmm_tangent_placed_port 
       to.Z_p, to.Z_x);
 }
 #define mstmm_tangent_placed_port(...) MSTMM_NAMED(mstmm_tangent_placed_port, __VA_ARGS__)
+
+struct mstmm_tangent_placed_carry_columns {
+    int n;
+    const real *Rc, *r, *B_p, *Z_o;
+    real *Z_p, *Z_z, *Z_x;
+};
+static inline int mstmm_tangent_placed_carry_columns_by(struct mstmm_tangent_placed_carry_columns to)
+{
+    return mstmm_sweep_tangent_placed_carry_columns(to.n, to.Rc, to.r, to.B_p, to.Z_o, to.Z_p,
+      to.Z_z, to.Z_x);
+}
+#define mstmm_tangent_placed_carry_columns(...) MSTMM_NAMED(mstmm_tangent_placed_carry_columns, __VA_ARGS__)
 
 struct mstmm_tangent_placed_remainder {
     int n;

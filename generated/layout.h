@@ -107,6 +107,9 @@
 #define MSTMM_SECTION_PSID(n) (18 * (size_t)(n) + 45)
 #define MSTMM_SECTION_XDD(n) (18 * (size_t)(n) + 48)
 #define MSTMM_SECTION_PSIDD(n) (18 * (size_t)(n) + 51)
+#define MSTMM_SECTION_DC1(n) (18 * (size_t)(n) + 54)
+#define MSTMM_SECTION_DC2(n) (24 * (size_t)(n) + 54)
+#define MSTMM_SECTION_S_RF(n) (30 * (size_t)(n) + 54)
 /* Data of the tangent for a body, a flexible body, a section. */
 #define MSTMM_TANGENT_S(nu, nq) (0)
 #define MSTMM_TANGENT_B(nu, nq) (54 * 1)
@@ -155,5 +158,8 @@
 #define MSTMM_PORT_W(n) (15 * (size_t)(n) + 0 * (size_t)(n) * (n))
 #define MSTMM_PORT_K(n) (15 * (size_t)(n) + 1 * (size_t)(n) * (n))
 #define MSTMM_PORT_PLACE_B(n) (21 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_PORT_OUTBOARD_K(n) (30 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_PORT_OUTBOARD_Z_Z(n) (36 * (size_t)(n) + 1 * (size_t)(n) * (n))
+#define MSTMM_PORT_OUTBOARD_Z_P(n) (45 * (size_t)(n) + 1 * (size_t)(n) * (n))
 
 #endif

@@ -1443,6 +1443,731 @@ int mstmm_sweep_modal_frame_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t P
 MSTMM_CALL(mstmm_sweep_modal_frame_motion, (in[0], in[1], in[2], in[3], in[4], in[5], in[6], out[0],
   out[1], out[2], out[3], out[4], out[5]))
 
+/* segment of an exact beam
+ * source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, 2009, 5.3
+ * source: Sonneville, Cardona, Bruls, Geometrically exact beam finite element on SE(3), 2014
+ * source: Simo, A finite strain beam formulation, 1985 (strains in section axes)
+ * in  b[18] B1, B2, B3 at eta = 0
+ * in  Bm[18][n] derivatives of B1, B2, B3 by the strain coordinates
+ * in  eta[n] modal coordinates
+ * in  etad[n] modal speeds
+ * out dC1[6][n] derivatives of C1
+ * out dC2[6][n] derivatives of C2
+ * out Phi[6][n] rates of point and rotation vector per modal speed
+ * out Om[6] Omega: displacement, then rotation vector
+ * out Omd[6] rate of Omega
+ * out Omdd[6] second rate of Omega at etadd = 0
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_segment_sized(int n, in_t b, in_t Bm, in_t eta, in_t etad, out_t dC1,
+    out_t dC2, out_t Phi, out_t Om, out_t Omd, out_t Omdd)
+{
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += eta[k] * Bm[7 * n + k];
+  }
+  real t2 = b[7] + t1;
+  real t5 = 0;
+  for (int k = 0; k < n; ++k) {
+    t5 += eta[k] * Bm[8 * n + k];
+  }
+  real t6 = b[8] + t5;
+  real t10 = 0;
+  for (int k = 0; k < n; ++k) {
+    t10 += eta[k] * Bm[10 * n + k];
+  }
+  real t11 = b[10] + t10;
+  real t14 = 0;
+  for (int k = 0; k < n; ++k) {
+    t14 += eta[k] * Bm[11 * n + k];
+  }
+  real t15 = b[11] + t14;
+  real t20 = 0;
+  for (int k = 0; k < n; ++k) {
+    t20 += eta[k] * Bm[n + k];
+  }
+  real t21 = b[1] + t20;
+  real t24 = 0;
+  for (int k = 0; k < n; ++k) {
+    t24 += eta[k] * Bm[2 * n + k];
+  }
+  real t25 = b[2] + t24;
+  real t29 = 0;
+  for (int k = 0; k < n; ++k) {
+    t29 += eta[k] * Bm[4 * n + k];
+  }
+  real t30 = b[4] + t29;
+  real t33 = 0;
+  for (int k = 0; k < n; ++k) {
+    t33 += eta[k] * Bm[5 * n + k];
+  }
+  real t34 = b[5] + t33;
+  for (int k = 0; k < n; ++k) {
+    dC1[k] = Bm[5 * n + k] * t2 - Bm[4 * n + k] * t6 + (Bm[2 * n + k] * t11 - Bm[n + k] * t15) -
+      (t21 * Bm[11 * n + k] - t25 * Bm[10 * n + k] + (t30 * Bm[8 * n + k] - t34 * Bm[7 * n + k]));
+  }
+  real t41 = 0;
+  for (int k = 0; k < n; ++k) {
+    t41 += eta[k] * Bm[6 * n + k];
+  }
+  real t42 = b[6] + t41;
+  real t47 = 0;
+  for (int k = 0; k < n; ++k) {
+    t47 += eta[k] * Bm[9 * n + k];
+  }
+  real t48 = b[9] + t47;
+  real t54 = 0;
+  for (int k = 0; k < n; ++k) {
+    t54 += Bm[k] * eta[k];
+  }
+  real t55 = b[0] + t54;
+  real t60 = 0;
+  for (int k = 0; k < n; ++k) {
+    t60 += eta[k] * Bm[3 * n + k];
+  }
+  real t61 = b[3] + t60;
+  for (int k = 0; k < n; ++k) {
+    dC1[n + k] = Bm[3 * n + k] * t6 - Bm[5 * n + k] * t42 + (Bm[k] * t15 - Bm[2 * n + k] * t48) -
+      (t25 * Bm[9 * n + k] - t55 * Bm[11 * n + k] + (t34 * Bm[6 * n + k] - t61 * Bm[8 * n + k]));
+  }
+  for (int k = 0; k < n; ++k) {
+    dC1[2 * n + k] = Bm[4 * n + k] * t42 - Bm[3 * n + k] * t2 + (Bm[n + k] * t48 - Bm[k] * t11) -
+      (t55 * Bm[10 * n + k] - t21 * Bm[9 * n + k] + (t61 * Bm[7 * n + k] - t30 * Bm[6 * n + k]));
+  }
+  for (int k = 0; k < n; ++k) {
+    dC1[3 * n + k] = t34 * Bm[10 * n + k] - t30 * Bm[11 * n + k] + (Bm[5 * n + k] * t11 - Bm[4 * n +
+      k] * t15);
+  }
+  for (int k = 0; k < n; ++k) {
+    dC1[4 * n + k] = t61 * Bm[11 * n + k] - t34 * Bm[9 * n + k] + (Bm[3 * n + k] * t15 - Bm[5 * n +
+      k] * t48);
+  }
+  for (int k = 0; k < n; ++k) {
+    dC1[5 * n + k] = t30 * Bm[9 * n + k] - t61 * Bm[10 * n + k] + (Bm[4 * n + k] * t48 - Bm[3 * n +
+      k] * t11);
+  }
+  real t124 = t61 * t6 + (t55 * t15 - t25 * t48) - t34 * t42;
+  real t126 = 0;
+  for (int k = 0; k < n; ++k) {
+    t126 += eta[k] * Bm[13 * n + k];
+  }
+  real t127 = b[13] + t126;
+  real t129 = t124 + t127 * 2.0;
+  real t137 = t30 * t42 + (t21 * t48 - t55 * t11 - t61 * t2);
+  real t139 = 0;
+  for (int k = 0; k < n; ++k) {
+    t139 += eta[k] * Bm[14 * n + k];
+  }
+  real t140 = b[14] + t139;
+  real t142 = t137 + t140 * 2.0;
+  real t147 = t61 * t15 - t34 * t48;
+  real t149 = 0;
+  for (int k = 0; k < n; ++k) {
+    t149 += eta[k] * Bm[16 * n + k];
+  }
+  real t150 = b[16] + t149;
+  real t152 = t147 + t150 * 2.0;
+  real t156 = t30 * t48 - t61 * t11;
+  real t158 = 0;
+  for (int k = 0; k < n; ++k) {
+    t158 += eta[k] * Bm[17 * n + k];
+  }
+  real t159 = b[17] + t158;
+  real t161 = t156 + t159 * 2.0;
+  for (int k = 0; k < n; ++k) {
+    dC2[k] = ((real)1 / (real)60) * (t21 * (Bm[17 * n + k] * 2.0 + dC1[5 * n + k]) - t25 * (Bm[16 *
+      n + k] * 2.0 + dC1[4 * n + k]) + (t30 * (Bm[14 * n + k] * 2.0 + dC1[2 * n + k]) - t34 * (Bm[13
+      * n + k] * 2.0 + dC1[n + k]))) - ((real)1 / (real)60) * (Bm[5 * n + k] * t129 - Bm[4 * n + k]
+      * t142 + (Bm[2 * n + k] * t152 - Bm[n + k] * t161));
+  }
+  real t190 = t34 * t2 + (t25 * t11 - t21 * t15 - t30 * t6);
+  real t192 = 0;
+  for (int k = 0; k < n; ++k) {
+    t192 += eta[k] * Bm[12 * n + k];
+  }
+  real t193 = b[12] + t192;
+  real t195 = t190 + t193 * 2.0;
+  real t201 = t34 * t11 - t30 * t15;
+  real t203 = 0;
+  for (int k = 0; k < n; ++k) {
+    t203 += eta[k] * Bm[15 * n + k];
+  }
+  real t204 = b[15] + t203;
+  real t206 = t201 + t204 * 2.0;
+  for (int k = 0; k < n; ++k) {
+    dC2[n + k] = ((real)1 / (real)60) * (t25 * (Bm[15 * n + k] * 2.0 + dC1[3 * n + k]) - t55 *
+      (Bm[17 * n + k] * 2.0 + dC1[5 * n + k]) + (t34 * (Bm[12 * n + k] * 2.0 + dC1[k]) - t61 *
+      (Bm[14 * n + k] * 2.0 + dC1[2 * n + k]))) - ((real)1 / (real)60) * (Bm[3 * n + k] * t142 -
+      Bm[5 * n + k] * t195 + (Bm[k] * t161 - Bm[2 * n + k] * t206));
+  }
+  for (int k = 0; k < n; ++k) {
+    dC2[2 * n + k] = ((real)1 / (real)60) * (t55 * (Bm[16 * n + k] * 2.0 + dC1[4 * n + k]) - t21 *
+      (Bm[15 * n + k] * 2.0 + dC1[3 * n + k]) + (t61 * (Bm[13 * n + k] * 2.0 + dC1[n + k]) - t30 *
+      (Bm[12 * n + k] * 2.0 + dC1[k]))) - ((real)1 / (real)60) * (Bm[4 * n + k] * t195 - Bm[3 * n +
+      k] * t129 + (Bm[n + k] * t206 - Bm[k] * t152));
+  }
+  for (int k = 0; k < n; ++k) {
+    dC2[3 * n + k] = ((real)1 / (real)60) * (t30 * (Bm[17 * n + k] * 2.0 + dC1[5 * n + k]) - t34 *
+      (Bm[16 * n + k] * 2.0 + dC1[4 * n + k])) - ((real)1 / (real)60) * (Bm[5 * n + k] * t152 - Bm[4
+      * n + k] * t161);
+  }
+  for (int k = 0; k < n; ++k) {
+    dC2[4 * n + k] = ((real)1 / (real)60) * (t34 * (Bm[15 * n + k] * 2.0 + dC1[3 * n + k]) - t61 *
+      (Bm[17 * n + k] * 2.0 + dC1[5 * n + k])) - ((real)1 / (real)60) * (Bm[3 * n + k] * t161 - Bm[5
+      * n + k] * t206);
+  }
+  for (int k = 0; k < n; ++k) {
+    dC2[5 * n + k] = ((real)1 / (real)60) * (t61 * (Bm[16 * n + k] * 2.0 + dC1[4 * n + k]) - t30 *
+      (Bm[15 * n + k] * 2.0 + dC1[3 * n + k])) - ((real)1 / (real)60) * (Bm[4 * n + k] * t206 - Bm[3
+      * n + k] * t152);
+  }
+  real t285 = t2 + ((real)1 / (real)60) * (t34 * t195 + (t25 * t206 - t55 * t161 - t61 * t142));
+  real t298 = t6 + ((real)1 / (real)60) * (t61 * t129 + (t55 * t152 - t21 * t206) - t30 * t195);
+  real t308 = t11 + ((real)1 / (real)60) * (t34 * t206 - t61 * t161);
+  real t317 = t15 + ((real)1 / (real)60) * (t61 * t152 - t30 * t206);
+  real t326 = t140 + t25 * 20.0;
+  real t327 = t326 - t137;
+  real t331 = t127 + t21 * 20.0;
+  real t332 = t124 - t331;
+  real t337 = t159 + t34 * 20.0;
+  real t338 = t337 - t156;
+  real t342 = t150 + t30 * 20.0;
+  real t343 = t147 - t342;
+  for (int k = 0; k < n; ++k) {
+    Phi[k] = Bm[k] + (Bm[12 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240) * (t285 *
+      (dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0)) - t298 * (dC1[4 * n + k] - (Bm[16 *
+      n + k] + Bm[4 * n + k] * 20.0)) + (t308 * (dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] *
+      20.0)) - t317 * (dC1[n + k] - (Bm[13 * n + k] + Bm[n + k] * 20.0)))) - (t327 * (Bm[10 * n + k]
+      + dC2[4 * n + k]) + t332 * (Bm[11 * n + k] + dC2[5 * n + k]) + (t338 * (Bm[7 * n + k] + dC2[n
+      + k]) + t343 * (Bm[8 * n + k] + dC2[2 * n + k]))) * ((real)1 / (real)240)));
+  }
+  real t365 = t42 + ((real)1 / (real)60) * (t30 * t142 + (t21 * t161 - t25 * t152) - t34 * t129);
+  real t379 = t48 + ((real)1 / (real)60) * (t30 * t161 - t34 * t152);
+  real t387 = t137 - t326;
+  real t391 = t193 + t55 * 20.0;
+  real t392 = t391 - t190;
+  real t396 = t156 - t337;
+  real t400 = t204 + t61 * 20.0;
+  real t401 = t400 - t201;
+  for (int k = 0; k < n; ++k) {
+    Phi[n + k] = Bm[n + k] + (Bm[13 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240) * (t298
+      * (dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) - t365 * (dC1[5 * n + k] - (Bm[17
+      * n + k] + Bm[5 * n + k] * 20.0)) + (t317 * (dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)) - t379
+      * (dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] * 20.0)))) - ((real)1 / (real)240) * (t387
+      * (Bm[9 * n + k] + dC2[3 * n + k]) + t392 * (Bm[11 * n + k] + dC2[5 * n + k]) + (t396 * (Bm[6
+      * n + k] + dC2[k]) + t401 * (Bm[8 * n + k] + dC2[2 * n + k])))));
+  }
+  real t431 = t331 - t124;
+  real t434 = t190 - t391;
+  real t438 = t342 - t147;
+  real t441 = t201 - t400;
+  for (int k = 0; k < n; ++k) {
+    Phi[2 * n + k] = Bm[2 * n + k] + (Bm[14 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
+      * (t365 * (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0)) - t285 * (dC1[3 * n + k]
+      - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) + (t379 * (dC1[n + k] - (Bm[13 * n + k] + Bm[n + k]
+      * 20.0)) - t308 * (dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)))) - ((real)1 / (real)240) * (t431
+      * (Bm[9 * n + k] + dC2[3 * n + k]) + t434 * (Bm[10 * n + k] + dC2[4 * n + k]) + (t438 * (Bm[6
+      * n + k] + dC2[k]) + t441 * (Bm[7 * n + k] + dC2[n + k])))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Phi[3 * n + k] = Bm[3 * n + k] + (Bm[15 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
+      * (t308 * (dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0)) - t317 * (dC1[4 * n + k]
+      - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0))) - ((real)1 / (real)240) * ((Bm[10 * n + k] + dC2[4
+      * n + k]) * t338 + t343 * (Bm[11 * n + k] + dC2[5 * n + k]))));
+  }
+  for (int k = 0; k < n; ++k) {
+    Phi[4 * n + k] = Bm[4 * n + k] + (Bm[16 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
+      * (t317 * (dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) - t379 * (dC1[5 * n + k]
+      - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0))) - ((real)1 / (real)240) * (t396 * (Bm[9 * n + k] +
+      dC2[3 * n + k]) + (Bm[11 * n + k] + dC2[5 * n + k]) * t401)));
+  }
+  for (int k = 0; k < n; ++k) {
+    Phi[5 * n + k] = Bm[5 * n + k] + (Bm[17 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
+      * (t379 * (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0)) - t308 * (dC1[3 * n + k]
+      - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0))) - ((real)1 / (real)240) * ((Bm[9 * n + k] + dC2[3
+      * n + k]) * t438 + t441 * (Bm[10 * n + k] + dC2[4 * n + k]))));
+  }
+  Om[0] = t193 * ((real)1 / (real)12) + (t55 + (((real)1 / (real)240) * (t396 * t285) + (((real)1 /
+    (real)240) * (t387 * t308) - ((real)1 / (real)240) * (t332 * t317) - ((real)1 / (real)240) *
+    (t343 * t298))));
+  Om[1] = t127 * ((real)1 / (real)12) + (t21 + (((real)1 / (real)240) * (t441 * t298) + (((real)1 /
+    (real)240) * (t434 * t317) - ((real)1 / (real)240) * (t387 * t379)) - ((real)1 / (real)240) *
+    (t396 * t365)));
+  Om[2] = t140 * ((real)1 / (real)12) + (t25 + (((real)1 / (real)240) * (t343 * t365) + (((real)1 /
+    (real)240) * (t332 * t379) - ((real)1 / (real)240) * (t434 * t308) - ((real)1 / (real)240) *
+    (t441 * t285))));
+  Om[3] = t204 * ((real)1 / (real)12) + (t61 + (((real)1 / (real)240) * (t396 * t308) - ((real)1 /
+    (real)240) * (t343 * t317)));
+  Om[4] = t150 * ((real)1 / (real)12) + (t30 + (((real)1 / (real)240) * (t441 * t317) - ((real)1 /
+    (real)240) * (t396 * t379)));
+  Om[5] = t159 * ((real)1 / (real)12) + (t34 + (((real)1 / (real)240) * (t343 * t379) - ((real)1 /
+    (real)240) * (t441 * t308)));
+  real t577 = 0;
+  for (int k = 0; k < n; ++k) {
+    t577 += Bm[12 * n + k] * etad[k];
+  }
+  real t578 = t577 * ((real)1 / (real)12);
+  real t580 = 0;
+  for (int k = 0; k < n; ++k) {
+    t580 += Bm[k] * etad[k];
+  }
+  real t582 = 0;
+  for (int k = 0; k < n; ++k) {
+    t582 += Bm[4 * n + k] * etad[k];
+  }
+  real t583 = t48 * t582;
+  real t585 = 0;
+  for (int k = 0; k < n; ++k) {
+    t585 += Bm[9 * n + k] * etad[k];
+  }
+  real t586 = t30 * t585;
+  real t588 = 0;
+  for (int k = 0; k < n; ++k) {
+    t588 += Bm[10 * n + k] * etad[k];
+  }
+  real t591 = t583 + (t586 - t61 * t588);
+  real t593 = 0;
+  for (int k = 0; k < n; ++k) {
+    t593 += Bm[3 * n + k] * etad[k];
+  }
+  real t595 = t591 - t11 * t593;
+  real t597 = 0;
+  for (int k = 0; k < n; ++k) {
+    t597 += Bm[17 * n + k] * etad[k];
+  }
+  real t599 = 0;
+  for (int k = 0; k < n; ++k) {
+    t599 += Bm[5 * n + k] * etad[k];
+  }
+  real t602 = t595 - (t597 + t599 * 20.0);
+  real t604 = ((real)1 / (real)240) * (t602 * t285);
+  real t606 = 0;
+  for (int k = 0; k < n; ++k) {
+    t606 += Bm[n + k] * etad[k];
+  }
+  real t607 = t48 * t606;
+  real t608 = t42 * t582;
+  real t610 = 0;
+  for (int k = 0; k < n; ++k) {
+    t610 += Bm[6 * n + k] * etad[k];
+  }
+  real t611 = t30 * t610;
+  real t614 = t21 * t585 - t55 * t588;
+  real t616 = 0;
+  for (int k = 0; k < n; ++k) {
+    t616 += Bm[7 * n + k] * etad[k];
+  }
+  real t625 = t607 + (t608 + (t611 + (t614 - t61 * t616)) - t2 * t593) - t11 * t580;
+  real t627 = 0;
+  for (int k = 0; k < n; ++k) {
+    t627 += Bm[14 * n + k] * etad[k];
+  }
+  real t629 = 0;
+  for (int k = 0; k < n; ++k) {
+    t629 += Bm[2 * n + k] * etad[k];
+  }
+  real t632 = t625 - (t627 + t629 * 20.0);
+  real t634 = ((real)1 / (real)240) * (t632 * t308);
+  real t635 = t599 * t195;
+  real t636 = t629 * t206;
+  real t637 = t11 * t629;
+  real t638 = t2 * t599;
+  real t639 = t34 * t616;
+  real t640 = t25 * t588;
+  real t642 = 0;
+  for (int k = 0; k < n; ++k) {
+    t642 += Bm[11 * n + k] * etad[k];
+  }
+  real t644 = t640 - t21 * t642;
+  real t646 = 0;
+  for (int k = 0; k < n; ++k) {
+    t646 += Bm[8 * n + k] * etad[k];
+  }
+  real t655 = t637 + (t638 + (t639 + (t644 - t30 * t646)) - t6 * t582) - t15 * t606;
+  real t657 = t655 + t577 * 2.0;
+  real t658 = t34 * t657;
+  real t665 = t11 * t599 + (t34 * t588 - t30 * t642) - t15 * t582;
+  real t667 = 0;
+  for (int k = 0; k < n; ++k) {
+    t667 += Bm[15 * n + k] * etad[k];
+  }
+  real t669 = t665 + t667 * 2.0;
+  real t672 = t595 + t597 * 2.0;
+  real t676 = t625 + t627 * 2.0;
+  real t687 = t616 + ((real)1 / (real)60) * (t635 + (t636 + (t658 + (t25 * t669 - t55 * t672 - t61 *
+    t676) - t580 * t161) - t593 * t142));
+  real t689 = ((real)1 / (real)240) * (t396 * t687);
+  real t698 = t588 + ((real)1 / (real)60) * (t599 * t206 + (t34 * t669 - t61 * t672 - t593 * t161));
+  real t700 = ((real)1 / (real)240) * (t387 * t698);
+  real t701 = t593 * t152;
+  real t708 = t15 * t593 + (t61 * t642 - t34 * t585 - t48 * t599);
+  real t710 = 0;
+  for (int k = 0; k < n; ++k) {
+    t710 += Bm[16 * n + k] * etad[k];
+  }
+  real t712 = t708 + t710 * 2.0;
+  real t720 = t642 + ((real)1 / (real)60) * (t701 + (t61 * t712 - t30 * t669) - t582 * t206);
+  real t723 = t700 - ((real)1 / (real)240) * (t332 * t720);
+  real t724 = t593 * t129;
+  real t725 = t580 * t152;
+  real t740 = t15 * t580 + (t6 * t593 + (t61 * t646 + (t55 * t642 - t25 * t585) - t34 * t610 - t42 *
+    t599) - t48 * t629);
+  real t742 = 0;
+  for (int k = 0; k < n; ++k) {
+    t742 += Bm[13 * n + k] * etad[k];
+  }
+  real t744 = t740 + t742 * 2.0;
+  real t759 = t646 + ((real)1 / (real)60) * (t724 + (t725 + (t61 * t744 + (t55 * t712 - t21 * t669)
+    - t30 * t657) - t606 * t206) - t582 * t195);
+  real t766 = t740 - (t742 + t606 * 20.0);
+  real t773 = t708 - (t710 + t582 * 20.0);
+  Omd[0] = t578 + (t580 + (t604 + (t634 + (t689 + (t723 - ((real)1 / (real)240) * (t343 * t759)) -
+    ((real)1 / (real)240) * (t766 * t317)) - ((real)1 / (real)240) * (t773 * t298))));
+  real t783 = t665 - (t667 + t593 * 20.0);
+  real t788 = t655 - (t577 + t580 * 20.0);
+  real t803 = t585 + ((real)1 / (real)60) * (t582 * t161 + (t30 * t672 - t34 * t712) - t599 * t152);
+  real t824 = t610 + ((real)1 / (real)60) * (t582 * t142 + (t606 * t161 + (t30 * t676 + (t21 * t672
+    - t25 * t712) - t34 * t744) - t629 * t152) - t599 * t129);
+  Omd[1] = t742 * ((real)1 / (real)12) + (t606 + (((real)1 / (real)240) * (t783 * t298) + (((real)1
+    / (real)240) * (t788 * t317) + (((real)1 / (real)240) * (t441 * t759) + (((real)1 / (real)240) *
+    (t434 * t720) - ((real)1 / (real)240) * (t387 * t803)) - ((real)1 / (real)240) * (t396 * t824))
+    - ((real)1 / (real)240) * (t632 * t379)) - ((real)1 / (real)240) * (t602 * t365)));
+  Omd[2] = t627 * ((real)1 / (real)12) + (t629 + (((real)1 / (real)240) * (t773 * t365) + (((real)1
+    / (real)240) * (t766 * t379) + (((real)1 / (real)240) * (t343 * t824) + (((real)1 / (real)240) *
+    (t332 * t803) - ((real)1 / (real)240) * (t434 * t698) - ((real)1 / (real)240) * (t441 * t687)) -
+    ((real)1 / (real)240) * (t788 * t308)) - ((real)1 / (real)240) * (t783 * t285))));
+  Omd[3] = t667 * ((real)1 / (real)12) + (t593 + (((real)1 / (real)240) * (t602 * t308) + (((real)1
+    / (real)240) * (t396 * t698) - ((real)1 / (real)240) * (t343 * t720) - ((real)1 / (real)240) *
+    (t773 * t317))));
+  Omd[4] = t710 * ((real)1 / (real)12) + (t582 + (((real)1 / (real)240) * (t783 * t317) + (((real)1
+    / (real)240) * (t441 * t720) - ((real)1 / (real)240) * (t396 * t803)) - ((real)1 / (real)240) *
+    (t602 * t379)));
+  Omd[5] = t597 * ((real)1 / (real)12) + (t599 + (((real)1 / (real)240) * (t773 * t379) + (((real)1
+    / (real)240) * (t343 * t803) - ((real)1 / (real)240) * (t441 * t698) - ((real)1 / (real)240) *
+    (t783 * t308))));
+  real t915 = 2.0 * (t599 * t588 - t582 * t642);
+  real t921 = 2.0 * (t582 * t585 - t593 * t588);
+  real t928 = ((real)1 / (real)30) * (t599 * t669) + (((real)1 / (real)60) * (t34 * t915) - ((real)1
+    / (real)60) * (t61 * t921) - ((real)1 / (real)30) * (t593 * t672));
+  real t942 = 2.0 * (t599 * t616 + (t629 * t588 - t606 * t642 - t582 * t646));
+  real t957 = 2.0 * (t582 * t610 + (t606 * t585 - t580 * t588 - t593 * t616));
+  real t969 = ((real)1 / (real)30) * (t599 * t657) + (((real)1 / (real)30) * (t629 * t669) +
+    (((real)1 / (real)60) * (t34 * t942) + (((real)1 / (real)60) * (t25 * t915) - ((real)1 /
+    (real)60) * (t55 * t921) - ((real)1 / (real)60) * (t61 * t957)) - ((real)1 / (real)30) * (t580 *
+    t672)) - ((real)1 / (real)30) * (t593 * t676));
+  real t983 = 2.0 * (t593 * t646 + (t580 * t642 - t629 * t585) - t599 * t610);
+  real t990 = 2.0 * (t593 * t642 - t599 * t585);
+  real t1018 = ((real)1 / (real)30) * (t593 * t744) + (((real)1 / (real)30) * (t580 * t712) +
+    (((real)1 / (real)60) * (t61 * t983) + (((real)1 / (real)60) * (t55 * t990) - ((real)1 /
+    (real)60) * (t21 * t915)) - ((real)1 / (real)60) * (t30 * t942)) - ((real)1 / (real)30) * (t606
+    * t669)) - ((real)1 / (real)30) * (t582 * t657);
+  real t1033 = ((real)1 / (real)30) * (t593 * t712) + (((real)1 / (real)60) * (t61 * t990) -
+    ((real)1 / (real)60) * (t30 * t915)) - ((real)1 / (real)30) * (t582 * t669);
+  Omdd[0] = ((real)1 / (real)120) * (t602 * t687) + (((real)1 / (real)120) * (t632 * t698) +
+    (((real)1 / (real)240) * (t928 * t387) + (((real)1 / (real)240) * (t969 * t396) + (((real)1 /
+    (real)240) * (t921 * t285) + (((real)1 / (real)240) * (t957 * t308) - ((real)1 / (real)240) *
+    (t983 * t317) - ((real)1 / (real)240) * (t990 * t298))) - ((real)1 / (real)240) * (t1018 *
+    t343)) - ((real)1 / (real)240) * (t1033 * t332) - t766 * t720 * ((real)1 / (real)120)) -
+    ((real)1 / (real)120) * (t773 * t759));
+  real t1086 = ((real)1 / (real)30) * (t582 * t676) + (t606 * t672 * ((real)1 / (real)30) +
+    (((real)1 / (real)60) * (t30 * t957) + (((real)1 / (real)60) * (t21 * t921) - ((real)1 /
+    (real)60) * (t25 * t990)) - ((real)1 / (real)60) * (t34 * t983)) - ((real)1 / (real)30) * (t629
+    * t712)) - ((real)1 / (real)30) * (t599 * t744);
+  real t1101 = ((real)1 / (real)30) * (t582 * t672) + (((real)1 / (real)60) * (t30 * t921) -
+    ((real)1 / (real)60) * (t34 * t990)) - ((real)1 / (real)30) * (t599 * t712);
+  Omdd[1] = ((real)1 / (real)120) * (t783 * t759) + (((real)1 / (real)120) * (t788 * t720) +
+    (((real)1 / (real)240) * (t1033 * t434) + (((real)1 / (real)240) * (t1018 * t441) + (((real)1 /
+    (real)240) * (t915 * t298) + (((real)1 / (real)240) * (t942 * t317) - ((real)1 / (real)240) *
+    (t957 * t379)) - ((real)1 / (real)240) * (t921 * t365) - ((real)1 / (real)240) * (t1086 * t396))
+    - ((real)1 / (real)240) * (t1101 * t387))) - ((real)1 / (real)120) * (t632 * t803)) - ((real)1 /
+    (real)120) * (t602 * t824);
+  Omdd[2] = ((real)1 / (real)120) * (t773 * t824) + (((real)1 / (real)120) * (t766 * t803) +
+    (((real)1 / (real)240) * (t1101 * t332) + (((real)1 / (real)240) * (t1086 * t343) + (((real)1 /
+    (real)240) * (t990 * t365) + (((real)1 / (real)240) * (t983 * t379) - ((real)1 / (real)240) *
+    (t942 * t308) - ((real)1 / (real)240) * (t915 * t285))) - ((real)1 / (real)240) * (t969 * t441))
+    - ((real)1 / (real)240) * (t928 * t434) - ((real)1 / (real)120) * (t788 * t698)) - ((real)1 /
+    (real)120) * (t783 * t687));
+  Omdd[3] = ((real)1 / (real)120) * (t602 * t698) + (((real)1 / (real)240) * (t928 * t396) +
+    (((real)1 / (real)240) * (t921 * t308) - ((real)1 / (real)240) * (t990 * t317)) - ((real)1 /
+    (real)240) * (t1033 * t343) - ((real)1 / (real)120) * (t773 * t720));
+  Omdd[4] = ((real)1 / (real)120) * (t783 * t720) + (((real)1 / (real)240) * (t1033 * t441) +
+    (((real)1 / (real)240) * (t915 * t317) - ((real)1 / (real)240) * (t921 * t379) - ((real)1 /
+    (real)240) * (t1101 * t396))) - ((real)1 / (real)120) * (t602 * t803);
+  Omdd[5] = ((real)1 / (real)120) * (t773 * t803) + (((real)1 / (real)240) * (t1101 * t343) +
+    (((real)1 / (real)240) * (t990 * t379) - ((real)1 / (real)240) * (t915 * t308)) - ((real)1 /
+    (real)240) * (t928 * t441) - ((real)1 / (real)120) * (t783 * t698));
+  return 0;
+}
+
+int mstmm_sweep_modal_segment(int n, in_t b, in_t Bm, in_t eta, in_t etad, out_t dC1, out_t dC2,
+    out_t Phi, out_t Om, out_t Omd, out_t Omdd)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_segment_sized(1, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
+  case 2: return mstmm_sweep_modal_segment_sized(2, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
+  case 3: return mstmm_sweep_modal_segment_sized(3, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
+  case 4: return mstmm_sweep_modal_segment_sized(4, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
+  default: return mstmm_sweep_modal_segment_sized(n, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_modal_segment, (n, in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3], out[4], out[5]))
+
+/* motion across a segment of an exact beam
+ * source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, 2009, 5.3
+ * source: Sonneville, Cardona, Bruls, Geometrically exact beam finite element on SE(3), 2014
+ * source: Simo, A finite strain beam formulation, 1985 (strains in section axes)
+ * in  R_end[3][3] rotation, end axes to section axes
+ * in  Om[6] Omega: displacement, then rotation vector
+ * in  Omd[6] rate of Omega
+ * in  Omdd[6] second rate of Omega at etadd = 0
+ * out R[3][3] rotation, outboard axes to inboard axes
+ * out d[3] (m) outboard point from the inboard one, inboard axes
+ * out H6[6][6] subspace by [xd; Psid], rows v then w, outboard axes
+ * out v[3] (m/s) relative velocity, outboard axes
+ * out w[3] (rad/s) relative angular velocity, outboard axes
+ * out c[6] (m/s2, rad/s2) relative acceleration at etadd = 0, outboard axes
+ */
+int mstmm_sweep_modal_segment_motion(in_t R_end, in_t Om, in_t Omd, in_t Omdd, out_t R, out_t d,
+    out_t H6, out_t v, out_t w, out_t c)
+{
+  real t0 = Om[5] * Om[5];
+  real t1 = Om[3] * Om[3];
+  real t2 = Om[4] * Om[4];
+  real t3 = t1 + t2;
+  real t4 = t0 + t3;
+  if (!((t4 < 2.25))) return 1; /* a segment of an exact beam turns by more than 3/2 rad */
+  real t19 = ((real)1 / (real)720) + t4 * ((-((real)1 / (real)40320)) + t4 * (((real)1 /
+    (real)3628800) + t4 * ((-((real)1 / (real)479001600)) + t4 * (((real)1 / (real)87178291200) + t4
+    * ((-((real)1 / (real)20922789888000)) + t4 * (((real)1 / (real)6402373705728000) - t4 *
+    4.110317623312165e-19))))));
+  real t21 = ((real)1 / (real)24) - t4 * t19;
+  real t22 = t4 * t21;
+  real t23 = 0.5 - t22;
+  real t24 = t2 + t0;
+  real t26 = 1.0 - t23 * t24;
+  real t28 = Om[3] * Om[4];
+  real t29 = t23 * t28;
+  real t43 = ((real)1 / (real)5040) + t4 * ((-((real)1 / (real)362880)) + t4 * (((real)1 /
+    (real)39916800) + t4 * ((-((real)1 / (real)6227020800)) + t4 * (((real)1 / (real)1307674368000)
+    + t4 * ((-((real)1 / (real)355687428096000)) + t4 * (8.22063524662433e-18 - t4 *
+    1.9572941063391263e-20))))));
+  real t45 = ((real)1 / (real)120) - t4 * t43;
+  real t47 = ((real)1 / (real)6) - t4 * t45;
+  real t49 = 1.0 - t4 * t47;
+  real t50 = Om[5] * t49;
+  real t51 = t29 - t50;
+  real t54 = Om[4] * t49;
+  real t55 = Om[3] * Om[5];
+  real t56 = t23 * t55;
+  real t57 = t54 + t56;
+  R[0] = R_end[0] * t26 + R_end[3] * t51 + R_end[6] * t57;
+  R[1] = R_end[1] * t26 + R_end[4] * t51 + R_end[7] * t57;
+  R[2] = R_end[2] * t26 + R_end[5] * t51 + R_end[8] * t57;
+  real t70 = t50 + t29;
+  real t72 = t1 + t0;
+  real t74 = 1.0 - t23 * t72;
+  real t77 = Om[4] * Om[5];
+  real t78 = t23 * t77;
+  real t79 = Om[3] * t49;
+  real t80 = t78 - t79;
+  R[3] = R_end[0] * t70 + R_end[3] * t74 + R_end[6] * t80;
+  R[4] = R_end[1] * t70 + R_end[4] * t74 + R_end[7] * t80;
+  R[5] = R_end[2] * t70 + R_end[5] * t74 + R_end[8] * t80;
+  real t93 = t56 - t54;
+  real t95 = t79 + t78;
+  real t99 = 1.0 - t3 * t23;
+  R[6] = R_end[0] * t93 + R_end[3] * t95 + R_end[6] * t99;
+  R[7] = R_end[1] * t93 + R_end[4] * t95 + R_end[7] * t99;
+  R[8] = R_end[2] * t93 + R_end[5] * t95 + R_end[8] * t99;
+  real t112 = Om[4] * t23;
+  real t113 = t47 * t55;
+  real t114 = t112 + t113;
+  real t117 = 1.0 - t47 * t24;
+  real t119 = t47 * t28;
+  real t120 = Om[5] * t23;
+  real t121 = t119 - t120;
+  d[0] = Om[2] * t114 + (Om[0] * t117 + Om[1] * t121);
+  real t125 = t120 + t119;
+  real t128 = 1.0 - t47 * t72;
+  real t130 = t47 * t77;
+  real t131 = Om[3] * t23;
+  real t132 = t130 - t131;
+  d[1] = Om[0] * t125 + (Om[1] * t128 + Om[2] * t132);
+  real t136 = t113 - t112;
+  real t139 = 1.0 - t3 * t47;
+  real t141 = t131 + t130;
+  d[2] = Om[0] * t136 + (Om[2] * t139 + Om[1] * t141);
+  real t149 = R_end[0] * t117 + R_end[3] * t121 + R_end[6] * t114;
+  H6[0] = t149;
+  real t154 = R_end[0] * t125 + R_end[3] * t128 + R_end[6] * t132;
+  H6[1] = t154;
+  real t159 = R_end[0] * t136 + R_end[3] * t141 + R_end[6] * t139;
+  H6[2] = t159;
+  real t163 = t47 * (Om[0] * Om[4] + Om[1] * Om[3]);
+  real t164 = Om[2] * Om[5];
+  real t165 = Om[1] * Om[4];
+  real t166 = Om[0] * Om[3];
+  real t167 = t165 + t166;
+  real t169 = 2.0 * (t164 + t167);
+  real t172 = t45 * 1.5 - t21 * 0.5;
+  real t173 = t172 * t28;
+  real t175 = t21 - t47 * 0.5;
+  real t176 = Om[5] * t175;
+  real t180 = Om[2] * t23;
+  real t181 = t163 + t169 * (t173 - t176) - t180;
+  real t186 = t2 * t172;
+  real t187 = t0 * t172;
+  real t190 = t47 * (2.0 * (t165 + t164)) + (t186 + t187) * t169;
+  real t193 = Om[1] * t23;
+  real t197 = t47 * (Om[0] * Om[5] + Om[2] * Om[3]);
+  real t198 = Om[4] * t175;
+  real t199 = t172 * t55;
+  real t203 = t193 + (t197 + t169 * (t198 + t199));
+  H6[3] = R_end[3] * t181 - R_end[0] * t190 + R_end[6] * t203;
+  real t209 = t180 + (t163 + t169 * (t176 + t173));
+  real t214 = t1 * t172;
+  real t217 = t47 * (2.0 * (t164 + t166)) + t169 * (t187 + t214);
+  real t223 = t47 * (Om[1] * Om[5] + Om[2] * Om[4]);
+  real t224 = t172 * t77;
+  real t225 = Om[3] * t175;
+  real t229 = Om[0] * t23;
+  real t230 = t223 + t169 * (t224 - t225) - t229;
+  H6[4] = R_end[0] * t209 - R_end[3] * t217 + R_end[6] * t230;
+  real t236 = t197 + t169 * (t199 - t198) - t193;
+  real t241 = t229 + (t223 + t169 * (t225 + t224));
+  real t248 = t47 * (2.0 * t167) + t169 * (t186 + t214);
+  H6[5] = R_end[0] * t236 + R_end[3] * t241 - R_end[6] * t248;
+  real t255 = R_end[1] * t117 + R_end[4] * t121 + R_end[7] * t114;
+  H6[6] = t255;
+  real t260 = R_end[1] * t125 + R_end[4] * t128 + R_end[7] * t132;
+  H6[7] = t260;
+  real t265 = R_end[1] * t136 + R_end[4] * t141 + R_end[7] * t139;
+  H6[8] = t265;
+  H6[9] = R_end[4] * t181 - R_end[1] * t190 + R_end[7] * t203;
+  H6[10] = R_end[1] * t209 - R_end[4] * t217 + R_end[7] * t230;
+  H6[11] = R_end[1] * t236 + R_end[4] * t241 - R_end[7] * t248;
+  real t285 = R_end[2] * t117 + R_end[5] * t121 + R_end[8] * t114;
+  H6[12] = t285;
+  real t290 = R_end[2] * t125 + R_end[5] * t128 + R_end[8] * t132;
+  H6[13] = t290;
+  real t295 = R_end[2] * t136 + R_end[5] * t141 + R_end[8] * t139;
+  H6[14] = t295;
+  H6[15] = R_end[5] * t181 - R_end[2] * t190 + R_end[8] * t203;
+  H6[16] = R_end[2] * t209 - R_end[5] * t217 + R_end[8] * t230;
+  H6[17] = R_end[2] * t236 + R_end[5] * t241 - R_end[8] * t248;
+  H6[18] = H6[19] = H6[20] = 0.0;
+  H6[21] = t149;
+  H6[22] = t154;
+  H6[23] = t159;
+  H6[24] = H6[25] = H6[26] = 0.0;
+  H6[27] = t255;
+  H6[28] = t260;
+  H6[29] = t265;
+  H6[30] = H6[31] = H6[32] = 0.0;
+  H6[33] = t285;
+  H6[34] = t290;
+  H6[35] = t295;
+  real t321 = Omd[0] * t117 + Omd[1] * t125 + Omd[2] * t136 - Omd[3] * t190 + Omd[4] * t209 + Omd[5]
+    * t236;
+  real t333 = Omd[0] * t121 + Omd[1] * t128 + Omd[2] * t141 + Omd[3] * t181 - Omd[4] * t217 + Omd[5]
+    * t241;
+  real t346 = Omd[0] * t114 + Omd[1] * t132 + Omd[2] * t139 + Omd[3] * t203 + Omd[4] * t230 - Omd[5]
+    * t248;
+  v[0] = R_end[0] * t321 + R_end[3] * t333 + R_end[6] * t346;
+  v[1] = R_end[1] * t321 + R_end[4] * t333 + R_end[7] * t346;
+  v[2] = R_end[2] * t321 + R_end[5] * t333 + R_end[8] * t346;
+  real t363 = Omd[3] * t117 + Omd[4] * t125 + Omd[5] * t136;
+  real t369 = Omd[3] * t121 + Omd[4] * t128 + Omd[5] * t141;
+  real t376 = Omd[3] * t114 + Omd[4] * t132 + Omd[5] * t139;
+  w[0] = R_end[0] * t363 + R_end[3] * t369 + R_end[6] * t376;
+  w[1] = R_end[1] * t363 + R_end[4] * t369 + R_end[7] * t376;
+  w[2] = R_end[2] * t363 + R_end[5] * t369 + R_end[8] * t376;
+  real t395 = Om[4] * Omd[2] + (Om[1] * Omd[5] - Om[2] * Omd[4]) - Om[5] * Omd[1];
+  real t401 = 2.0 * (Om[5] * Omd[5] + (Om[3] * Omd[3] + Om[4] * Omd[4]));
+  real t406 = 2.0 * t19 + (t21 * 0.25 - t45 * 1.25);
+  real t408 = t401 * (t4 * t406);
+  real t416 = Om[5] * Omd[0] + (Om[2] * Omd[3] - Om[0] * Omd[5] - Om[3] * Omd[2]);
+  real t420 = Om[5] * Omd[3] - Om[3] * Omd[5];
+  real t424 = Om[4] * Omd[5] - Om[5] * Omd[4];
+  real t429 = Om[3] * t416 + (Om[0] * t420 - Om[1] * t424) - Om[4] * t395;
+  real t433 = Om[3] * t420 - Om[4] * t424;
+  real t438 = Om[3] * Omd[4] - Om[4] * Omd[3];
+  real t440 = Om[5] * t424 - Om[3] * t438;
+  real t454 = Om[3] * Omd[1] + (Om[0] * Omd[4] - Om[1] * Omd[3]) - Om[4] * Omd[0];
+  real t457 = Om[5] * t395 + (Om[2] * t424 - Om[0] * t438 - Om[3] * t454);
+  real t459 = Om[4] * t429 + (Om[1] * t433 - Om[2] * t440) - Om[5] * t457;
+  real t460 = t401 * t406;
+  real t472 = Om[5] * Omdd[0] + (Om[2] * Omdd[3] - Om[0] * Omdd[5] - Om[3] * Omdd[2]);
+  real t476 = Om[5] * Omdd[3] - Om[3] * Omdd[5];
+  real t480 = Om[4] * Omdd[5] - Om[5] * Omdd[4];
+  real t490 = Om[4] * Omdd[2] + (Om[1] * Omdd[5] - Om[2] * Omdd[4]) - Om[5] * Omdd[1];
+  real t498 = Omd[3] * t416 + (Omd[0] * t420 + (Om[3] * t472 + (Om[0] * t476 - Om[1] * t480) - Om[4]
+    * t490) - Omd[1] * t424) - Omd[4] * t395;
+  real t506 = Omd[3] * t420 + (Om[3] * t476 - Om[4] * t480) - Omd[4] * t424;
+  real t512 = Om[3] * Omdd[4] - Om[4] * Omdd[3];
+  real t517 = Omd[5] * t424 + (Om[5] * t480 - Om[3] * t512 - Omd[3] * t438);
+  real t533 = Om[3] * Omdd[1] + (Om[0] * Omdd[4] - Om[1] * Omdd[3]) - Om[4] * Omdd[0];
+  real t542 = Omd[5] * t395 + (Omd[2] * t424 + (Om[5] * t490 + (Om[2] * t480 - Om[0] * t512 - Om[3]
+    * t533) - Omd[0] * t438) - Omd[3] * t454);
+  real t550 = Omd[4] * t429 + (Omd[1] * t433 + (Om[4] * t498 + (Om[1] * t506 - Om[2] * t517) - Om[5]
+    * t542) - Omd[2] * t440) - Omd[5] * t457;
+  real t554 = t4 * t175 + (t22 - 0.5);
+  real t570 = Omd[4] * t454 + (Omd[1] * t438 + (Om[4] * t533 + (Om[1] * t512 - Om[2] * t476) - Om[5]
+    * t472) - Omd[2] * t420) - Omd[5] * t416;
+  real t572 = t47 - t4 * t172;
+  real t580 = Om[4] * t438 - Om[5] * t420;
+  real t590 = Om[4] * t454 + (Om[1] * t438 - Om[2] * t420) - Om[5] * t416;
+  real t592 = Om[3] * t457 + (Om[0] * t440 - Om[1] * t580) - Om[4] * t590;
+  real t596 = Om[3] * t440 - Om[4] * t580;
+  real t608 = Omd[4] * t438 + (Om[4] * t512 - Om[5] * t476) - Omd[5] * t420;
+  real t619 = Omd[3] * t457 + (Omd[0] * t440 + (Om[3] * t542 + (Om[0] * t517 - Om[1] * t608) - Om[4]
+    * t570) - Omd[1] * t580) - Omd[4] * t590;
+  real t627 = Omd[3] * t440 + (Om[3] * t517 - Om[4] * t608) - Omd[4] * t580;
+  real t635 = Omd[5] * t580 + (Om[5] * t608 - Om[3] * t506 - Omd[3] * t433);
+  real t653 = Omd[5] * t590 + (Omd[2] * t580 + (Om[5] * t570 + (Om[2] * t608 - Om[0] * t506 - Om[3]
+    * t498) - Omd[0] * t433) - Omd[3] * t429);
+  real t659 = Om[5] * t580 - Om[3] * t433;
+  real t669 = Om[5] * t590 + (Om[2] * t580 - Om[0] * t433 - Om[3] * t429);
+  real t686 = t43 * 3.75 + (t45 * 0.25 - t19 * 1.75);
+  real t687 = t401 * t686;
+  real t692 = t401 * (t4 * t686);
+  real t699 = Omdd[0] + (t395 * t408 + (t459 * t460 + (t175 * t550 + (t490 * t554 + t570 * t572) -
+    t172 * (Omd[4] * t592 + (Omd[1] * t596 + (Om[4] * t619 + (Om[1] * t627 - Om[2] * t635) - Om[5] *
+    t653) - Omd[2] * t659) - Omd[5] * t669)) - (Om[4] * t592 + (Om[1] * t596 - Om[2] * t659) - Om[5]
+    * t669) * t687) - t590 * t692) + (t346 * t369 - t333 * t376);
+  real t711 = Om[4] * t433 - Om[5] * t440;
+  real t720 = Omd[4] * t433 + (Om[4] * t506 - Om[5] * t517) - Omd[5] * t440;
+  real t752 = Omdd[1] + (t416 * t408 + (t669 * t460 + (t175 * t653 + (t472 * t554 + t542 * t572) -
+    t172 * (Omd[5] * t459 + (Omd[2] * t711 + (Om[5] * t550 + (Om[2] * t720 - Om[0] * t627 - Om[3] *
+    t619) - Omd[0] * t596) - Omd[3] * t592))) - (Om[5] * t459 + (Om[2] * t711 - Om[0] * t596 - Om[3]
+    * t592)) * t687) - t457 * t692) + (t321 * t376 - t346 * t363);
+  real t796 = Omdd[2] + (t454 * t408 + (t592 * t460 + (t175 * t619 + (t533 * t554 + t498 * t572) -
+    t172 * (Omd[3] * t669 + (Omd[0] * t659 + (Om[3] * t653 + (Om[0] * t635 - Om[1] * t720) - Om[4] *
+    t550) - Omd[1] * t711) - Omd[4] * t459)) - (Om[3] * t669 + (Om[0] * t659 - Om[1] * t711) - Om[4]
+    * t459) * t687) - t429 * t692) + (t333 * t363 - t321 * t369);
+  c[0] = R_end[0] * t699 + R_end[3] * t752 + R_end[6] * t796;
+  c[1] = R_end[1] * t699 + R_end[4] * t752 + R_end[7] * t796;
+  c[2] = R_end[2] * t699 + R_end[5] * t752 + R_end[8] * t796;
+  real t834 = Omdd[3] + (t424 * t408 + (t711 * t460 + (t175 * t720 + (t480 * t554 + t608 * t572) -
+    t172 * (Omd[4] * t596 + (Om[4] * t627 - Om[5] * t635) - Omd[5] * t659)) - (Om[4] * t596 - Om[5]
+    * t659) * t687) - t580 * t692);
+  real t861 = Omdd[4] + (t420 * t408 + (t659 * t460 + (t175 * t635 + (t476 * t554 + t517 * t572) -
+    t172 * (Omd[5] * t711 + (Om[5] * t720 - Om[3] * t627 - Omd[3] * t596))) - (Om[5] * t711 - Om[3]
+    * t596) * t687) - t440 * t692);
+  real t889 = Omdd[5] + (t438 * t408 + (t596 * t460 + (t175 * t627 + (t512 * t554 + t506 * t572) -
+    t172 * (Omd[3] * t659 + (Om[3] * t635 - Om[4] * t720) - Omd[4] * t711)) - (Om[3] * t659 - Om[4]
+    * t711) * t687) - t433 * t692);
+  c[3] = R_end[0] * t834 + R_end[3] * t861 + R_end[6] * t889;
+  c[4] = R_end[1] * t834 + R_end[4] * t861 + R_end[7] * t889;
+  c[5] = R_end[2] * t834 + R_end[5] * t861 + R_end[8] * t889;
+  return 0;
+}
+
+MSTMM_CALL(mstmm_sweep_modal_segment_motion, (in[0], in[1], in[2], in[3], out[0], out[1], out[2],
+  out[3], out[4], out[5]))
+
 /* subspace of a port
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
@@ -1719,6 +2444,63 @@ int mstmm_sweep_modal_rebase(int n, in_t H, in_t S, in_t e, in_t S_rf, out_t S_r
 }
 
 MSTMM_CALL(mstmm_sweep_modal_rebase, (n, in[0], in[1], in[2], in[3], out[0], out[1], out[2]))
+
+/* columns of the modes carried along a segment
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  S_rf_I[6][n] S_rf + S H
+ * out S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt], added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_carry_columns_sized(int n, in_t Rc, in_t r, in_t S_rf_I, out_t S_rf)
+{
+  for (int k = 0; k < n; ++k) {
+    S_rf[k] += Rc[0] * S_rf_I[k] + Rc[1] * S_rf_I[n + k] + Rc[2] * S_rf_I[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf[n + k] += Rc[3] * S_rf_I[k] + Rc[4] * S_rf_I[n + k] + Rc[5] * S_rf_I[2 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    S_rf[2 * n + k] += Rc[6] * S_rf_I[k] + Rc[7] * S_rf_I[n + k] + Rc[8] * S_rf_I[2 * n + k];
+  }
+  real t22 = Rc[6] * r[1] - Rc[3] * r[2];
+  real t26 = Rc[7] * r[1] - Rc[4] * r[2];
+  real t31 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    S_rf[3 * n + k] += Rc[0] * S_rf_I[3 * n + k] + Rc[1] * S_rf_I[4 * n + k] + Rc[2] * S_rf_I[5 * n
+      + k] + (S_rf_I[k] * t22 + S_rf_I[n + k] * t26 + S_rf_I[2 * n + k] * t31);
+  }
+  real t42 = Rc[0] * r[2] - Rc[6] * r[0];
+  real t46 = Rc[1] * r[2] - Rc[7] * r[0];
+  real t51 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    S_rf[4 * n + k] += Rc[3] * S_rf_I[3 * n + k] + Rc[4] * S_rf_I[4 * n + k] + Rc[5] * S_rf_I[5 * n
+      + k] + (S_rf_I[k] * t42 + S_rf_I[n + k] * t46 + S_rf_I[2 * n + k] * t51);
+  }
+  real t62 = Rc[3] * r[0] - Rc[0] * r[1];
+  real t66 = Rc[4] * r[0] - Rc[1] * r[1];
+  real t71 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    S_rf[5 * n + k] += Rc[6] * S_rf_I[3 * n + k] + Rc[7] * S_rf_I[4 * n + k] + Rc[8] * S_rf_I[5 * n
+      + k] + (S_rf_I[k] * t62 + S_rf_I[n + k] * t66 + S_rf_I[2 * n + k] * t71);
+  }
+  return 0;
+}
+
+int mstmm_sweep_modal_carry_columns(int n, in_t Rc, in_t r, in_t S_rf_I, out_t S_rf)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_carry_columns_sized(1, Rc, r, S_rf_I, S_rf);
+  case 2: return mstmm_sweep_modal_carry_columns_sized(2, Rc, r, S_rf_I, S_rf);
+  case 3: return mstmm_sweep_modal_carry_columns_sized(3, Rc, r, S_rf_I, S_rf);
+  case 4: return mstmm_sweep_modal_carry_columns_sized(4, Rc, r, S_rf_I, S_rf);
+  default: return mstmm_sweep_modal_carry_columns_sized(n, Rc, r, S_rf_I, S_rf);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_modal_carry_columns, (n, in[0], in[1], in[2], out[0]))
 
 /* modes of a flexible body condensed
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
@@ -4381,6 +5163,1274 @@ int mstmm_sweep_modal_frame_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, 
 MSTMM_CALL(mstmm_sweep_modal_frame_motion_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
   in[7], in[8], in[9], in[10], in[11], in[12], out[0], out[1], out[2], out[3], out[4], out[5]))
 
+/* segment and its derivative along a direction
+ * source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, 2009, 5.3
+ * source: Sonneville, Cardona, Bruls, Geometrically exact beam finite element on SE(3), 2014
+ * source: Simo, A finite strain beam formulation, 1985 (strains in section axes)
+ * in  b[18] B1, B2, B3 at eta = 0
+ * in  Bm[18][n] derivatives of B1, B2, B3 by the strain coordinates
+ * in  eta[n] modal coordinates
+ * in  etad[n] modal speeds
+ * in  dC1[6][n] derivatives of C1
+ * in  dC2[6][n] derivatives of C2
+ * in  d_eta[n] derivative of eta
+ * in  d_etad[n] derivative of etad
+ * out d_dC1[6][n] derivative of dC1
+ * out d_dC2[6][n] derivative of dC2
+ * out d_Phi[6][n] derivative of Phi
+ * out d_Om[6] derivative of Om
+ * out d_Omd[6] derivative of Omd
+ * out d_Omdd[6] derivative of Omdd
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_segment_slope_sized(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1,
+    in_t dC2, in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_Phi, out_t d_Om,
+    out_t d_Omd, out_t d_Omdd)
+{
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += Bm[10 * n + k] * d_eta[k];
+  }
+  real t4 = 0;
+  for (int k = 0; k < n; ++k) {
+    t4 += Bm[11 * n + k] * d_eta[k];
+  }
+  real t8 = 0;
+  for (int k = 0; k < n; ++k) {
+    t8 += Bm[7 * n + k] * d_eta[k];
+  }
+  real t11 = 0;
+  for (int k = 0; k < n; ++k) {
+    t11 += Bm[8 * n + k] * d_eta[k];
+  }
+  real t16 = 0;
+  for (int k = 0; k < n; ++k) {
+    t16 += Bm[4 * n + k] * d_eta[k];
+  }
+  real t19 = 0;
+  for (int k = 0; k < n; ++k) {
+    t19 += Bm[5 * n + k] * d_eta[k];
+  }
+  real t23 = 0;
+  for (int k = 0; k < n; ++k) {
+    t23 += Bm[n + k] * d_eta[k];
+  }
+  real t26 = 0;
+  for (int k = 0; k < n; ++k) {
+    t26 += Bm[2 * n + k] * d_eta[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC1[k] = Bm[2 * n + k] * t1 - Bm[n + k] * t4 + (Bm[5 * n + k] * t8 - Bm[4 * n + k] * t11) -
+      (Bm[8 * n + k] * t16 - Bm[7 * n + k] * t19 + (Bm[11 * n + k] * t23 - Bm[10 * n + k] * t26));
+  }
+  real t33 = 0;
+  for (int k = 0; k < n; ++k) {
+    t33 += Bm[9 * n + k] * d_eta[k];
+  }
+  real t38 = 0;
+  for (int k = 0; k < n; ++k) {
+    t38 += Bm[6 * n + k] * d_eta[k];
+  }
+  real t44 = 0;
+  for (int k = 0; k < n; ++k) {
+    t44 += Bm[3 * n + k] * d_eta[k];
+  }
+  real t49 = 0;
+  for (int k = 0; k < n; ++k) {
+    t49 += Bm[k] * d_eta[k];
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC1[n + k] = Bm[k] * t4 - Bm[2 * n + k] * t33 + (Bm[3 * n + k] * t11 - Bm[5 * n + k] * t38) -
+      (Bm[6 * n + k] * t19 - Bm[8 * n + k] * t44 + (Bm[9 * n + k] * t26 - Bm[11 * n + k] * t49));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC1[2 * n + k] = Bm[n + k] * t33 - Bm[k] * t1 + (Bm[4 * n + k] * t38 - Bm[3 * n + k] * t8) -
+      (Bm[7 * n + k] * t44 - Bm[6 * n + k] * t16 + (Bm[10 * n + k] * t49 - Bm[9 * n + k] * t23));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC1[3 * n + k] = Bm[5 * n + k] * t1 - Bm[4 * n + k] * t4 + (Bm[10 * n + k] * t19 - Bm[11 * n +
+      k] * t16);
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC1[4 * n + k] = Bm[3 * n + k] * t4 - Bm[5 * n + k] * t33 + (Bm[11 * n + k] * t44 - Bm[9 * n +
+      k] * t19);
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC1[5 * n + k] = Bm[4 * n + k] * t33 - Bm[3 * n + k] * t1 + (Bm[9 * n + k] * t16 - Bm[10 * n +
+      k] * t44);
+  }
+  real t94 = 0;
+  for (int k = 0; k < n; ++k) {
+    t94 += eta[k] * Bm[4 * n + k];
+  }
+  real t95 = t94 + b[4];
+  real t102 = 0;
+  for (int k = 0; k < n; ++k) {
+    t102 += eta[k] * Bm[5 * n + k];
+  }
+  real t103 = t102 + b[5];
+  real t111 = 0;
+  for (int k = 0; k < n; ++k) {
+    t111 += eta[k] * Bm[n + k];
+  }
+  real t112 = t111 + b[1];
+  real t119 = 0;
+  for (int k = 0; k < n; ++k) {
+    t119 += eta[k] * Bm[2 * n + k];
+  }
+  real t120 = t119 + b[2];
+  real t127 = 0;
+  for (int k = 0; k < n; ++k) {
+    t127 += Bm[16 * n + k] * d_eta[k];
+  }
+  real t128 = 2.0 * t127;
+  real t130 = 0;
+  for (int k = 0; k < n; ++k) {
+    t130 += eta[k] * Bm[3 * n + k];
+  }
+  real t131 = t130 + b[3];
+  real t132 = t131 * t4;
+  real t134 = 0;
+  for (int k = 0; k < n; ++k) {
+    t134 += eta[k] * Bm[11 * n + k];
+  }
+  real t135 = t134 + b[11];
+  real t137 = t132 + t135 * t44;
+  real t139 = 0;
+  for (int k = 0; k < n; ++k) {
+    t139 += eta[k] * Bm[9 * n + k];
+  }
+  real t140 = t139 + b[9];
+  real t144 = t137 - (t140 * t19 + t103 * t33);
+  real t145 = t128 + t144;
+  real t148 = 0;
+  for (int k = 0; k < n; ++k) {
+    t148 += Bm[17 * n + k] * d_eta[k];
+  }
+  real t149 = 2.0 * t148;
+  real t152 = t140 * t16 + t95 * t33;
+  real t153 = t131 * t1;
+  real t155 = 0;
+  for (int k = 0; k < n; ++k) {
+    t155 += eta[k] * Bm[10 * n + k];
+  }
+  real t156 = t155 + b[10];
+  real t159 = t152 - (t153 + t156 * t44);
+  real t160 = t149 + t159;
+  real t164 = 0;
+  for (int k = 0; k < n; ++k) {
+    t164 += Bm[13 * n + k] * d_eta[k];
+  }
+  real t165 = 2.0 * t164;
+  real t167 = 0;
+  for (int k = 0; k < n; ++k) {
+    t167 += eta[k] * Bm[k];
+  }
+  real t168 = t167 + b[0];
+  real t175 = t168 * t4 + t135 * t49 - (t140 * t26 + t120 * t33);
+  real t176 = t131 * t11;
+  real t178 = 0;
+  for (int k = 0; k < n; ++k) {
+    t178 += eta[k] * Bm[8 * n + k];
+  }
+  real t179 = t178 + b[8];
+  real t182 = t175 + (t176 + t179 * t44);
+  real t184 = 0;
+  for (int k = 0; k < n; ++k) {
+    t184 += eta[k] * Bm[6 * n + k];
+  }
+  real t185 = t184 + b[6];
+  real t189 = t182 - (t185 * t19 + t103 * t38);
+  real t190 = t165 + t189;
+  real t193 = 0;
+  for (int k = 0; k < n; ++k) {
+    t193 += Bm[14 * n + k] * d_eta[k];
+  }
+  real t194 = 2.0 * t193;
+  real t201 = t140 * t23 + t112 * t33 - (t168 * t1 + t156 * t49);
+  real t202 = t131 * t8;
+  real t204 = 0;
+  for (int k = 0; k < n; ++k) {
+    t204 += eta[k] * Bm[7 * n + k];
+  }
+  real t205 = t204 + b[7];
+  real t212 = t201 - (t202 + t205 * t44) + (t185 * t16 + t95 * t38);
+  real t213 = t194 + t212;
+  for (int k = 0; k < n; ++k) {
+    d_dC2[k] = ((real)1 / (real)60) * ((2.0 * Bm[14 * n + k] + dC1[2 * n + k]) * t16 + t95 * d_dC1[2
+      * n + k] - ((Bm[13 * n + k] * 2.0 + dC1[n + k]) * t19 + t103 * d_dC1[n + k]) + ((2.0 * Bm[17 *
+      n + k] + dC1[5 * n + k]) * t23 + t112 * d_dC1[5 * n + k] - ((2.0 * Bm[16 * n + k] + dC1[4 * n
+      + k]) * t26 + t120 * d_dC1[4 * n + k]))) - ((real)1 / (real)60) * (Bm[2 * n + k] * t145 - Bm[n
+      + k] * t160 + (Bm[5 * n + k] * t190 - Bm[4 * n + k] * t213));
+  }
+  real t245 = 0;
+  for (int k = 0; k < n; ++k) {
+    t245 += Bm[15 * n + k] * d_eta[k];
+  }
+  real t253 = t103 * t1 + t156 * t19 - (t95 * t4 + t135 * t16);
+  real t254 = 2.0 * t245 + t253;
+  real t259 = 0;
+  for (int k = 0; k < n; ++k) {
+    t259 += Bm[12 * n + k] * d_eta[k];
+  }
+  real t275 = t120 * t1 + t156 * t26 - (t112 * t4 + t135 * t23) - (t95 * t11 + t179 * t16) + (t103 *
+    t8 + t205 * t19);
+  real t276 = 2.0 * t259 + t275;
+  for (int k = 0; k < n; ++k) {
+    d_dC2[n + k] = ((real)1 / (real)60) * ((2.0 * Bm[12 * n + k] + dC1[k]) * t19 + t103 * d_dC1[k] -
+      ((2.0 * Bm[14 * n + k] + dC1[2 * n + k]) * t44 + t131 * d_dC1[2 * n + k]) + ((2.0 * Bm[15 * n
+      + k] + dC1[3 * n + k]) * t26 + t120 * d_dC1[3 * n + k] - ((2.0 * Bm[17 * n + k] + dC1[5 * n +
+      k]) * t49 + t168 * d_dC1[5 * n + k]))) - ((real)1 / (real)60) * (Bm[k] * t160 - Bm[2 * n + k]
+      * t254 + (Bm[3 * n + k] * t213 - Bm[5 * n + k] * t276));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC2[2 * n + k] = ((real)1 / (real)60) * ((Bm[13 * n + k] * 2.0 + dC1[n + k]) * t44 + t131 *
+      d_dC1[n + k] - ((2.0 * Bm[12 * n + k] + dC1[k]) * t16 + t95 * d_dC1[k]) + ((2.0 * Bm[16 * n +
+      k] + dC1[4 * n + k]) * t49 + t168 * d_dC1[4 * n + k] - ((2.0 * Bm[15 * n + k] + dC1[3 * n +
+      k]) * t23 + t112 * d_dC1[3 * n + k]))) - ((real)1 / (real)60) * (Bm[n + k] * t254 - Bm[k] *
+      t145 + (Bm[4 * n + k] * t276 - Bm[3 * n + k] * t190));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC2[3 * n + k] = ((real)1 / (real)60) * ((2.0 * Bm[17 * n + k] + dC1[5 * n + k]) * t16 + t95 *
+      d_dC1[5 * n + k] - ((2.0 * Bm[16 * n + k] + dC1[4 * n + k]) * t19 + t103 * d_dC1[4 * n + k]))
+      - ((real)1 / (real)60) * (Bm[5 * n + k] * t145 - Bm[4 * n + k] * t160);
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC2[4 * n + k] = ((real)1 / (real)60) * ((2.0 * Bm[15 * n + k] + dC1[3 * n + k]) * t19 + t103
+      * d_dC1[3 * n + k] - ((2.0 * Bm[17 * n + k] + dC1[5 * n + k]) * t44 + t131 * d_dC1[5 * n +
+      k])) - ((real)1 / (real)60) * (Bm[3 * n + k] * t160 - Bm[5 * n + k] * t254);
+  }
+  for (int k = 0; k < n; ++k) {
+    d_dC2[5 * n + k] = ((real)1 / (real)60) * ((2.0 * Bm[16 * n + k] + dC1[4 * n + k]) * t44 + t131
+      * d_dC1[4 * n + k] - ((2.0 * Bm[15 * n + k] + dC1[3 * n + k]) * t16 + t95 * d_dC1[3 * n + k]))
+      - ((real)1 / (real)60) * (Bm[4 * n + k] * t254 - Bm[3 * n + k] * t145);
+  }
+  real t371 = t156 * t103 - t135 * t95;
+  real t373 = 0;
+  for (int k = 0; k < n; ++k) {
+    t373 += eta[k] * Bm[15 * n + k];
+  }
+  real t374 = t373 + b[15];
+  real t376 = t371 + 2.0 * t374;
+  real t379 = t376 * t19 + t103 * t254;
+  real t382 = t95 * t140 - t156 * t131;
+  real t384 = 0;
+  for (int k = 0; k < n; ++k) {
+    t384 += eta[k] * Bm[17 * n + k];
+  }
+  real t385 = t384 + b[17];
+  real t387 = t382 + 2.0 * t385;
+  real t393 = t1 + ((real)1 / (real)60) * (t379 - (t387 * t44 + t131 * t160));
+  real t399 = t156 + ((real)1 / (real)60) * (t103 * t376 - t131 * t387);
+  real t407 = t135 * t131 - t103 * t140;
+  real t409 = 0;
+  for (int k = 0; k < n; ++k) {
+    t409 += eta[k] * Bm[16 * n + k];
+  }
+  real t410 = t409 + b[16];
+  real t412 = t407 + 2.0 * t410;
+  real t421 = t4 + ((real)1 / (real)60) * (t412 * t44 + t131 * t145 - (t376 * t16 + t95 * t254));
+  real t427 = t135 + ((real)1 / (real)60) * (t131 * t412 - t95 * t376);
+  real t440 = t376 * t26 + t120 * t254 - (t387 * t49 + t168 * t160);
+  real t447 = t95 * t185 + (t112 * t140 - t156 * t168 - t205 * t131);
+  real t449 = 0;
+  for (int k = 0; k < n; ++k) {
+    t449 += eta[k] * Bm[14 * n + k];
+  }
+  real t450 = t449 + b[14];
+  real t452 = t447 + 2.0 * t450;
+  real t456 = t440 - (t452 * t44 + t131 * t213);
+  real t463 = t205 * t103 + (t156 * t120 - t135 * t112 - t179 * t95);
+  real t465 = 0;
+  for (int k = 0; k < n; ++k) {
+    t465 += eta[k] * Bm[12 * n + k];
+  }
+  real t466 = t465 + b[12];
+  real t468 = t463 + 2.0 * t466;
+  real t474 = t8 + ((real)1 / (real)60) * (t456 + (t468 * t19 + t103 * t276));
+  real t484 = t205 + ((real)1 / (real)60) * (t103 * t468 + (t120 * t376 - t168 * t387 - t131 *
+    t452));
+  real t496 = t412 * t49 + t168 * t145 - (t376 * t23 + t112 * t254);
+  real t503 = t179 * t131 + (t135 * t168 - t120 * t140) - t103 * t185;
+  real t505 = 0;
+  for (int k = 0; k < n; ++k) {
+    t505 += eta[k] * Bm[13 * n + k];
+  }
+  real t506 = t505 + b[13];
+  real t508 = t503 + t506 * 2.0;
+  real t518 = t11 + ((real)1 / (real)60) * (t496 + (t508 * t44 + t131 * t190) - (t468 * t16 + t95 *
+    t276));
+  real t528 = t179 + ((real)1 / (real)60) * (t131 * t508 + (t168 * t412 - t112 * t376) - t95 *
+    t468);
+  real t537 = t144 - (t127 + 20.0 * t16);
+  real t541 = t407 - (t410 + t95 * 20.0);
+  real t547 = t148 + 20.0 * t19 - t159;
+  real t551 = t385 + t103 * 20.0 - t382;
+  real t558 = t189 - (t164 + 20.0 * t23);
+  real t562 = t503 - (t506 + t112 * 20.0);
+  real t568 = t193 + 20.0 * t26 - t212;
+  real t572 = t450 + t120 * 20.0 - t447;
+  for (int k = 0; k < n; ++k) {
+    d_Phi[k] = ((real)1 / (real)240) * ((dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] * 20.0)) *
+      t393 + t399 * d_dC1[2 * n + k] - ((dC1[n + k] - (Bm[13 * n + k] + Bm[n + k] * 20.0)) * t421 +
+      t427 * d_dC1[n + k]) + ((dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0)) * t474 +
+      t484 * d_dC1[5 * n + k] - ((dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0)) * t518 +
+      t528 * d_dC1[4 * n + k]))) - ((real)1 / (real)240) * ((Bm[8 * n + k] + dC2[2 * n + k]) * t537
+      + t541 * d_dC2[2 * n + k] + ((Bm[7 * n + k] + dC2[n + k]) * t547 + t551 * d_dC2[n + k]) +
+      ((Bm[11 * n + k] + dC2[5 * n + k]) * t558 + t562 * d_dC2[5 * n + k] + ((Bm[10 * n + k] + dC2[4
+      * n + k]) * t568 + t572 * d_dC2[4 * n + k])));
+  }
+  real t589 = t140 + ((real)1 / (real)60) * (t95 * t387 - t103 * t412);
+  real t602 = t33 + ((real)1 / (real)60) * (t387 * t16 + t95 * t160 - (t412 * t19 + t103 * t145));
+  real t620 = t185 + ((real)1 / (real)60) * (t95 * t452 + (t112 * t387 - t120 * t412) - t103 *
+    t508);
+  real t641 = t38 + ((real)1 / (real)60) * (t387 * t23 + t112 * t160 - (t412 * t26 + t120 * t145) +
+    (t452 * t16 + t95 * t213) - (t508 * t19 + t103 * t190));
+  real t649 = t374 + t131 * 20.0 - t371;
+  real t654 = t245 + 20.0 * t44 - t253;
+  real t664 = t466 + t168 * 20.0 - t463;
+  real t669 = t259 + 20.0 * t49 - t275;
+  for (int k = 0; k < n; ++k) {
+    d_Phi[n + k] = ((real)1 / (real)240) * ((dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)) * t421 + t427
+      * d_dC1[k] - (t589 * d_dC1[2 * n + k] + (dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] *
+      20.0)) * t602) + ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) * t518 + t528 *
+      d_dC1[3 * n + k] - (t620 * d_dC1[5 * n + k] + (dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n +
+      k] * 20.0)) * t641))) - ((real)1 / (real)240) * (t649 * d_dC2[2 * n + k] + (Bm[8 * n + k] +
+      dC2[2 * n + k]) * t654 - ((Bm[6 * n + k] + dC2[k]) * t547 + t551 * d_dC2[k]) + (t664 * d_dC2[5
+      * n + k] + (Bm[11 * n + k] + dC2[5 * n + k]) * t669 - ((Bm[9 * n + k] + dC2[3 * n + k]) * t568
+      + t572 * d_dC2[3 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_Phi[2 * n + k] = ((real)1 / (real)240) * (t649 * d_dC2[n + k] + (Bm[7 * n + k] + dC2[n + k]) *
+      t654 + ((Bm[6 * n + k] + dC2[k]) * t537 + t541 * d_dC2[k]) + (t664 * d_dC2[4 * n + k] + (Bm[10
+      * n + k] + dC2[4 * n + k]) * t669 + ((Bm[9 * n + k] + dC2[3 * n + k]) * t558 + t562 * d_dC2[3
+      * n + k]))) + ((real)1 / (real)240) * (t589 * d_dC1[n + k] + (dC1[n + k] - (Bm[13 * n + k] +
+      Bm[n + k] * 20.0)) * t602 - ((dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)) * t393 + t399 *
+      d_dC1[k]) + (t620 * d_dC1[4 * n + k] + (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] *
+      20.0)) * t641 - ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) * t474 + t484 *
+      d_dC1[3 * n + k])));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_Phi[3 * n + k] = ((real)1 / (real)240) * ((dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] *
+      20.0)) * t393 + t399 * d_dC1[5 * n + k] - ((dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] *
+      20.0)) * t421 + t427 * d_dC1[4 * n + k])) - ((real)1 / (real)240) * ((Bm[11 * n + k] + dC2[5 *
+      n + k]) * t537 + t541 * d_dC2[5 * n + k] + ((Bm[10 * n + k] + dC2[4 * n + k]) * t547 + t551 *
+      d_dC2[4 * n + k]));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_Phi[4 * n + k] = ((real)1 / (real)240) * ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] *
+      20.0)) * t421 + t427 * d_dC1[3 * n + k] - (t589 * d_dC1[5 * n + k] + (dC1[5 * n + k] - (Bm[17
+      * n + k] + Bm[5 * n + k] * 20.0)) * t602)) - ((real)1 / (real)240) * (t649 * d_dC2[5 * n + k]
+      + (Bm[11 * n + k] + dC2[5 * n + k]) * t654 - ((Bm[9 * n + k] + dC2[3 * n + k]) * t547 + t551 *
+      d_dC2[3 * n + k]));
+  }
+  for (int k = 0; k < n; ++k) {
+    d_Phi[5 * n + k] = ((real)1 / (real)240) * (t649 * d_dC2[4 * n + k] + (Bm[10 * n + k] + dC2[4 *
+      n + k]) * t654 + ((Bm[9 * n + k] + dC2[3 * n + k]) * t537 + t541 * d_dC2[3 * n + k])) +
+      ((real)1 / (real)240) * (t589 * d_dC1[4 * n + k] + (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 *
+      n + k] * 20.0)) * t602 - ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) * t393 +
+      t399 * d_dC1[3 * n + k]));
+  }
+  d_Om[0] = t49 - (((real)1 / (real)240) * (t541 * t518 + t528 * t537) + (((real)1 / (real)240) *
+    (t562 * t421 + t427 * t558) + ((real)1 / (real)240) * (t572 * t393 + t399 * t568)) + ((real)1 /
+    (real)240) * (t551 * t474 + t484 * t547)) + ((real)1 / (real)12) * t259;
+  d_Om[1] = t23 + (((real)1 / (real)240) * (t620 * t547 + t551 * t641) + (((real)1 / (real)240) *
+    (t589 * t568 + t572 * t602) - ((real)1 / (real)240) * (t664 * t421 + t427 * t669) - ((real)1 /
+    (real)240) * (t649 * t518 + t528 * t654))) + ((real)1 / (real)12) * t164;
+  d_Om[2] = t26 + (((real)1 / (real)240) * (t649 * t474 + t484 * t654) + (((real)1 / (real)240) *
+    (t664 * t393 + t399 * t669) + ((real)1 / (real)240) * (t589 * t558 + t562 * t602)) + ((real)1 /
+    (real)240) * (t620 * t537 + t541 * t641)) + ((real)1 / (real)12) * t193;
+  d_Om[3] = t44 - (((real)1 / (real)240) * (t541 * t421 + t427 * t537) + ((real)1 / (real)240) *
+    (t551 * t393 + t399 * t547)) + ((real)1 / (real)12) * t245;
+  d_Om[4] = t16 + (((real)1 / (real)240) * (t589 * t547 + t551 * t602) - ((real)1 / (real)240) *
+    (t649 * t421 + t427 * t654)) + ((real)1 / (real)12) * t127;
+  d_Om[5] = t19 + (((real)1 / (real)240) * (t649 * t393 + t399 * t654) + ((real)1 / (real)240) *
+    (t589 * t537 + t541 * t602)) + ((real)1 / (real)12) * t148;
+  real t907 = 0;
+  for (int k = 0; k < n; ++k) {
+    t907 += Bm[k] * d_etad[k];
+  }
+  real t909 = 0;
+  for (int k = 0; k < n; ++k) {
+    t909 += Bm[n + k] * etad[k];
+  }
+  real t910 = t140 * t909;
+  real t912 = 0;
+  for (int k = 0; k < n; ++k) {
+    t912 += Bm[4 * n + k] * etad[k];
+  }
+  real t913 = t185 * t912;
+  real t915 = 0;
+  for (int k = 0; k < n; ++k) {
+    t915 += Bm[6 * n + k] * etad[k];
+  }
+  real t916 = t95 * t915;
+  real t918 = 0;
+  for (int k = 0; k < n; ++k) {
+    t918 += Bm[9 * n + k] * etad[k];
+  }
+  real t919 = t112 * t918;
+  real t921 = 0;
+  for (int k = 0; k < n; ++k) {
+    t921 += Bm[10 * n + k] * etad[k];
+  }
+  real t923 = t919 - t168 * t921;
+  real t925 = 0;
+  for (int k = 0; k < n; ++k) {
+    t925 += Bm[7 * n + k] * etad[k];
+  }
+  real t929 = t913 + (t916 + (t923 - t131 * t925));
+  real t931 = 0;
+  for (int k = 0; k < n; ++k) {
+    t931 += Bm[3 * n + k] * etad[k];
+  }
+  real t934 = t910 + (t929 - t205 * t931);
+  real t936 = 0;
+  for (int k = 0; k < n; ++k) {
+    t936 += Bm[k] * etad[k];
+  }
+  real t938 = t934 - t156 * t936;
+  real t940 = 0;
+  for (int k = 0; k < n; ++k) {
+    t940 += Bm[14 * n + k] * etad[k];
+  }
+  real t942 = 0;
+  for (int k = 0; k < n; ++k) {
+    t942 += Bm[2 * n + k] * etad[k];
+  }
+  real t945 = t938 - (t940 + 20.0 * t942);
+  real t946 = t945 * t393;
+  real t947 = t918 * t23;
+  real t949 = 0;
+  for (int k = 0; k < n; ++k) {
+    t949 += Bm[9 * n + k] * d_etad[k];
+  }
+  real t951 = t947 + t112 * t949;
+  real t952 = t921 * t49;
+  real t954 = 0;
+  for (int k = 0; k < n; ++k) {
+    t954 += Bm[10 * n + k] * d_etad[k];
+  }
+  real t957 = t951 - (t952 + t168 * t954);
+  real t958 = t925 * t44;
+  real t960 = 0;
+  for (int k = 0; k < n; ++k) {
+    t960 += Bm[7 * n + k] * d_etad[k];
+  }
+  real t963 = t957 - (t958 + t131 * t960);
+  real t964 = t915 * t16;
+  real t966 = 0;
+  for (int k = 0; k < n; ++k) {
+    t966 += Bm[6 * n + k] * d_etad[k];
+  }
+  real t969 = t963 + (t964 + t95 * t966);
+  real t970 = t912 * t38;
+  real t972 = 0;
+  for (int k = 0; k < n; ++k) {
+    t972 += Bm[4 * n + k] * d_etad[k];
+  }
+  real t975 = t969 + (t970 + t185 * t972);
+  real t976 = t931 * t8;
+  real t978 = 0;
+  for (int k = 0; k < n; ++k) {
+    t978 += Bm[3 * n + k] * d_etad[k];
+  }
+  real t981 = t975 - (t976 + t205 * t978);
+  real t982 = t909 * t33;
+  real t984 = 0;
+  for (int k = 0; k < n; ++k) {
+    t984 += Bm[n + k] * d_etad[k];
+  }
+  real t991 = t981 + (t982 + t140 * t984) - (t936 * t1 + t156 * t907);
+  real t993 = 0;
+  for (int k = 0; k < n; ++k) {
+    t993 += Bm[14 * n + k] * d_etad[k];
+  }
+  real t995 = 0;
+  for (int k = 0; k < n; ++k) {
+    t995 += Bm[2 * n + k] * d_etad[k];
+  }
+  real t998 = t991 - (t993 + 20.0 * t995);
+  real t1001 = ((real)1 / (real)240) * (t946 + t399 * t998);
+  real t1002 = t135 * t936;
+  real t1003 = t179 * t931;
+  real t1005 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1005 += Bm[8 * n + k] * etad[k];
+  }
+  real t1006 = t131 * t1005;
+  real t1008 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1008 += Bm[11 * n + k] * etad[k];
+  }
+  real t1014 = t1006 + (t168 * t1008 - t120 * t918) - t103 * t915;
+  real t1016 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1016 += Bm[5 * n + k] * etad[k];
+  }
+  real t1022 = t1002 + (t1003 + (t1014 - t185 * t1016) - t140 * t942);
+  real t1024 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1024 += Bm[13 * n + k] * etad[k];
+  }
+  real t1027 = t1022 - (t1024 + 20.0 * t909);
+  real t1028 = t1027 * t421;
+  real t1029 = t1008 * t49;
+  real t1031 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1031 += Bm[11 * n + k] * d_etad[k];
+  }
+  real t1037 = t1029 + t168 * t1031 - (t918 * t26 + t120 * t949);
+  real t1038 = t1005 * t44;
+  real t1040 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1040 += Bm[8 * n + k] * d_etad[k];
+  }
+  real t1047 = t1037 + (t1038 + t131 * t1040) - (t915 * t19 + t103 * t966);
+  real t1048 = t1016 * t38;
+  real t1050 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1050 += Bm[5 * n + k] * d_etad[k];
+  }
+  real t1065 = t1047 - (t1048 + t185 * t1050) + (t931 * t11 + t179 * t978) - (t942 * t33 + t140 *
+    t995) + (t936 * t4 + t135 * t907);
+  real t1066 = 20.0 * t984;
+  real t1068 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1068 += Bm[13 * n + k] * d_etad[k];
+  }
+  real t1070 = t1065 - (t1066 + t1068);
+  real t1073 = ((real)1 / (real)240) * (t1028 + t427 * t1070);
+  real t1074 = t508 * t931;
+  real t1075 = t412 * t936;
+  real t1077 = t1022 + 2.0 * t1024;
+  real t1078 = t131 * t1077;
+  real t1085 = t135 * t931 + (t131 * t1008 - t103 * t918 - t140 * t1016);
+  real t1087 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1087 += Bm[16 * n + k] * etad[k];
+  }
+  real t1089 = t1085 + 2.0 * t1087;
+  real t1090 = t168 * t1089;
+  real t1097 = t156 * t1016 + (t103 * t921 - t95 * t1008) - t135 * t912;
+  real t1099 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1099 += Bm[15 * n + k] * etad[k];
+  }
+  real t1101 = t1097 + 2.0 * t1099;
+  real t1104 = t1078 + (t1090 - t112 * t1101);
+  real t1119 = t156 * t942 + (t205 * t1016 + (t103 * t925 + (t120 * t921 - t112 * t1008 - t95 *
+    t1005)) - t179 * t912) - t135 * t909;
+  real t1121 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1121 += Bm[12 * n + k] * etad[k];
+  }
+  real t1123 = t1119 + 2.0 * t1121;
+  real t1133 = t1005 + ((real)1 / (real)60) * (t1074 + (t1075 + (t1104 - t95 * t1123) - t376 * t909)
+    - t468 * t912);
+  real t1134 = t1133 * t537;
+  real t1135 = t1089 * t49;
+  real t1150 = t1008 * t44 + t131 * t1031 - (t918 * t19 + t103 * t949) - (t1016 * t33 + t140 *
+    t1050) + (t931 * t4 + t135 * t978);
+  real t1152 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1152 += Bm[16 * n + k] * d_etad[k];
+  }
+  real t1154 = t1150 + 2.0 * t1152;
+  real t1156 = t1135 + t168 * t1154;
+  real t1157 = t1101 * t23;
+  real t1159 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1159 += Bm[15 * n + k] * d_etad[k];
+  }
+  real t1175 = t921 * t19 + t103 * t954 - (t1008 * t16 + t95 * t1031) + (t1016 * t1 + t156 * t1050)
+    - (t912 * t4 + t135 * t972);
+  real t1176 = 2.0 * t1159 + t1175;
+  real t1182 = t1065 + 2.0 * t1068;
+  real t1185 = t1156 - (t1157 + t112 * t1176) + (t1077 * t44 + t131 * t1182);
+  real t1186 = t1123 * t16;
+  real t1188 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1188 += Bm[12 * n + k] * d_etad[k];
+  }
+  real t1220 = t921 * t26 + t120 * t954 - (t1008 * t23 + t112 * t1031) - (t1005 * t16 + t95 * t1040)
+    + (t925 * t19 + t103 * t960) + (t1016 * t8 + t205 * t1050) - (t912 * t11 + t179 * t972) + (t942
+    * t1 + t156 * t995) - (t909 * t4 + t135 * t984);
+  real t1221 = 2.0 * t1188 + t1220;
+  real t1242 = t1040 + ((real)1 / (real)60) * (t1185 - (t1186 + t95 * t1221) + (t936 * t145 + t412 *
+    t907) - (t909 * t254 + t376 * t984) + (t931 * t190 + t508 * t978) - (t912 * t276 + t468 *
+    t972));
+  real t1245 = ((real)1 / (real)240) * (t1134 + t541 * t1242);
+  real t1254 = t1008 + ((real)1 / (real)60) * (t412 * t931 + (t131 * t1089 - t95 * t1101) - t376 *
+    t912);
+  real t1272 = t1031 + ((real)1 / (real)60) * (t1089 * t44 + t131 * t1154 - (t1101 * t16 + t95 *
+    t1176) + (t931 * t145 + t412 * t978) - (t912 * t254 + t376 * t972));
+  real t1275 = ((real)1 / (real)240) * (t1254 * t558 + t562 * t1272);
+  real t1276 = t376 * t1016;
+  real t1277 = t103 * t1101;
+  real t1284 = t140 * t912 + (t95 * t918 - t131 * t921) - t156 * t931;
+  real t1286 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1286 += Bm[17 * n + k] * etad[k];
+  }
+  real t1288 = t1284 + 2.0 * t1286;
+  real t1295 = t921 + ((real)1 / (real)60) * (t1276 + (t1277 - t131 * t1288 - t387 * t931));
+  real t1296 = t1295 * t568;
+  real t1299 = t1101 * t19 + t103 * t1176;
+  real t1300 = t1288 * t44;
+  real t1302 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1302 += Bm[17 * n + k] * d_etad[k];
+  }
+  real t1318 = t918 * t16 + t95 * t949 - (t921 * t44 + t131 * t954) + (t912 * t33 + t140 * t972) -
+    (t931 * t1 + t156 * t978);
+  real t1319 = 2.0 * t1302 + t1318;
+  real t1332 = t954 + ((real)1 / (real)60) * (t1299 - (t1300 + t131 * t1319) - (t931 * t160 + t387 *
+    t978) + (t1016 * t254 + t376 * t1050));
+  real t1345 = t938 + 2.0 * t940;
+  real t1356 = t925 + ((real)1 / (real)60) * (t468 * t1016 + (t376 * t942 + (t103 * t1123 + (t120 *
+    t1101 - t168 * t1288 - t131 * t1345) - t387 * t936) - t452 * t931));
+  real t1367 = 2.0 * t993 + t991;
+  real t1392 = t960 + ((real)1 / (real)60) * (t1101 * t26 + t120 * t1176 - (t1288 * t49 + t168 *
+    t1319) - (t1345 * t44 + t131 * t1367) + (t1123 * t19 + t103 * t1221) - (t936 * t160 + t387 *
+    t907) + (t942 * t254 + t376 * t995) - (t931 * t213 + t452 * t978) + (t1016 * t276 + t468 *
+    t1050));
+  real t1401 = t1085 - (t1087 + 20.0 * t912);
+  real t1405 = t1150 - (20.0 * t972 + t1152);
+  real t1412 = t1284 - (t1286 + 20.0 * t1016);
+  real t1416 = t1318 - (t1302 + 20.0 * t1050);
+  d_Omd[0] = t907 + (t1001 - (t1073 + (t1245 + (t1275 + ((real)1 / (real)240) * (t1296 + t572 *
+    t1332)) + ((real)1 / (real)240) * (t1356 * t547 + t551 * t1392))) - ((real)1 / (real)240) *
+    (t1401 * t518 + t528 * t1405) + ((real)1 / (real)240) * (t1412 * t474 + t484 * t1416)) +
+    ((real)1 / (real)12) * t1188;
+  real t1440 = t915 + ((real)1 / (real)60) * (t452 * t912 + (t387 * t909 + (t95 * t1345 + (t112 *
+    t1288 - t120 * t1089) - t103 * t1077) - t412 * t942) - t508 * t1016);
+  real t1474 = t966 + ((real)1 / (real)60) * (t1288 * t23 + t112 * t1319 - (t1089 * t26 + t120 *
+    t1154) + (t1345 * t16 + t95 * t1367) - (t1077 * t19 + t103 * t1182) + (t909 * t160 + t387 *
+    t984) - (t942 * t145 + t412 * t995) + (t912 * t213 + t452 * t972) - (t1016 * t190 + t508 *
+    t1050));
+  real t1486 = t918 + ((real)1 / (real)60) * (t387 * t912 + (t95 * t1288 - t103 * t1089) - t412 *
+    t1016);
+  real t1504 = t949 + ((real)1 / (real)60) * (t1288 * t16 + t95 * t1319 - (t1089 * t19 + t103 *
+    t1154) + (t912 * t160 + t387 * t972) - (t1016 * t145 + t412 * t1050));
+  real t1521 = t1119 - (t1121 + 20.0 * t936);
+  real t1525 = t1220 - (t1188 + 20.0 * t907);
+  real t1537 = t1097 - (t1099 + 20.0 * t931);
+  real t1541 = t1175 - (t1159 + 20.0 * t978);
+  d_Omd[1] = t984 + (((real)1 / (real)240) * (t1440 * t547 + t551 * t1474) + (((real)1 / (real)240)
+    * (t1486 * t568 + t572 * t1504) - ((real)1 / (real)240) * (t1254 * t669 + t664 * t1272) -
+    ((real)1 / (real)240) * (t1133 * t654 + t649 * t1242)) + ((real)1 / (real)240) * (t1521 * t421 +
+    t427 * t1525) - ((real)1 / (real)240) * (t945 * t602 + t589 * t998) + ((real)1 / (real)240) *
+    (t1537 * t518 + t528 * t1541) - ((real)1 / (real)240) * (t1412 * t641 + t620 * t1416)) +
+    ((real)1 / (real)12) * t1068;
+  d_Omd[2] = t995 + (((real)1 / (real)240) * (t1356 * t654 + t649 * t1392) + (((real)1 / (real)240)
+    * (t1295 * t669 + t664 * t1332) + ((real)1 / (real)240) * (t1486 * t558 + t562 * t1504)) +
+    ((real)1 / (real)240) * (t1440 * t537 + t541 * t1474) - ((real)1 / (real)240) * (t1521 * t393 +
+    t399 * t1525) + ((real)1 / (real)240) * (t1027 * t602 + t589 * t1070) - ((real)1 / (real)240) *
+    (t1537 * t474 + t484 * t1541) + ((real)1 / (real)240) * (t1401 * t641 + t620 * t1405)) +
+    ((real)1 / (real)12) * t993;
+  d_Omd[3] = t978 + (((real)1 / (real)240) * (t1412 * t393 + t399 * t1416) - (((real)1 / (real)240)
+    * (t1401 * t421 + t427 * t1405) + (((real)1 / (real)240) * (t1254 * t537 + t541 * t1272) +
+    ((real)1 / (real)240) * (t1295 * t547 + t551 * t1332)))) + ((real)1 / (real)12) * t1159;
+  d_Omd[4] = t972 + (((real)1 / (real)240) * (t1486 * t547 + t551 * t1504) - ((real)1 / (real)240) *
+    (t1254 * t654 + t649 * t1272) + ((real)1 / (real)240) * (t1537 * t421 + t427 * t1541) - ((real)1
+    / (real)240) * (t1412 * t602 + t589 * t1416)) + ((real)1 / (real)12) * t1152;
+  d_Omd[5] = t1050 + (((real)1 / (real)240) * (t1295 * t654 + t649 * t1332) + ((real)1 / (real)240)
+    * (t1486 * t537 + t541 * t1504) - ((real)1 / (real)240) * (t1537 * t393 + t399 * t1541) +
+    ((real)1 / (real)240) * (t1401 * t602 + t589 * t1405)) + ((real)1 / (real)12) * t1302;
+  real t1669 = 2.0 * (t912 * t915 + (t918 * t909 - t936 * t921 - t931 * t925));
+  real t1686 = 2.0 * (t909 * t949 + t918 * t984 - (t921 * t907 + t936 * t954) - (t925 * t978 + t931
+    * t960) + (t915 * t972 + t912 * t966));
+  real t1697 = 2.0 * (t931 * t1005 + (t936 * t1008 - t918 * t942) - t1016 * t915);
+  real t1714 = 2.0 * (t1008 * t907 + t936 * t1031 - (t942 * t949 + t918 * t995) + (t1005 * t978 +
+    t931 * t1040) - (t915 * t1050 + t1016 * t966));
+  real t1722 = 2.0 * (t931 * t1008 - t918 * t1016);
+  real t1731 = 2.0 * (t1008 * t978 + t931 * t1031 - (t1016 * t949 + t918 * t1050));
+  real t1739 = 2.0 * (t912 * t918 - t921 * t931);
+  real t1748 = 2.0 * (t918 * t972 + t912 * t949 - (t931 * t954 + t921 * t978));
+  real t1764 = 2.0 * (t1016 * t925 + (t921 * t942 - t909 * t1008 - t912 * t1005));
+  real t1770 = 2.0 * (t921 * t1016 - t912 * t1008);
+  real t1787 = ((real)1 / (real)30) * (t1016 * t1123) + (((real)1 / (real)30) * (t942 * t1101) +
+    (((real)1 / (real)60) * (t103 * t1764) + (((real)1 / (real)60) * (t120 * t1770) - ((real)1 /
+    (real)60) * (t168 * t1739) - ((real)1 / (real)60) * (t131 * t1669)) - ((real)1 / (real)30) *
+    (t936 * t1288)) - ((real)1 / (real)30) * (t931 * t1345));
+  real t1797 = 2.0 * (t1016 * t954 + t921 * t1050 - (t1008 * t972 + t912 * t1031));
+  real t1827 = 2.0 * (t942 * t954 + t921 * t995 - (t1008 * t984 + t909 * t1031) - (t1005 * t972 +
+    t912 * t1040) + (t925 * t1050 + t1016 * t960));
+  real t1851 = ((real)1 / (real)60) * (t1770 * t26 + t120 * t1797) - ((real)1 / (real)60) * (t1739 *
+    t49 + t168 * t1748) - ((real)1 / (real)60) * (t1669 * t44 + t131 * t1686) + ((real)1 / (real)60)
+    * (t1764 * t19 + t103 * t1827) - ((real)1 / (real)30) * (t1288 * t907 + t936 * t1319) + ((real)1
+    / (real)30) * (t1101 * t995 + t942 * t1176) - ((real)1 / (real)30) * (t1345 * t978 + t931 *
+    t1367) + ((real)1 / (real)30) * (t1123 * t1050 + t1016 * t1221);
+  real t1878 = ((real)1 / (real)30) * (t931 * t1077) + (((real)1 / (real)30) * (t936 * t1089) +
+    (((real)1 / (real)60) * (t131 * t1697) + (((real)1 / (real)60) * (t168 * t1722) - ((real)1 /
+    (real)60) * (t112 * t1770)) - ((real)1 / (real)60) * (t95 * t1764)) - ((real)1 / (real)30) *
+    (t909 * t1101)) - ((real)1 / (real)30) * (t912 * t1123);
+  real t1918 = ((real)1 / (real)60) * (t1722 * t49 + t168 * t1731) - ((real)1 / (real)60) * (t1770 *
+    t23 + t112 * t1797) + ((real)1 / (real)60) * (t1697 * t44 + t131 * t1714) - ((real)1 / (real)60)
+    * (t1764 * t16 + t95 * t1827) + ((real)1 / (real)30) * (t1089 * t907 + t936 * t1154) - ((real)1
+    / (real)30) * (t1101 * t984 + t909 * t1176) + ((real)1 / (real)30) * (t1077 * t978 + t931 *
+    t1182) - ((real)1 / (real)30) * (t1123 * t972 + t912 * t1221);
+  real t1933 = t1016 * t1101 * ((real)1 / (real)30) + (((real)1 / (real)60) * (t103 * t1770) -
+    ((real)1 / (real)60) * (t131 * t1739) - ((real)1 / (real)30) * (t931 * t1288));
+  real t1953 = ((real)1 / (real)60) * (t1770 * t19 + t103 * t1797) - ((real)1 / (real)60) * (t1739 *
+    t44 + t131 * t1748) - ((real)1 / (real)30) * (t1288 * t978 + t931 * t1319) + ((real)1 /
+    (real)30) * (t1101 * t1050 + t1016 * t1176);
+  real t1968 = ((real)1 / (real)30) * (t931 * t1089) + (((real)1 / (real)60) * (t131 * t1722) -
+    ((real)1 / (real)60) * (t95 * t1770)) - ((real)1 / (real)30) * (t912 * t1101);
+  real t1988 = ((real)1 / (real)60) * (t1722 * t44 + t131 * t1731) - ((real)1 / (real)60) * (t1770 *
+    t16 + t95 * t1797) + ((real)1 / (real)30) * (t1089 * t978 + t931 * t1154) - ((real)1 / (real)30)
+    * (t1101 * t972 + t912 * t1176);
+  d_Omdd[0] = ((real)1 / (real)240) * (t1669 * t393 + t399 * t1686) - ((real)1 / (real)240) * (t1697
+    * t421 + t427 * t1714) - ((real)1 / (real)240) * (t1722 * t518 + t528 * t1731) + ((real)1 /
+    (real)240) * (t1739 * t474 + t484 * t1748) - ((real)1 / (real)240) * (t1787 * t547 + t551 *
+    t1851) - ((real)1 / (real)240) * (t1878 * t537 + t541 * t1918) - ((real)1 / (real)240) * (t1933
+    * t568 + t572 * t1953) - ((real)1 / (real)240) * (t1968 * t558 + t562 * t1988) - ((real)1 /
+    (real)120) * (t1027 * t1272 + t1254 * t1070) + ((real)1 / (real)120) * (t1295 * t998 + t945 *
+    t1332) - ((real)1 / (real)120) * (t1401 * t1242 + t1133 * t1405) + ((real)1 / (real)120) *
+    (t1356 * t1416 + t1412 * t1392);
+  real t2023 = ((real)1 / (real)30) * (t912 * t1288) + (((real)1 / (real)60) * (t95 * t1739) -
+    ((real)1 / (real)60) * (t103 * t1722)) - ((real)1 / (real)30) * (t1016 * t1089);
+  real t2043 = ((real)1 / (real)60) * (t1739 * t16 + t95 * t1748) - ((real)1 / (real)60) * (t1722 *
+    t19 + t103 * t1731) + ((real)1 / (real)30) * (t1288 * t972 + t912 * t1319) - ((real)1 /
+    (real)30) * (t1089 * t1050 + t1016 * t1154);
+  real t2069 = ((real)1 / (real)30) * (t912 * t1345) + (((real)1 / (real)30) * (t909 * t1288) +
+    (((real)1 / (real)60) * (t95 * t1669) + (((real)1 / (real)60) * (t112 * t1739) - ((real)1 /
+    (real)60) * (t120 * t1722)) - ((real)1 / (real)60) * (t103 * t1697)) - ((real)1 / (real)30) *
+    (t942 * t1089)) - ((real)1 / (real)30) * (t1016 * t1077);
+  real t2109 = ((real)1 / (real)60) * (t1739 * t23 + t112 * t1748) - ((real)1 / (real)60) * (t1722 *
+    t26 + t120 * t1731) + ((real)1 / (real)60) * (t1669 * t16 + t95 * t1686) - ((real)1 / (real)60)
+    * (t1697 * t19 + t103 * t1714) + ((real)1 / (real)30) * (t1288 * t984 + t909 * t1319) - ((real)1
+    / (real)30) * (t1089 * t995 + t942 * t1154) + ((real)1 / (real)30) * (t1345 * t972 + t912 *
+    t1367) - ((real)1 / (real)30) * (t1077 * t1050 + t1016 * t1182);
+  d_Omdd[1] = ((real)1 / (real)240) * (t2023 * t568 + t572 * t2043) + (((real)1 / (real)240) *
+    (t2069 * t547 + t551 * t2109) + (((real)1 / (real)240) * (t1764 * t421 + t427 * t1827) -
+    ((real)1 / (real)240) * (t1669 * t602 + t589 * t1686) + ((real)1 / (real)240) * (t1770 * t518 +
+    t528 * t1797) - ((real)1 / (real)240) * (t1739 * t641 + t620 * t1748)) - ((real)1 / (real)240) *
+    (t1878 * t654 + t649 * t1918)) - ((real)1 / (real)240) * (t1968 * t669 + t664 * t1988) +
+    ((real)1 / (real)120) * (t1521 * t1272 + t1254 * t1525) - ((real)1 / (real)120) * (t1486 * t998
+    + t945 * t1504) + ((real)1 / (real)120) * (t1537 * t1242 + t1133 * t1541) - ((real)1 /
+    (real)120) * (t1440 * t1416 + t1412 * t1474);
+  d_Omdd[2] = ((real)1 / (real)240) * (t1933 * t669 + t664 * t1953) + (((real)1 / (real)240) *
+    (t1787 * t654 + t649 * t1851) + (((real)1 / (real)240) * (t1697 * t602 + t589 * t1714) -
+    ((real)1 / (real)240) * (t1764 * t393 + t399 * t1827) - ((real)1 / (real)240) * (t1770 * t474 +
+    t484 * t1797) + ((real)1 / (real)240) * (t1722 * t641 + t620 * t1731) + ((real)1 / (real)240) *
+    (t2069 * t537 + t541 * t2109)) + ((real)1 / (real)240) * (t2023 * t558 + t562 * t2043)) -
+    ((real)1 / (real)120) * (t1521 * t1332 + t1295 * t1525) + ((real)1 / (real)120) * (t1486 * t1070
+    + t1027 * t1504) - ((real)1 / (real)120) * (t1537 * t1392 + t1356 * t1541) + ((real)1 /
+    (real)120) * (t1440 * t1405 + t1401 * t1474);
+  d_Omdd[3] = ((real)1 / (real)240) * (t1739 * t393 + t399 * t1748) - ((real)1 / (real)240) * (t1722
+    * t421 + t427 * t1731) - ((real)1 / (real)240) * (t1933 * t547 + t551 * t1953) - ((real)1 /
+    (real)240) * (t1968 * t537 + t541 * t1988) - ((real)1 / (real)120) * (t1401 * t1272 + t1254 *
+    t1405) + ((real)1 / (real)120) * (t1295 * t1416 + t1412 * t1332);
+  d_Omdd[4] = ((real)1 / (real)240) * (t2023 * t547 + t551 * t2043) + (((real)1 / (real)240) *
+    (t1770 * t421 + t427 * t1797) - ((real)1 / (real)240) * (t1739 * t602 + t589 * t1748)) -
+    ((real)1 / (real)240) * (t1968 * t654 + t649 * t1988) + ((real)1 / (real)120) * (t1537 * t1272 +
+    t1254 * t1541) - ((real)1 / (real)120) * (t1486 * t1416 + t1412 * t1504);
+  d_Omdd[5] = ((real)1 / (real)240) * (t1933 * t654 + t649 * t1953) + (((real)1 / (real)240) *
+    (t1722 * t602 + t589 * t1731) - ((real)1 / (real)240) * (t1770 * t393 + t399 * t1797) + ((real)1
+    / (real)240) * (t2023 * t537 + t541 * t2043)) - ((real)1 / (real)120) * (t1537 * t1332 + t1295 *
+    t1541) + ((real)1 / (real)120) * (t1486 * t1405 + t1401 * t1504);
+  return 0;
+}
+
+int mstmm_sweep_modal_segment_slope(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1, in_t dC2,
+    in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_Phi, out_t d_Om, out_t d_Omd,
+    out_t d_Omdd)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_segment_slope_sized(1, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 2: return mstmm_sweep_modal_segment_slope_sized(2, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 3: return mstmm_sweep_modal_segment_slope_sized(3, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 4: return mstmm_sweep_modal_segment_slope_sized(4, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
+  default: return mstmm_sweep_modal_segment_slope_sized(n, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_modal_segment_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], out[0], out[1], out[2], out[3], out[4], out[5]))
+
+/* segment_motion and its derivative along a direction
+ * source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, 2009, 5.3
+ * source: Sonneville, Cardona, Bruls, Geometrically exact beam finite element on SE(3), 2014
+ * source: Simo, A finite strain beam formulation, 1985 (strains in section axes)
+ * in  R_end[3][3] rotation, end axes to section axes
+ * in  Om[6] Omega: displacement, then rotation vector
+ * in  Omd[6] rate of Omega
+ * in  Omdd[6] second rate of Omega at etadd = 0
+ * in  d_Om[6] derivative of Om
+ * in  d_Omd[6] derivative of Omd
+ * in  d_Omdd[6] derivative of Omdd
+ * out d_R[3][3] derivative of R
+ * out d_d[3] (m) derivative of d
+ * out d_H6[6][6] derivative of H6
+ * out d_v[3] (m/s) derivative of v
+ * out d_w[3] (rad/s) derivative of w
+ * out d_c[6] (m/s2, rad/s2) derivative of c
+ */
+int mstmm_sweep_modal_segment_motion_slope(in_t R_end, in_t Om, in_t Omd, in_t Omdd, in_t d_Om,
+    in_t d_Omd, in_t d_Omdd, out_t d_R, out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c)
+{
+  real t0 = Om[5] * Om[3];
+  real t1 = Om[5] * Om[5];
+  real t2 = Om[3] * Om[3];
+  real t3 = Om[4] * Om[4];
+  real t4 = t2 + t3;
+  real t5 = t1 + t4;
+  real t7 = ((real)1 / (real)6402373705728000) - t5 * 4.110317623312165e-19;
+  real t9 = t5 * t7 + (-((real)1 / (real)20922789888000));
+  real t11 = t5 * t9 + ((real)1 / (real)87178291200);
+  real t13 = t5 * t11 + (-((real)1 / (real)479001600));
+  real t15 = t5 * t13 + ((real)1 / (real)3628800);
+  real t17 = t5 * t15 + (-((real)1 / (real)40320));
+  real t19 = t5 * t17 + ((real)1 / (real)720);
+  real t20 = Om[4] * d_Om[4];
+  real t21 = t20 + t20;
+  real t22 = Om[3] * d_Om[3];
+  real t23 = t22 + t22;
+  real t24 = t21 + t23;
+  real t25 = Om[5] * d_Om[5];
+  real t26 = t25 + t25;
+  real t27 = t24 + t26;
+  real t47 = t17 * t27 + t5 * (t15 * t27 + t5 * (t13 * t27 + t5 * (t11 * t27 + t5 * (t9 * t27 + t5 *
+    (t7 * t27 - t5 * (4.110317623312165e-19 * t27))))));
+  real t49 = t19 * t27 + t5 * t47;
+  real t52 = ((real)1 / (real)24) - t5 * t19;
+  real t54 = t5 * t49 - t52 * t27;
+  real t57 = 0.5 - t5 * t52;
+  real t60 = Om[3] * d_Om[5] + Om[5] * d_Om[3];
+  real t62 = t0 * t54 + t57 * t60;
+  real t64 = 8.22063524662433e-18 - t5 * 1.9572941063391263e-20;
+  real t66 = t5 * t64 + (-((real)1 / (real)355687428096000));
+  real t68 = t5 * t66 + ((real)1 / (real)1307674368000);
+  real t70 = t5 * t68 + (-((real)1 / (real)6227020800));
+  real t72 = t5 * t70 + ((real)1 / (real)39916800);
+  real t74 = t5 * t72 + (-((real)1 / (real)362880));
+  real t76 = t5 * t74 + ((real)1 / (real)5040);
+  real t78 = ((real)1 / (real)120) - t5 * t76;
+  real t80 = ((real)1 / (real)6) - t5 * t78;
+  real t82 = 1.0 - t5 * t80;
+  real t104 = t74 * t27 + t5 * (t72 * t27 + t5 * (t70 * t27 + t5 * (t68 * t27 + t5 * (t66 * t27 + t5
+    * (t64 * t27 - t5 * (1.9572941063391263e-20 * t27))))));
+  real t106 = t76 * t27 + t5 * t104;
+  real t109 = t5 * t106 - t78 * t27;
+  real t111 = t80 * t27 + t5 * t109;
+  real t113 = t82 * d_Om[4] - Om[4] * t111;
+  real t114 = t62 + t113;
+  real t116 = Om[3] * Om[4];
+  real t120 = Om[4] * d_Om[3] + Om[3] * d_Om[4];
+  real t122 = t116 * t54 + t57 * t120;
+  real t125 = t82 * d_Om[5] - Om[5] * t111;
+  real t126 = t122 - t125;
+  real t128 = t1 + t3;
+  real t130 = t21 + t26;
+  real t132 = t128 * t54 + t57 * t130;
+  d_R[0] = R_end[6] * t114 + (R_end[3] * t126 - R_end[0] * t132);
+  d_R[1] = R_end[7] * t114 + (R_end[4] * t126 - R_end[1] * t132);
+  d_R[2] = R_end[8] * t114 + (R_end[5] * t126 - R_end[2] * t132);
+  real t146 = Om[5] * Om[4];
+  real t150 = Om[4] * d_Om[5] + Om[5] * d_Om[4];
+  real t152 = t146 * t54 + t57 * t150;
+  real t155 = t82 * d_Om[3] - Om[3] * t111;
+  real t156 = t152 - t155;
+  real t158 = t125 + t122;
+  real t160 = t1 + t2;
+  real t162 = t23 + t26;
+  real t164 = t160 * t54 + t57 * t162;
+  d_R[3] = R_end[6] * t156 + (R_end[0] * t158 - R_end[3] * t164);
+  d_R[4] = R_end[7] * t156 + (R_end[1] * t158 - R_end[4] * t164);
+  d_R[5] = R_end[8] * t156 + (R_end[2] * t158 - R_end[5] * t164);
+  real t178 = t155 + t152;
+  real t180 = t62 - t113;
+  real t185 = t57 * t24 + t4 * t54;
+  d_R[6] = R_end[3] * t178 + R_end[0] * t180 - R_end[6] * t185;
+  d_R[7] = R_end[4] * t178 + R_end[1] * t180 - R_end[7] * t185;
+  d_R[8] = R_end[5] * t178 + R_end[2] * t180 - R_end[8] * t185;
+  real t200 = t80 * t120 + t116 * t109;
+  real t203 = t57 * d_Om[5] + Om[5] * t54;
+  real t204 = t200 - t203;
+  real t206 = t116 * t80;
+  real t207 = Om[5] * t57;
+  real t208 = t206 - t207;
+  real t212 = 1.0 - t128 * t80;
+  real t216 = t80 * t130 + t128 * t109;
+  real t222 = t0 * t109 + t80 * t60;
+  real t225 = t57 * d_Om[4] + Om[4] * t54;
+  real t226 = t222 + t225;
+  real t228 = Om[4] * t57;
+  real t229 = t80 * t0;
+  real t230 = t228 + t229;
+  d_d[0] = Om[1] * t204 + t208 * d_Om[1] + (t212 * d_Om[0] - Om[0] * t216) + (Om[2] * t226 + t230 *
+    d_Om[2]);
+  real t234 = t80 * t146;
+  real t235 = Om[3] * t57;
+  real t236 = t234 - t235;
+  real t240 = t146 * t109 + t80 * t150;
+  real t243 = t57 * d_Om[3] + Om[3] * t54;
+  real t244 = t240 - t243;
+  real t248 = 1.0 - t80 * t160;
+  real t252 = t160 * t109 + t80 * t162;
+  real t256 = t206 + t207;
+  real t258 = t203 + t200;
+  d_d[1] = t236 * d_Om[2] + Om[2] * t244 + (t248 * d_Om[1] - Om[1] * t252) + (t256 * d_Om[0] + Om[0]
+    * t258);
+  real t262 = t234 + t235;
+  real t264 = t243 + t240;
+  real t268 = 1.0 - t4 * t80;
+  real t272 = t80 * t24 + t4 * t109;
+  real t276 = t229 - t228;
+  real t278 = t222 - t225;
+  d_d[2] = t262 * d_Om[1] + Om[1] * t264 + (t268 * d_Om[2] - Om[2] * t272) + (t276 * d_Om[0] + Om[0]
+    * t278);
+  real t286 = R_end[6] * t226 + (R_end[3] * t204 - R_end[0] * t216);
+  d_H6[0] = t286;
+  real t291 = R_end[6] * t244 + (R_end[0] * t258 - R_end[3] * t252);
+  d_H6[1] = t291;
+  real t296 = R_end[3] * t264 + R_end[0] * t278 - R_end[6] * t272;
+  d_H6[2] = t296;
+  real t298 = t52 - 0.5 * t80;
+  real t299 = Om[4] * t298;
+  real t302 = t78 * 1.5 - t52 * 0.5;
+  real t303 = t0 * t302;
+  real t304 = t299 + t303;
+  real t307 = Om[0] * d_Om[3] + Om[3] * d_Om[0];
+  real t310 = Om[1] * d_Om[4] + Om[4] * d_Om[1];
+  real t311 = t307 + t310;
+  real t314 = Om[2] * d_Om[5] + Om[5] * d_Om[2];
+  real t316 = 2.0 * (t311 + t314);
+  real t318 = Om[5] * Om[2];
+  real t319 = Om[4] * Om[1];
+  real t320 = Om[3] * Om[0];
+  real t321 = t319 + t320;
+  real t323 = (t318 + t321) * 2.0;
+  real t327 = 0.5 * t49 - 1.5 * t106;
+  real t329 = t302 * t60 + t0 * t327;
+  real t332 = t49 + 0.5 * t109;
+  real t334 = t298 * d_Om[4] - Om[4] * t332;
+  real t340 = Om[5] * Om[0] + Om[3] * Om[2];
+  real t350 = t340 * t109 + t80 * (Om[2] * d_Om[3] + Om[3] * d_Om[2] + (Om[0] * d_Om[5] + Om[5] *
+    d_Om[0]));
+  real t354 = Om[1] * t54 + t57 * d_Om[1];
+  real t355 = t304 * t316 + t323 * (t329 + t334) + t350 + t354;
+  real t357 = t116 * t302;
+  real t358 = Om[5] * t298;
+  real t359 = t357 - t358;
+  real t363 = t302 * t120 + t116 * t327;
+  real t366 = t298 * d_Om[5] - Om[5] * t332;
+  real t372 = Om[4] * Om[0] + Om[3] * Om[1];
+  real t382 = t372 * t109 + t80 * (Om[1] * d_Om[3] + Om[3] * d_Om[1] + (Om[0] * d_Om[4] + Om[4] *
+    d_Om[0]));
+  real t386 = Om[2] * t54 + t57 * d_Om[2];
+  real t387 = t359 * t316 + t323 * (t363 - t366) + t382 - t386;
+  real t389 = t3 * t302;
+  real t390 = t1 * t302;
+  real t391 = t389 + t390;
+  real t395 = t302 * t26 + t1 * t327;
+  real t398 = t302 * t21 + t3 * t327;
+  real t403 = 2.0 * (t318 + t319);
+  real t409 = t391 * t316 + t323 * (t395 + t398) + (t403 * t109 + t80 * (2.0 * (t310 + t314)));
+  d_H6[3] = R_end[6] * t355 + (R_end[3] * t387 - R_end[0] * t409);
+  real t413 = t146 * t302;
+  real t414 = Om[3] * t298;
+  real t415 = t413 - t414;
+  real t419 = t302 * t150 + t146 * t327;
+  real t422 = t298 * d_Om[3] - Om[3] * t332;
+  real t428 = Om[5] * Om[1] + Om[4] * Om[2];
+  real t438 = t428 * t109 + t80 * (Om[2] * d_Om[4] + Om[4] * d_Om[2] + (Om[1] * d_Om[5] + Om[5] *
+    d_Om[1]));
+  real t442 = Om[0] * t54 + t57 * d_Om[0];
+  real t443 = t415 * t316 + t323 * (t419 - t422) + t438 - t442;
+  real t445 = t357 + t358;
+  real t451 = t386 + (t382 + (t445 * t316 + t323 * (t366 + t363)));
+  real t453 = t2 * t302;
+  real t454 = t390 + t453;
+  real t458 = t302 * t23 + t2 * t327;
+  real t463 = 2.0 * (t318 + t320);
+  real t469 = t454 * t316 + t323 * (t395 + t458) + (t463 * t109 + t80 * (2.0 * (t307 + t314)));
+  d_H6[4] = R_end[6] * t443 + (R_end[0] * t451 - R_end[3] * t469);
+  real t473 = t413 + t414;
+  real t479 = t442 + (t438 + (t473 * t316 + t323 * (t422 + t419)));
+  real t481 = t303 - t299;
+  real t487 = t350 + (t481 * t316 + t323 * (t329 - t334)) - t354;
+  real t490 = t389 + t453;
+  real t495 = t321 * 2.0;
+  real t500 = t490 * t316 + t323 * (t398 + t458) + (t495 * t109 + t80 * (2.0 * t311));
+  d_H6[5] = R_end[3] * t479 + R_end[0] * t487 - R_end[6] * t500;
+  real t507 = R_end[7] * t226 + (R_end[4] * t204 - R_end[1] * t216);
+  d_H6[6] = t507;
+  real t512 = R_end[7] * t244 + (R_end[1] * t258 - R_end[4] * t252);
+  d_H6[7] = t512;
+  real t517 = R_end[4] * t264 + R_end[1] * t278 - R_end[7] * t272;
+  d_H6[8] = t517;
+  d_H6[9] = R_end[7] * t355 + (R_end[4] * t387 - R_end[1] * t409);
+  d_H6[10] = R_end[7] * t443 + (R_end[1] * t451 - R_end[4] * t469);
+  d_H6[11] = R_end[4] * t479 + R_end[1] * t487 - R_end[7] * t500;
+  real t537 = R_end[8] * t226 + (R_end[5] * t204 - R_end[2] * t216);
+  d_H6[12] = t537;
+  real t542 = R_end[8] * t244 + (R_end[2] * t258 - R_end[5] * t252);
+  d_H6[13] = t542;
+  real t547 = R_end[5] * t264 + R_end[2] * t278 - R_end[8] * t272;
+  d_H6[14] = t547;
+  d_H6[15] = R_end[8] * t355 + (R_end[5] * t387 - R_end[2] * t409);
+  d_H6[16] = R_end[8] * t443 + (R_end[2] * t451 - R_end[5] * t469);
+  d_H6[17] = R_end[5] * t479 + R_end[2] * t487 - R_end[8] * t500;
+  d_H6[18] = d_H6[19] = d_H6[20] = 0.0;
+  d_H6[21] = t286;
+  d_H6[22] = t291;
+  d_H6[23] = t296;
+  d_H6[24] = d_H6[25] = d_H6[26] = 0.0;
+  d_H6[27] = t507;
+  d_H6[28] = t512;
+  d_H6[29] = t517;
+  d_H6[30] = d_H6[31] = d_H6[32] = 0.0;
+  d_H6[33] = t537;
+  d_H6[34] = t542;
+  d_H6[35] = t547;
+  real t564 = t80 * t428;
+  real t567 = t57 * Om[0];
+  real t568 = t564 + t323 * t415 - t567;
+  real t572 = t57 * Om[1];
+  real t573 = t80 * t340;
+  real t576 = t572 + (t573 + t323 * t304);
+  real t595 = t80 * t495 + t323 * t490;
+  real t598 = Omd[4] * t443 + t568 * d_Omd[4] + (Omd[3] * t355 + t576 * d_Omd[3] + (t268 * d_Omd[2]
+    - Omd[2] * t272 + (Omd[1] * t244 + t236 * d_Omd[1] + (Omd[0] * t226 + t230 * d_Omd[0])))) -
+    (Omd[5] * t500 + t595 * d_Omd[5]);
+  real t603 = t567 + (t564 + t323 * t473);
+  real t607 = t80 * t372;
+  real t610 = t57 * Om[2];
+  real t611 = t607 + t323 * t359 - t610;
+  real t629 = t80 * t463 + t323 * t454;
+  real t633 = Omd[5] * t479 + t603 * d_Omd[5] + (Omd[3] * t387 + t611 * d_Omd[3] + (Omd[2] * t264 +
+    t262 * d_Omd[2] + (t248 * d_Omd[1] - Omd[1] * t252 + (Omd[0] * t204 + t208 * d_Omd[0]))) -
+    (Omd[4] * t469 + t629 * d_Omd[4]));
+  real t638 = t573 + t323 * t481 - t572;
+  real t644 = t610 + (t607 + t323 * t445);
+  real t661 = t80 * t403 + t323 * t391;
+  real t666 = Omd[5] * t487 + t638 * d_Omd[5] + (Omd[4] * t451 + t644 * d_Omd[4] + (Omd[2] * t278 +
+    t276 * d_Omd[2] + (Omd[1] * t258 + t256 * d_Omd[1] + (t212 * d_Omd[0] - Omd[0] * t216)) -
+    (Omd[3] * t409 + t661 * d_Omd[3])));
+  d_v[0] = R_end[6] * t598 + (R_end[3] * t633 + R_end[0] * t666);
+  d_v[1] = R_end[7] * t598 + (R_end[4] * t633 + R_end[1] * t666);
+  d_v[2] = R_end[8] * t598 + (R_end[5] * t633 + R_end[2] * t666);
+  real t690 = t268 * d_Omd[5] - Omd[5] * t272 + (Omd[4] * t244 + t236 * d_Omd[4] + (Omd[3] * t226 +
+    t230 * d_Omd[3]));
+  real t702 = Omd[5] * t264 + t262 * d_Omd[5] + (t248 * d_Omd[4] - Omd[4] * t252 + (Omd[3] * t204 +
+    t208 * d_Omd[3]));
+  real t714 = Omd[5] * t278 + t276 * d_Omd[5] + (Omd[4] * t258 + t256 * d_Omd[4] + (t212 * d_Omd[3]
+    - Omd[3] * t216));
+  d_w[0] = R_end[6] * t690 + (R_end[3] * t702 + R_end[0] * t714);
+  d_w[1] = R_end[7] * t690 + (R_end[4] * t702 + R_end[1] * t714);
+  d_w[2] = R_end[8] * t690 + (R_end[5] * t702 + R_end[2] * t714);
+  real t732 = t212 * Omd[3] + t256 * Omd[4] + t276 * Omd[5];
+  real t744 = t208 * Omd[0] + t248 * Omd[1] + t262 * Omd[2] + t611 * Omd[3] - t629 * Omd[4] + t603 *
+    Omd[5];
+  real t751 = t208 * Omd[3] + t248 * Omd[4] + t262 * Omd[5];
+  real t763 = t212 * Omd[0] + t256 * Omd[1] + t276 * Omd[2] - t661 * Omd[3] + t644 * Omd[4] + t638 *
+    Omd[5];
+  real t768 = t80 - t5 * t302;
+  real t771 = Om[5] * Omdd[3] - Om[3] * Omdd[5];
+  real t779 = Omdd[3] * d_Om[5] + Om[5] * d_Omdd[3] - (Omdd[5] * d_Om[3] + Om[3] * d_Omdd[5]);
+  real t784 = Om[4] * Omdd[5] - Om[5] * Omdd[4];
+  real t792 = Omdd[5] * d_Om[4] + Om[4] * d_Omdd[5] - (Omdd[4] * d_Om[5] + Om[5] * d_Omdd[4]);
+  real t802 = Om[5] * Omdd[0] + (Om[2] * Omdd[3] - Om[0] * Omdd[5] - Om[3] * Omdd[2]);
+  real t818 = Omdd[3] * d_Om[2] + Om[2] * d_Omdd[3] - (Omdd[5] * d_Om[0] + Om[0] * d_Omdd[5]) -
+    (Omdd[2] * d_Om[3] + Om[3] * d_Omdd[2]) + (Omdd[0] * d_Om[5] + Om[5] * d_Omdd[0]);
+  real t828 = Om[4] * Omdd[2] + (Om[1] * Omdd[5] - Om[2] * Omdd[4]) - Om[5] * Omdd[1];
+  real t844 = Omdd[5] * d_Om[1] + Om[1] * d_Omdd[5] - (Omdd[4] * d_Om[2] + Om[2] * d_Omdd[4]) +
+    (Omdd[2] * d_Om[4] + Om[4] * d_Omdd[2]) - (Omdd[1] * d_Om[5] + Om[5] * d_Omdd[1]);
+  real t850 = Om[5] * Omd[3] - Om[3] * Omd[5];
+  real t858 = Omd[3] * d_Om[5] + Om[5] * d_Omd[3] - (Omd[5] * d_Om[3] + Om[3] * d_Omd[5]);
+  real t864 = Om[4] * Omd[5] - Om[5] * Omd[4];
+  real t872 = Omd[5] * d_Om[4] + Om[4] * d_Omd[5] - (Omd[4] * d_Om[5] + Om[5] * d_Omd[4]);
+  real t882 = Om[5] * Omd[0] + (Om[2] * Omd[3] - Om[0] * Omd[5] - Om[3] * Omd[2]);
+  real t898 = Omd[3] * d_Om[2] + Om[2] * d_Omd[3] - (Omd[5] * d_Om[0] + Om[0] * d_Omd[5]) - (Omd[2]
+    * d_Om[3] + Om[3] * d_Omd[2]) + (Omd[0] * d_Om[5] + Om[5] * d_Omd[0]);
+  real t908 = Om[4] * Omd[2] + (Om[1] * Omd[5] - Om[2] * Omd[4]) - Om[5] * Omd[1];
+  real t924 = Omd[5] * d_Om[1] + Om[1] * d_Omd[5] - (Omd[4] * d_Om[2] + Om[2] * d_Omd[4]) + (Omd[2]
+    * d_Om[4] + Om[4] * d_Omd[2]) - (Omd[1] * d_Om[5] + Om[5] * d_Omd[1]);
+  real t927 = t771 * d_Om[0] + Om[0] * t779 - (t784 * d_Om[1] + Om[1] * t792) + (t802 * d_Om[3] +
+    Om[3] * t818) - (t828 * d_Om[4] + Om[4] * t844) + (t850 * d_Omd[0] + Omd[0] * t858) - (t864 *
+    d_Omd[1] + Omd[1] * t872) + (t882 * d_Omd[3] + Omd[3] * t898) - (t908 * d_Omd[4] + Omd[4] *
+    t924);
+  real t943 = Omd[3] * t882 + (Omd[0] * t850 + (Om[3] * t802 + (Om[0] * t771 - Om[1] * t784) - Om[4]
+    * t828) - Omd[1] * t864) - Omd[4] * t908;
+  real t947 = t109 - (t302 * t27 + t5 * t327);
+  real t951 = t5 * t298 - t57;
+  real t966 = Omdd[4] * d_Om[0] + Om[0] * d_Omdd[4] - (Omdd[3] * d_Om[1] + Om[1] * d_Omdd[3]) +
+    (Omdd[1] * d_Om[3] + Om[3] * d_Omdd[1]) - (Omdd[0] * d_Om[4] + Om[4] * d_Omdd[0]);
+  real t974 = Om[3] * Omdd[1] + (Om[0] * Omdd[4] - Om[1] * Omdd[3]) - Om[4] * Omdd[0];
+  real t978 = t298 * t27 - t5 * t332 - t54;
+  real t986 = Om[3] * Omdd[4] - Om[4] * Omdd[3];
+  real t991 = Om[3] * Omd[4] - Om[4] * Omd[3];
+  real t994 = Omd[5] * t864 + (Om[5] * t784 - Om[3] * t986 - Omd[3] * t991);
+  real t1006 = Omdd[4] * d_Om[3] + Om[3] * d_Omdd[4] - (Omdd[3] * d_Om[4] + Om[4] * d_Omdd[3]);
+  real t1017 = Omd[4] * d_Om[3] + Om[3] * d_Omd[4] - (Omd[3] * d_Om[4] + Om[4] * d_Omd[3]);
+  real t1024 = t784 * d_Om[5] + Om[5] * t792 - (t986 * d_Om[3] + Om[3] * t1006) - (t991 * d_Omd[3] +
+    Omd[3] * t1017) + (t864 * d_Omd[5] + Omd[5] * t872);
+  real t1033 = Omd[4] * t991 + (Om[4] * t986 - Om[5] * t771) - Omd[5] * t850;
+  real t1049 = t986 * d_Om[4] + Om[4] * t1006 - (t771 * d_Om[5] + Om[5] * t779) + (t991 * d_Omd[4] +
+    Omd[4] * t1017) - (t850 * d_Omd[5] + Omd[5] * t858);
+  real t1071 = Om[3] * Omd[1] + (Om[0] * Omd[4] - Om[1] * Omd[3]) - Om[4] * Omd[0];
+  real t1074 = Omd[5] * t908 + (Omd[2] * t864 + (Om[5] * t828 + (Om[2] * t784 - Om[0] * t986 - Om[3]
+    * t974) - Omd[0] * t991) - Omd[3] * t1071);
+  real t1114 = Omd[4] * d_Om[0] + Om[0] * d_Omd[4] - (Omd[3] * d_Om[1] + Om[1] * d_Omd[3]) + (Omd[1]
+    * d_Om[3] + Om[3] * d_Omd[1]) - (Omd[0] * d_Om[4] + Om[4] * d_Omd[0]);
+  real t1121 = t784 * d_Om[2] + Om[2] * t792 - (t986 * d_Om[0] + Om[0] * t1006) - (t974 * d_Om[3] +
+    Om[3] * t966) + (t828 * d_Om[5] + Om[5] * t844) - (t991 * d_Omd[0] + Omd[0] * t1017) + (t864 *
+    d_Omd[2] + Omd[2] * t872) - (t1071 * d_Omd[3] + Omd[3] * t1114) + (t908 * d_Omd[5] + Omd[5] *
+    t924);
+  real t1139 = Omd[4] * t1071 + (Omd[1] * t991 + (Om[4] * t974 + (Om[1] * t986 - Om[2] * t771) -
+    Om[5] * t802) - Omd[2] * t850) - Omd[5] * t882;
+  real t1171 = t986 * d_Om[1] + Om[1] * t1006 - (t771 * d_Om[2] + Om[2] * t779) + (t974 * d_Om[4] +
+    Om[4] * t966) - (t802 * d_Om[5] + Om[5] * t818) + (t991 * d_Omd[1] + Omd[1] * t1017) - (t850 *
+    d_Omd[2] + Omd[2] * t858) + (t1071 * d_Omd[4] + Omd[4] * t1114) - (t882 * d_Omd[5] + Omd[5] *
+    t898);
+  real t1177 = Om[5] * t864 - Om[3] * t991;
+  real t1185 = t864 * d_Om[5] + Om[5] * t872 - (t991 * d_Om[3] + Om[3] * t1017);
+  real t1191 = Om[4] * t991 - Om[5] * t850;
+  real t1199 = t991 * d_Om[4] + Om[4] * t1017 - (t850 * d_Om[5] + Om[5] * t858);
+  real t1209 = Om[5] * t908 + (Om[2] * t864 - Om[0] * t991 - Om[3] * t1071);
+  real t1225 = t864 * d_Om[2] + Om[2] * t872 - (t991 * d_Om[0] + Om[0] * t1017) - (t1071 * d_Om[3] +
+    Om[3] * t1114) + (t908 * d_Om[5] + Om[5] * t924);
+  real t1235 = Om[4] * t1071 + (Om[1] * t991 - Om[2] * t850) - Om[5] * t882;
+  real t1251 = t991 * d_Om[1] + Om[1] * t1017 - (t850 * d_Om[2] + Om[2] * t858) + (t1071 * d_Om[4] +
+    Om[4] * t1114) - (t882 * d_Om[5] + Om[5] * t898);
+  real t1254 = t994 * d_Om[0] + Om[0] * t1024 - (t1033 * d_Om[1] + Om[1] * t1049) + (t1074 * d_Om[3]
+    + Om[3] * t1121) - (t1139 * d_Om[4] + Om[4] * t1171) + (t1177 * d_Omd[0] + Omd[0] * t1185) -
+    (t1191 * d_Omd[1] + Omd[1] * t1199) + (t1209 * d_Omd[3] + Omd[3] * t1225) - (t1235 * d_Omd[4] +
+    Omd[4] * t1251);
+  real t1270 = Omd[3] * t1209 + (Omd[0] * t1177 + (Om[3] * t1074 + (Om[0] * t994 - Om[1] * t1033) -
+    Om[4] * t1139) - Omd[1] * t1191) - Omd[4] * t1235;
+  real t1278 = Om[3] * t850 - Om[4] * t864;
+  real t1287 = Om[3] * t882 + (Om[0] * t850 - Om[1] * t864) - Om[4] * t908;
+  real t1290 = Om[5] * t1235 + (Om[2] * t1191 - Om[0] * t1278 - Om[3] * t1287);
+  real t1294 = Om[5] * t1191 - Om[3] * t1278;
+  real t1306 = Omd[3] * t850 + (Om[3] * t771 - Om[4] * t784) - Omd[4] * t864;
+  real t1317 = Omd[5] * t1235 + (Omd[2] * t1191 + (Om[5] * t1139 + (Om[2] * t1033 - Om[0] * t1306 -
+    Om[3] * t943) - Omd[0] * t1278) - Omd[3] * t1287);
+  real t1325 = Omd[5] * t1191 + (Om[5] * t1033 - Om[3] * t1306 - Omd[3] * t1278);
+  real t1333 = Omd[4] * t1278 + (Om[4] * t1306 - Om[5] * t994) - Omd[5] * t1177;
+  real t1351 = Omd[4] * t1287 + (Omd[1] * t1278 + (Om[4] * t943 + (Om[1] * t1306 - Om[2] * t994) -
+    Om[5] * t1074) - Omd[2] * t1177) - Omd[5] * t1209;
+  real t1357 = Om[4] * t1278 - Om[5] * t1177;
+  real t1367 = Om[4] * t1287 + (Om[1] * t1278 - Om[2] * t1177) - Om[5] * t1209;
+  real t1390 = t771 * d_Om[3] + Om[3] * t779 - (t784 * d_Om[4] + Om[4] * t792) + (t850 * d_Omd[3] +
+    Omd[3] * t858) - (t864 * d_Omd[4] + Omd[4] * t872);
+  real t1401 = t850 * d_Om[3] + Om[3] * t858 - (t864 * d_Om[4] + Om[4] * t872);
+  real t1408 = t1033 * d_Om[5] + Om[5] * t1049 - (t1306 * d_Om[3] + Om[3] * t1390) - (t1278 *
+    d_Omd[3] + Omd[3] * t1401) + (t1191 * d_Omd[5] + Omd[5] * t1199);
+  real t1426 = t1306 * d_Om[4] + Om[4] * t1390 - (t994 * d_Om[5] + Om[5] * t1024) + (t1278 *
+    d_Omd[4] + Omd[4] * t1401) - (t1177 * d_Omd[5] + Omd[5] * t1185);
+  real t1469 = t850 * d_Om[0] + Om[0] * t858 - (t864 * d_Om[1] + Om[1] * t872) + (t882 * d_Om[3] +
+    Om[3] * t898) - (t908 * d_Om[4] + Om[4] * t924);
+  real t1476 = t1033 * d_Om[2] + Om[2] * t1049 - (t1306 * d_Om[0] + Om[0] * t1390) - (t943 * d_Om[3]
+    + Om[3] * t927) + (t1139 * d_Om[5] + Om[5] * t1171) - (t1278 * d_Omd[0] + Omd[0] * t1401) +
+    (t1191 * d_Omd[2] + Omd[2] * t1199) - (t1287 * d_Omd[3] + Omd[3] * t1469) + (t1235 * d_Omd[5] +
+    Omd[5] * t1251);
+  real t1511 = t1306 * d_Om[1] + Om[1] * t1390 - (t994 * d_Om[2] + Om[2] * t1024) + (t943 * d_Om[4]
+    + Om[4] * t927) - (t1074 * d_Om[5] + Om[5] * t1121) + (t1278 * d_Omd[1] + Omd[1] * t1401) -
+    (t1177 * d_Omd[2] + Omd[2] * t1185) + (t1287 * d_Omd[4] + Omd[4] * t1469) - (t1209 * d_Omd[5] +
+    Omd[5] * t1225);
+  real t1522 = t1191 * d_Om[5] + Om[5] * t1199 - (t1278 * d_Om[3] + Om[3] * t1401);
+  real t1533 = t1278 * d_Om[4] + Om[4] * t1401 - (t1177 * d_Om[5] + Om[5] * t1185);
+  real t1552 = t1191 * d_Om[2] + Om[2] * t1199 - (t1278 * d_Om[0] + Om[0] * t1401) - (t1287 *
+    d_Om[3] + Om[3] * t1469) + (t1235 * d_Om[5] + Om[5] * t1251);
+  real t1571 = t1278 * d_Om[1] + Om[1] * t1401 - (t1177 * d_Om[2] + Om[2] * t1185) + (t1287 *
+    d_Om[4] + Om[4] * t1469) - (t1209 * d_Om[5] + Om[5] * t1225);
+  real t1584 = Om[3] * t1209 + (Om[0] * t1177 - Om[1] * t1191) - Om[4] * t1235;
+  real t1589 = t19 * 2.0 + (t52 * 0.25 - t78 * 1.25);
+  real t1601 = 2.0 * (Omd[4] * d_Om[4] + Om[4] * d_Omd[4] + (Omd[3] * d_Om[3] + Om[3] * d_Omd[3]) +
+    (Omd[5] * d_Om[5] + Om[5] * d_Omd[5]));
+  real t1608 = 2.0 * (Om[5] * Omd[5] + (Om[3] * Omd[3] + Om[4] * Omd[4]));
+  real t1613 = 1.25 * t106 - 0.25 * t49 + 2.0 * t47;
+  real t1615 = t1589 * t1601 + t1608 * t1613;
+  real t1617 = t1608 * t1589;
+  real t1632 = t1177 * d_Om[0] + Om[0] * t1185 - (t1191 * d_Om[1] + Om[1] * t1199) + (t1209 *
+    d_Om[3] + Om[3] * t1225) - (t1235 * d_Om[4] + Om[4] * t1251);
+  real t1647 = t76 * 3.75 + (t78 * 0.25 - t19 * 1.75);
+  real t1653 = 3.75 * t104 - (1.75 * t47 + 0.25 * t106);
+  real t1655 = t1647 * t1601 + t1608 * t1653;
+  real t1657 = t1608 * t1647;
+  real t1676 = t5 * t1589;
+  real t1682 = t1676 * t1601 + t1608 * (t1589 * t27 + t5 * t1613);
+  real t1684 = t1608 * t1676;
+  real t1688 = t5 * t1647;
+  real t1689 = t1608 * t1688;
+  real t1696 = t1688 * t1601 + t1608 * (t1647 * t27 + t5 * t1653);
+  real t1701 = t732 * t633 + t744 * t714 - (t751 * t666 + t763 * t702) + (d_Omdd[2] + (t768 * t927 +
+    t943 * t947 + (t951 * t966 + t974 * t978) + (t298 * t1254 - t1270 * t332) - ((Omd[3] * t1290 +
+    (Omd[0] * t1294 + (Om[3] * t1317 + (Om[0] * t1325 - Om[1] * t1333) - Om[4] * t1351) - Omd[1] *
+    t1357) - Omd[4] * t1367) * t327 + t302 * (t1325 * d_Om[0] + Om[0] * t1408 - (t1333 * d_Om[1] +
+    Om[1] * t1426) + (t1317 * d_Om[3] + Om[3] * t1476) - (t1351 * d_Om[4] + Om[4] * t1511) + (t1294
+    * d_Omd[0] + Omd[0] * t1522) - (t1357 * d_Omd[1] + Omd[1] * t1533) + (t1290 * d_Omd[3] + Omd[3]
+    * t1552) - (t1367 * d_Omd[4] + Omd[4] * t1571))) + (t1584 * t1615 + t1617 * t1632) - ((Om[3] *
+    t1290 + (Om[0] * t1294 - Om[1] * t1357) - Om[4] * t1367) * t1655 + t1657 * (t1294 * d_Om[0] +
+    Om[0] * t1522 - (t1357 * d_Om[1] + Om[1] * t1533) + (t1290 * d_Om[3] + Om[3] * t1552) - (t1367 *
+    d_Om[4] + Om[4] * t1571))) + (t1071 * t1682 + t1684 * t1114) - (t1689 * t1469 + t1287 *
+    t1696)));
+  real t1707 = t230 * Omd[3] + t236 * Omd[4] + t268 * Omd[5];
+  real t1722 = t230 * Omd[0] + t236 * Omd[1] + t268 * Omd[2] + t576 * Omd[3] + t568 * Omd[4] - t595
+    * Omd[5];
+  real t1747 = Omd[3] * t1177 + (Om[3] * t994 - Om[4] * t1033) - Omd[4] * t1191;
+  real t1755 = Om[3] * t1177 - Om[4] * t1191;
+  real t1781 = t994 * d_Om[3] + Om[3] * t1024 - (t1033 * d_Om[4] + Om[4] * t1049) + (t1177 *
+    d_Omd[3] + Omd[3] * t1185) - (t1191 * d_Omd[4] + Omd[4] * t1199);
+  real t1800 = t1177 * d_Om[3] + Om[3] * t1185 - (t1191 * d_Om[4] + Om[4] * t1199);
+  real t1858 = t1707 * t666 + t763 * t690 - (t732 * t598 + t1722 * t714) + (d_Omdd[1] + (t768 *
+    t1121 + t1074 * t947 + (t951 * t818 + t802 * t978) + (t298 * t1476 - t1317 * t332) - ((Omd[5] *
+    t1367 + (Omd[2] * t1357 + (Om[5] * t1351 + (Om[2] * t1333 - Om[0] * t1747 - Om[3] * t1270) -
+    Omd[0] * t1755) - Omd[3] * t1584)) * t327 + t302 * (t1333 * d_Om[2] + Om[2] * t1426 - (t1747 *
+    d_Om[0] + Om[0] * t1781) - (t1270 * d_Om[3] + Om[3] * t1254) + (t1351 * d_Om[5] + Om[5] * t1511)
+    - (t1755 * d_Omd[0] + Omd[0] * t1800) + (t1357 * d_Omd[2] + Omd[2] * t1533) - (t1584 * d_Omd[3]
+    + Omd[3] * t1632) + (t1367 * d_Omd[5] + Omd[5] * t1571))) + (t1290 * t1615 + t1617 * t1552) -
+    ((Om[5] * t1367 + (Om[2] * t1357 - Om[0] * t1755 - Om[3] * t1584)) * t1655 + t1657 * (t1357 *
+    d_Om[2] + Om[2] * t1533 - (t1755 * d_Om[0] + Om[0] * t1800) - (t1584 * d_Om[3] + Om[3] * t1632)
+    + (t1367 * d_Om[5] + Om[5] * t1571))) + (t882 * t1682 + t1684 * t898) - (t1689 * t1225 + t1209 *
+    t1696)));
+  real t1967 = t751 * t598 + t1722 * t702 - (t1707 * t633 + t744 * t690) + (d_Omdd[0] + (t768 *
+    t1171 + t1139 * t947 + (t951 * t844 + t828 * t978) + (t298 * t1511 - t1351 * t332) - ((Omd[4] *
+    t1584 + (Omd[1] * t1755 + (Om[4] * t1270 + (Om[1] * t1747 - Om[2] * t1325) - Om[5] * t1317) -
+    Omd[2] * t1294) - Omd[5] * t1290) * t327 + t302 * (t1747 * d_Om[1] + Om[1] * t1781 - (t1325 *
+    d_Om[2] + Om[2] * t1408) + (t1270 * d_Om[4] + Om[4] * t1254) - (t1317 * d_Om[5] + Om[5] * t1476)
+    + (t1755 * d_Omd[1] + Omd[1] * t1800) - (t1294 * d_Omd[2] + Omd[2] * t1522) + (t1584 * d_Omd[4]
+    + Omd[4] * t1632) - (t1290 * d_Omd[5] + Omd[5] * t1552))) + (t1617 * t1571 + t1367 * t1615) -
+    (t1657 * (t1755 * d_Om[1] + Om[1] * t1800 - (t1294 * d_Om[2] + Om[2] * t1522) + (t1584 * d_Om[4]
+    + Om[4] * t1632) - (t1290 * d_Om[5] + Om[5] * t1552)) + (Om[4] * t1584 + (Om[1] * t1755 - Om[2]
+    * t1294) - Om[5] * t1290) * t1655) + (t1684 * t924 + t908 * t1682) - (t1689 * t1251 + t1235 *
+    t1696)));
+  d_c[0] = R_end[6] * t1701 + (R_end[3] * t1858 + R_end[0] * t1967);
+  d_c[1] = R_end[7] * t1701 + (R_end[4] * t1858 + R_end[1] * t1967);
+  d_c[2] = R_end[8] * t1701 + (R_end[5] * t1858 + R_end[2] * t1967);
+  real t2044 = d_Omdd[5] + (t768 * t1390 + t1306 * t947 + (t951 * t1006 + t986 * t978) + (t298 *
+    t1781 - t1747 * t332) - ((Omd[3] * t1294 + (Om[3] * t1325 - Om[4] * t1333) - Omd[4] * t1357) *
+    t327 + t302 * (t1325 * d_Om[3] + Om[3] * t1408 - (t1333 * d_Om[4] + Om[4] * t1426) + (t1294 *
+    d_Omd[3] + Omd[3] * t1522) - (t1357 * d_Omd[4] + Omd[4] * t1533))) + (t1755 * t1615 + t1617 *
+    t1800) - ((Om[3] * t1294 - Om[4] * t1357) * t1655 + t1657 * (t1294 * d_Om[3] + Om[3] * t1522 -
+    (t1357 * d_Om[4] + Om[4] * t1533))) + (t991 * t1682 + t1684 * t1017) - (t1689 * t1401 + t1278 *
+    t1696));
+  real t2109 = d_Omdd[4] + (t768 * t1024 + t994 * t947 + (t951 * t779 + t771 * t978) + (t298 * t1408
+    - t1325 * t332) - ((Omd[5] * t1357 + (Om[5] * t1333 - Om[3] * t1747 - Omd[3] * t1755)) * t327 +
+    t302 * (t1333 * d_Om[5] + Om[5] * t1426 - (t1747 * d_Om[3] + Om[3] * t1781) - (t1755 * d_Omd[3]
+    + Omd[3] * t1800) + (t1357 * d_Omd[5] + Omd[5] * t1533))) + (t1294 * t1615 + t1617 * t1522) -
+    ((Om[5] * t1357 - Om[3] * t1755) * t1655 + t1657 * (t1357 * d_Om[5] + Om[5] * t1533 - (t1755 *
+    d_Om[3] + Om[3] * t1800))) + (t850 * t1682 + t1684 * t858) - (t1689 * t1185 + t1177 * t1696));
+  real t2174 = d_Omdd[3] + (t1033 * t947 + t768 * t1049 + (t951 * t792 + t784 * t978) + (t298 *
+    t1426 - t1333 * t332) - ((Omd[4] * t1755 + (Om[4] * t1747 - Om[5] * t1325) - Omd[5] * t1294) *
+    t327 + t302 * (t1747 * d_Om[4] + Om[4] * t1781 - (t1325 * d_Om[5] + Om[5] * t1408) + (t1755 *
+    d_Omd[4] + Omd[4] * t1800) - (t1294 * d_Omd[5] + Omd[5] * t1522))) + (t1357 * t1615 + t1617 *
+    t1533) - ((Om[4] * t1755 - Om[5] * t1294) * t1655 + t1657 * (t1755 * d_Om[4] + Om[4] * t1800 -
+    (t1294 * d_Om[5] + Om[5] * t1522))) + (t864 * t1682 + t1684 * t872) - (t1689 * t1199 + t1191 *
+    t1696));
+  d_c[3] = R_end[6] * t2044 + (R_end[3] * t2109 + R_end[0] * t2174);
+  d_c[4] = R_end[7] * t2044 + (R_end[4] * t2109 + R_end[1] * t2174);
+  d_c[5] = R_end[8] * t2044 + (R_end[5] * t2109 + R_end[2] * t2174);
+  return 0;
+}
+
+MSTMM_CALL(mstmm_sweep_modal_segment_motion_slope, (in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  out[0], out[1], out[2], out[3], out[4], out[5]))
+
 /* subspace and its derivative along a direction
  * source: Shabana, Dynamics of Multibody Systems, ch. 5 (floating frame of reference)
  * source: Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (invariants, unit loads)
@@ -4666,6 +6716,17 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}},
     "1a9365dcba5402f0b29574ff039e0d20b23f653b753f4765d9e3e8f2a028d34d", 1, (const mstmm_guard[]){{1,
     "a section rotates by more than 3/2 rad relative to its floating frame"}}},
+  {"segment", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment), 4, 6, (const mstmm_port[]){{"b", 18, "",
+    0, 0}, {"Bm", 18, "", 0, 1}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1}}, (const
+    mstmm_port[]){{"dC1", 6, "", 0, 1}, {"dC2", 6, "", 0, 1}, {"Phi", 6, "", 0, 1}, {"Om", 6, "", 0,
+    0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "", 0, 0}},
+    "0cc76666287731f0713b7d09f0e12335b04b630ab0a49842a29c3832ce680ecc", 0, NULL},
+  {"segment_motion", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_motion), 4, 6, (const
+    mstmm_port[]){{"R_end", 9, "", 0, 0}, {"Om", 6, "", 0, 0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "",
+    0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H6", 36, "", 0, 0},
+    {"v", 3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}},
+    "c1269d6d3e68b0d34ed1825d59ffe85b99c2c4bca1da98c40371b38876a8a76a", 1, (const mstmm_guard[]){{1,
+    "a segment of an exact beam turns by more than 3/2 rad"}}},
   {"subspace", MSTMM_FUNCTIONS(mstmm_sweep_modal_subspace), 2, 1, (const mstmm_port[]){{"H6", 36,
     "", 0, 0}, {"Phi", 6, "", 0, 1}}, (const mstmm_port[]){{"H", 6, "", 0, 1}},
     "c60dc44f72bd50f346ca5e436cca19b5c99854330b7478aefcc0650a69cf0ca5", 0, NULL},
@@ -4682,6 +6743,10 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     1}, {"S", 21, "", 0, 0}, {"e", 6, "N, N*m", 0, 0}, {"S_rf", 6, "", 0, 1}}, (const
     mstmm_port[]){{"S_rf_I", 6, "", 0, 1}, {"S_ff", 1, "", 1, 2}, {"e_f", 1, "", 1, 1}},
     "53f63cb74d2d4b48ca967f1ea24dbe7b242df2424cc48086a7656cbaa1382aad", 0, NULL},
+  {"carry_columns", MSTMM_FUNCTIONS(mstmm_sweep_modal_carry_columns), 3, 1, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"S_rf_I", 6, "", 0, 1}}, (const
+    mstmm_port[]){{"S_rf", 6, "", 1, 1}},
+    "26a34f0403c64d3361ba431c4ee54ee17dea595ede26b81c650be2973aa54c73", 0, NULL},
   {"condense", MSTMM_FUNCTIONS(mstmm_sweep_modal_condense), 5, 5, (const mstmm_port[]){{"S", 21, "",
     0, 0}, {"e", 6, "N, N*m", 0, 0}, {"S_rf", 6, "", 0, 1}, {"S_ff", 1, "", 0, 2}, {"e_f", 1, "", 0,
     1}}, (const mstmm_port[]){{"right", 7, "", 0, 1}, {"Gg", 7, "", 0, 1}, {"S_c", 21, "", 0, 0},
@@ -4777,6 +6842,18 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H6", 36, "", 0, 0}, {"d_v", 3,
     "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}},
     "03fcefdd4b3fd4857435baf2ea7f4cb939e7014116c6165462e063c71acfd6b3", 0, NULL},
+  {"segment_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_slope), 8, 6, (const
+    mstmm_port[]){{"b", 18, "", 0, 0}, {"Bm", 18, "", 0, 1}, {"eta", 1, "", 0, 1}, {"etad", 1, "",
+    0, 1}, {"dC1", 6, "", 0, 1}, {"dC2", 6, "", 0, 1}, {"d_eta", 1, "", 0, 1}, {"d_etad", 1, "", 0,
+    1}}, (const mstmm_port[]){{"d_dC1", 6, "", 0, 1}, {"d_dC2", 6, "", 0, 1}, {"d_Phi", 6, "", 0,
+    1}, {"d_Om", 6, "", 0, 0}, {"d_Omd", 6, "", 0, 0}, {"d_Omdd", 6, "", 0, 0}},
+    "44026db9563d0ea0873e87e71f079689fe2374d0b1909bc3b9b2f8e1126a7f85", 0, NULL},
+  {"segment_motion_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_motion_slope), 7, 6, (const
+    mstmm_port[]){{"R_end", 9, "", 0, 0}, {"Om", 6, "", 0, 0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "",
+    0, 0}, {"d_Om", 6, "", 0, 0}, {"d_Omd", 6, "", 0, 0}, {"d_Omdd", 6, "", 0, 0}}, (const
+    mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H6", 36, "", 0, 0}, {"d_v", 3,
+    "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}},
+    "44791693802483e4619a2009b5e6f8980086c68306e8a14e8352590beeaa0f4f", 0, NULL},
   {"subspace_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_subspace_slope), 4, 1, (const
     mstmm_port[]){{"H6", 36, "", 0, 0}, {"Phi", 6, "", 0, 1}, {"d_H6", 36, "", 0, 0}, {"d_Phi", 6,
     "", 0, 1}}, (const mstmm_port[]){{"d_H", 6, "", 0, 1}},
@@ -4800,7 +6877,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "b79e951dda22bb7cf4c29c70cfa48e575f3d638b1ba6a34425cadef826a71ae6",
+    .hash = "2d2aeacd6c9a1a8f1821ba59c1358723e7639590833dda6964f040fd4485bbca",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -4810,6 +6887,6 @@ const mstmm_element mstmm_sweep_modal = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 32,
+    .n_kernels = 37,
     .kernels = mstmm_sweep_modal_kernels,
 };

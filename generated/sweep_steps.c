@@ -339,9 +339,9 @@ static const real mstmm_directions[18] = {
 };
 
 int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
-int64_t mstmm_section_numbers(int n) { return (int64_t)18 * n + 54; }
+int64_t mstmm_section_numbers(int n) { return (int64_t)36 * n + 54; }
 int64_t mstmm_bend_numbers(int n) { return (int64_t)89 * n + 4 * (int64_t)n * n; }
-int64_t mstmm_port_numbers(int n) { return (int64_t)30 * n + 1 * (int64_t)n * n; }
+int64_t mstmm_port_numbers(int n) { return (int64_t)54 * n + 1 * (int64_t)n * n; }
 
 /* Given accelerations: all, or zero. */
 static int mstmm_at_prescribed_accelerations(mstmm_state *state, int index)
@@ -384,16 +384,33 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
     const mstmm_section *section = body->section;
     real *laid = section ? state->workspace + section->place : NULL;
     int code;
-    mstmm_modal_section(
-        .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
-        .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
-        .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
-        .eta = state->q + modal->q, .etad = state->u + modal->u,
-        .Phi = laid + MSTMM_SECTION_PHI(n), .x = laid + MSTMM_SECTION_X(n),
-        .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
-        .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
-        .Psidd = laid + MSTMM_SECTION_PSIDD(n));
-    if (body->section && !body->section->inward) {
+    if (body->section && body->section->shapes) {
+        real *block = state->workspace + body->block;
+        mstmm_modal_segment(
+            .n = modal->n, .b = section->rest, .Bm = section->shapes, .eta = state->q + modal->q,
+            .etad = state->u + modal->u, .dC1 = laid + MSTMM_SECTION_DC1(n),
+            .dC2 = laid + MSTMM_SECTION_DC2(n), .Phi = laid + MSTMM_SECTION_PHI(n),
+            .Om = laid + MSTMM_SECTION_X(n), .Omd = laid + MSTMM_SECTION_XD(n),
+            .Omdd = laid + MSTMM_SECTION_XDD(n));
+        code = mstmm_modal_segment_motion(
+            .R_end = section->end, .Om = laid + MSTMM_SECTION_X(n),
+            .Omd = laid + MSTMM_SECTION_XD(n), .Omdd = laid + MSTMM_SECTION_XDD(n),
+            .R = block + MSTMM_BLOCK_HINGE_R, .d = block + MSTMM_BLOCK_HINGE_D,
+            .H6 = laid + MSTMM_SECTION_H6(n), .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .c = block + MSTMM_BLOCK_HINGE_C);
+        if (code) return mstmm_fail(state, MSTMM_FAILED_SECTION, index, code);
+    } else {
+        mstmm_modal_section(
+            .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
+            .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
+            .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
+            .eta = state->q + modal->q, .etad = state->u + modal->u,
+            .Phi = laid + MSTMM_SECTION_PHI(n), .x = laid + MSTMM_SECTION_X(n),
+            .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
+            .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
+            .Psidd = laid + MSTMM_SECTION_PSIDD(n));
+    }
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         real *block = state->workspace + body->block;
         code = mstmm_modal_end_motion(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
@@ -404,7 +421,8 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
             .v = block + MSTMM_BLOCK_HINGE_V, .w = block + MSTMM_BLOCK_HINGE_W,
             .c = block + MSTMM_BLOCK_HINGE_C);
         if (code) return mstmm_fail(state, MSTMM_FAILED_SECTION, index, code);
-    } else {
+    }
+    if (!(body->section && !body->section->inward)) {
         real *block = state->workspace + body->block;
         code = mstmm_modal_frame_motion(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
@@ -486,6 +504,14 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
     if (body->section) {
         code = mstmm_at_section_motion(state, index);
         if (code) return code;
+    }
+    if (body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        for (int j = 0; j < 6 * n; j++)
+            (laid + MSTMM_SECTION_S_RF(n))[j] = 0;
     }
     if ((body->generic || state->required) && !body->section && !(body->kernels->body_motion && !body->section && (body->generic || state->required))) {
         code = mstmm_at_hinge_motion(state, index);
@@ -936,7 +962,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         code = mstmm_at_modal_condense(state, index);
         if (code) return code;
     }
-    if (body->section && !body->section->inward) {
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         real *block = state->workspace + body->block;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -949,6 +975,23 @@ int mstmm_at_condense(mstmm_state *state, int index)
             .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
+    }
+    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+        real *block = state->workspace + body->block;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        mstmm_modal_rebase(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
+            .e = block + MSTMM_BLOCK_E, .S_rf = laid + MSTMM_SECTION_S_RF(n),
+            .S_rf_I = laid + MSTMM_SECTION_PUSH(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
+            .e_f = modes + MSTMM_MODES_E_F(n));
+        mstmm_modal_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
+            .S_rf_I = laid + MSTMM_SECTION_PUSH(n),
+            .S_rf = state->workspace + (section->before ? section->before->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
     }
     if ((body->generic || state->required)) {
         real *block = state->workspace + body->block;
@@ -1387,7 +1430,7 @@ static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
         code = mstmm_at_row_elimination(state, r);
         if (code) return code;
     }
-    if (body->section && !body->section->inward) {
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         real *modes = modal ? state->workspace + modal->place : NULL;
         mstmm_modal_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
@@ -1395,6 +1438,18 @@ static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
             .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
+    }
+    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        mstmm_modal_rebase(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
+            .e = block + MSTMM_BLOCK_E, .S_rf = laid + MSTMM_SECTION_S_RF(n),
+            .S_rf_I = laid + MSTMM_SECTION_PUSH(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
+            .e_f = modes + MSTMM_MODES_E_F(n));
+        mstmm_modal_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
+            .S_rf_I = laid + MSTMM_SECTION_PUSH(n),
+            .S_rf = state->workspace + (section->before ? section->before->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
     }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
@@ -2328,7 +2383,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
         code = mstmm_at_modal_condense(state, index);
         if (code) return code;
     }
-    if (body->section && !body->section->inward) {
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *modes = modal ? state->workspace + modal->place : NULL;
@@ -2340,6 +2395,22 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
             .e = block + MSTMM_BLOCK_E, .U = laid + MSTMM_SECTION_PUSH(n),
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
+    }
+    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        mstmm_modal_rebase(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
+            .e = block + MSTMM_BLOCK_E, .S_rf = laid + MSTMM_SECTION_S_RF(n),
+            .S_rf_I = laid + MSTMM_SECTION_PUSH(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
+            .e_f = modes + MSTMM_MODES_E_F(n));
+        mstmm_modal_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
+            .S_rf_I = laid + MSTMM_SECTION_PUSH(n),
+            .S_rf = state->workspace + (section->before ? section->before->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
     }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
@@ -2522,17 +2593,37 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
     const mstmm_section *section = body->section;
     real *laid = section ? state->workspace + section->place : NULL;
     real *d_laid = section ? state->slope->workspace + section->place : NULL;
-    mstmm_modal_section_slope(
-        .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
-        .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
-        .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
-        .eta = state->q + modal->q, .etad = state->u + modal->u,
-        .Phi = laid + MSTMM_SECTION_PHI(n), .d_eta = state->slope->q + modal->q,
-        .d_etad = state->slope->u + modal->u, .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
-        .d_x = d_laid + MSTMM_SECTION_X(n), .d_Psi = d_laid + MSTMM_SECTION_PSI(n),
-        .d_xd = d_laid + MSTMM_SECTION_XD(n), .d_Psid = d_laid + MSTMM_SECTION_PSID(n),
-        .d_xdd = d_laid + MSTMM_SECTION_XDD(n), .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n));
-    if (body->section && !body->section->inward) {
+    if (body->section && body->section->shapes) {
+        real *d_block = state->slope->workspace + body->block;
+        mstmm_modal_segment_slope(
+            .n = modal->n, .b = section->rest, .Bm = section->shapes, .eta = state->q + modal->q,
+            .etad = state->u + modal->u, .dC1 = laid + MSTMM_SECTION_DC1(n),
+            .dC2 = laid + MSTMM_SECTION_DC2(n), .d_eta = state->slope->q + modal->q,
+            .d_etad = state->slope->u + modal->u, .d_dC1 = d_laid + MSTMM_SECTION_DC1(n),
+            .d_dC2 = d_laid + MSTMM_SECTION_DC2(n), .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
+            .d_Om = d_laid + MSTMM_SECTION_X(n), .d_Omd = d_laid + MSTMM_SECTION_XD(n),
+            .d_Omdd = d_laid + MSTMM_SECTION_XDD(n));
+        mstmm_modal_segment_motion_slope(
+            .R_end = section->end, .Om = laid + MSTMM_SECTION_X(n),
+            .Omd = laid + MSTMM_SECTION_XD(n), .Omdd = laid + MSTMM_SECTION_XDD(n),
+            .d_Om = d_laid + MSTMM_SECTION_X(n), .d_Omd = d_laid + MSTMM_SECTION_XD(n),
+            .d_Omdd = d_laid + MSTMM_SECTION_XDD(n), .d_R = d_block + MSTMM_BLOCK_HINGE_R,
+            .d_d = d_block + MSTMM_BLOCK_HINGE_D, .d_H6 = d_laid + MSTMM_SECTION_H6(n),
+            .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
+            .d_c = d_block + MSTMM_BLOCK_HINGE_C);
+    } else {
+        mstmm_modal_section_slope(
+            .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
+            .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
+            .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
+            .eta = state->q + modal->q, .etad = state->u + modal->u,
+            .Phi = laid + MSTMM_SECTION_PHI(n), .d_eta = state->slope->q + modal->q,
+            .d_etad = state->slope->u + modal->u, .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
+            .d_x = d_laid + MSTMM_SECTION_X(n), .d_Psi = d_laid + MSTMM_SECTION_PSI(n),
+            .d_xd = d_laid + MSTMM_SECTION_XD(n), .d_Psid = d_laid + MSTMM_SECTION_PSID(n),
+            .d_xdd = d_laid + MSTMM_SECTION_XDD(n), .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n));
+    }
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         real *d_block = state->slope->workspace + body->block;
         mstmm_modal_end_motion_slope(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
@@ -2545,7 +2636,8 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
             .d_d = d_block + MSTMM_BLOCK_HINGE_D, .d_H6 = d_laid + MSTMM_SECTION_H6(n),
             .d_v = d_block + MSTMM_BLOCK_HINGE_V, .d_w = d_block + MSTMM_BLOCK_HINGE_W,
             .d_c = d_block + MSTMM_BLOCK_HINGE_C);
-    } else {
+    }
+    if (!(body->section && !body->section->inward)) {
         real *d_block = state->slope->workspace + body->block;
         mstmm_modal_frame_motion_slope(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
@@ -3505,6 +3597,24 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
         memset(d_block + MSTMM_BLOCK_X, 0, 3 * sizeof(real));
         memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
     }
+    if (body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        for (int j = 0; j < 6 * n; j++)
+            (port + MSTMM_PORT_OUTBOARD_K(n))[j] = 0;
+        for (int j = 0; j < 9 * n; j++)
+            (port + MSTMM_PORT_OUTBOARD_Z_Z(n))[j] = 0;
+    }
+    if (body->section && body->section->shapes && body->placed) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        for (int j = 0; j < 9 * n; j++)
+            (port + MSTMM_PORT_OUTBOARD_Z_P(n))[j] = 0;
+    }
     if (body->modal && !body->section) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -4203,7 +4313,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
             .S_wI = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     }
-    if (body->section && !body->section->inward) {
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -4218,7 +4328,33 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && !body->section->inward && body->placed) {
+    if (body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_assemble_port(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = laid + MSTMM_SECTION_H(n), .B = port + MSTMM_PORT_B(n),
+            .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
+            .K_x = port + MSTMM_PORT_K(n),
+            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+        mstmm_tangent_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .w_I = parent + MSTMM_BLOCK_MOTION, .v = block + MSTMM_BLOCK_HINGE_V,
+            .w = block + MSTMM_BLOCK_HINGE_W, .H = laid + MSTMM_SECTION_H(n),
+            .B = port + MSTMM_PORT_B(n), .K_o = port + MSTMM_PORT_OUTBOARD_K(n),
+            .Z_o = port + MSTMM_PORT_OUTBOARD_Z_Z(n),
+            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->section && !body->section->inward && body->placed && !(body->section && body->section->shapes)) {
         real *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -4231,6 +4367,28 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
             .K = bend + MSTMM_BEND_K(n), .Z_p = bend + MSTMM_BEND_PLACE_Z(n),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+    }
+    if (body->section && body->section->shapes && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        mstmm_tangent_placed_port(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
+            .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
+            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .Z_x = bend + MSTMM_BEND_Z_X(n));
+        mstmm_tangent_placed_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
+            .B_p = port + MSTMM_PORT_PLACE_B(n), .Z_o = port + MSTMM_PORT_OUTBOARD_Z_P(n),
+            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     return 0;
@@ -4853,6 +5011,30 @@ static int mstmm_at_increment_backward(mstmm_state *state, int index)
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
             .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = row_load, .e_b = known);
     }
+    if (body->section && body->section->shapes) {
+        real *tangent = state->tangents->numbers + body->tangent;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_tangent_outboard_rows(
+            .n = modal->n, .Z_o = port + MSTMM_PORT_OUTBOARD_Z_Z(n),
+            .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq),
+            .e_f = d_modes + MSTMM_MODES_E_F(n));
+    }
+    if (body->section && body->section->shapes && body->placed) {
+        real *place = state->tangents->numbers + body->place;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_tangent_outboard_rows(
+            .n = modal->n, .Z_o = port + MSTMM_PORT_OUTBOARD_Z_P(n),
+            .b = place + MSTMM_PLACE_KNOWN(body->nu, body->nq),
+            .e_f = d_modes + MSTMM_MODES_E_F(n));
+    }
     if (body->section && !body->section->inward) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5157,6 +5339,14 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
         .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
         .floor_ = block + MSTMM_BLOCK_FLOOR);
     mstmm_set_zero(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), nu * nu);
+    if (body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        for (int j = 0; j < 6 * n; j++)
+            (port + MSTMM_PORT_OUTBOARD_K(n))[j] = 0;
+    }
     if (body->modal) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5300,7 +5490,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         code = mstmm_at_laws_modal_condense(state, index);
         if (code) return code;
     }
-    if (body->section && !body->section->inward) {
+    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -5316,6 +5506,26 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
             .e = d_block + MSTMM_BLOCK_E, .U = port + MSTMM_PORT_K(n),
             .S_rf = bend + MSTMM_BEND_V(n), .S_ff = bend + MSTMM_BEND_D(n),
             .e_f = d_modes + MSTMM_MODES_E_F(n));
+    }
+    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        real *bend = modal ? state->tangents->numbers + modal->tangent : NULL;
+        real *port = section ? state->tangents->numbers + section->tangent : NULL;
+        real *d_block = state->slope->workspace + body->block;
+        real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
+        mstmm_modal_rebase(
+            .n = modal->n, .H = laid + MSTMM_SECTION_H(n),
+            .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
+            .e = d_block + MSTMM_BLOCK_E, .S_rf = port + MSTMM_PORT_OUTBOARD_K(n),
+            .S_rf_I = port + MSTMM_PORT_K(n), .S_ff = bend + MSTMM_BEND_D(n),
+            .e_f = d_modes + MSTMM_MODES_E_F(n));
+        mstmm_modal_carry_columns(
+            .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
+            .S_rf_I = port + MSTMM_PORT_K(n),
+            .S_rf = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_V(n)));
     }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)

@@ -646,6 +646,187 @@ int mstmm_sweep_tangent_assemble_port(int n, in_t Rc, in_t r, in_t H, in_t B, in
 MSTMM_CALL(mstmm_sweep_tangent_assemble_port, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
   in[7], out[0], out[1], out[2], out[3]))
 
+/* outboard stations along the unknowns of their body
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  w_I[3] (rad/s) angular velocity of the parent, parent axes
+ * in  v[3] (m/s) relative velocity of the hinge, body axes
+ * in  w[3] (rad/s) relative angular velocity of the hinge, body axes
+ * in  H[6][n] motion subspace of the unknowns
+ * in  B[n][9] motion along the unknowns
+ * in  K_o[n][6] load
+ * in  Z_o[9][n] rows by the motion
+ * out K[n][6], added to what is there
+ * out Z_z[9][n], added to what is there
+ * out Z_x[n][n], added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_carry_columns_sized(int n, in_t Rc, in_t r, in_t w_I, in_t v, in_t w,
+    in_t H, in_t B, in_t K_o, in_t Z_o, out_t K, out_t Z_z, out_t Z_x)
+{
+  for (int k = 0; k < n; ++k) {
+    K[6 * k] += Rc[0] * K_o[6 * k] + Rc[1] * K_o[6 * k + 1] + Rc[2] * K_o[6 * k + 2];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 1] += Rc[3] * K_o[6 * k] + Rc[4] * K_o[6 * k + 1] + Rc[5] * K_o[6 * k + 2];
+  }
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 2] += Rc[6] * K_o[6 * k] + Rc[7] * K_o[6 * k + 1] + Rc[8] * K_o[6 * k + 2];
+  }
+  real t22 = Rc[6] * r[1] - Rc[3] * r[2];
+  real t26 = Rc[7] * r[1] - Rc[4] * r[2];
+  real t31 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 3] += Rc[0] * K_o[6 * k + 3] + Rc[1] * K_o[6 * k + 4] + Rc[2] * K_o[6 * k + 5] +
+      (K_o[6 * k] * t22 + K_o[6 * k + 1] * t26 + K_o[6 * k + 2] * t31);
+  }
+  real t42 = Rc[0] * r[2] - Rc[6] * r[0];
+  real t46 = Rc[1] * r[2] - Rc[7] * r[0];
+  real t51 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 4] += Rc[3] * K_o[6 * k + 3] + Rc[4] * K_o[6 * k + 4] + Rc[5] * K_o[6 * k + 5] +
+      (K_o[6 * k] * t42 + K_o[6 * k + 1] * t46 + K_o[6 * k + 2] * t51);
+  }
+  real t62 = Rc[3] * r[0] - Rc[0] * r[1];
+  real t66 = Rc[4] * r[0] - Rc[1] * r[1];
+  real t71 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    K[6 * k + 5] += Rc[6] * K_o[6 * k + 3] + Rc[7] * K_o[6 * k + 4] + Rc[8] * K_o[6 * k + 5] +
+      (K_o[6 * k] * t62 + K_o[6 * k + 1] * t66 + K_o[6 * k + 2] * t71);
+  }
+  real t75 = v[1] * 2.0;
+  real t77 = v[2] * 2.0;
+  real t87 = v[0] * 2.0;
+  real t107 = r[1] * w_I[1];
+  real t108 = r[2] * w_I[2];
+  real t109 = t107 + t108;
+  real t111 = r[0] * w_I[1];
+  real t112 = r[1] * w_I[0];
+  real t114 = t111 - 2.0 * t112;
+  real t117 = r[0] * w_I[2];
+  real t118 = r[2] * w_I[0];
+  real t120 = t117 - 2.0 * t118;
+  real t122 = Rc[0] * t109 + Rc[3] * t114 + Rc[6] * t120;
+  real t128 = Rc[1] * t109 + Rc[4] * t114 + Rc[7] * t120;
+  real t135 = Rc[2] * t109 + Rc[5] * t114 + Rc[8] * t120;
+  for (int k = 0; k < n; ++k) {
+    Z_z[k] += Rc[0] * (Z_o[k] + (t75 * Z_o[8 * n + k] - t77 * Z_o[7 * n + k] + (w[1] * Z_o[5 * n +
+      k] - w[2] * Z_o[4 * n + k]))) + Rc[1] * (Z_o[n + k] + (t77 * Z_o[6 * n + k] - t87 * Z_o[8 * n
+      + k] + (w[2] * Z_o[3 * n + k] - w[0] * Z_o[5 * n + k]))) + Rc[2] * (Z_o[2 * n + k] + (t87 *
+      Z_o[7 * n + k] - t75 * Z_o[6 * n + k] + (w[0] * Z_o[4 * n + k] - w[1] * Z_o[3 * n + k]))) +
+      (Z_o[6 * n + k] * t122 + Z_o[7 * n + k] * t128 + Z_o[8 * n + k] * t135);
+  }
+  real t169 = t112 - 2.0 * t111;
+  real t171 = r[0] * w_I[0];
+  real t172 = t108 + t171;
+  real t175 = r[1] * w_I[2];
+  real t176 = r[2] * w_I[1];
+  real t178 = t175 - 2.0 * t176;
+  real t180 = Rc[0] * t169 + Rc[3] * t172 + Rc[6] * t178;
+  real t186 = Rc[1] * t169 + Rc[4] * t172 + Rc[7] * t178;
+  real t193 = Rc[2] * t169 + Rc[5] * t172 + Rc[8] * t178;
+  for (int k = 0; k < n; ++k) {
+    Z_z[n + k] += Rc[3] * (Z_o[k] + (t75 * Z_o[8 * n + k] - t77 * Z_o[7 * n + k] + (w[1] * Z_o[5 * n
+      + k] - w[2] * Z_o[4 * n + k]))) + Rc[4] * (Z_o[n + k] + (t77 * Z_o[6 * n + k] - t87 * Z_o[8 *
+      n + k] + (w[2] * Z_o[3 * n + k] - w[0] * Z_o[5 * n + k]))) + Rc[5] * (Z_o[2 * n + k] + (t87 *
+      Z_o[7 * n + k] - t75 * Z_o[6 * n + k] + (w[0] * Z_o[4 * n + k] - w[1] * Z_o[3 * n + k]))) +
+      (Z_o[6 * n + k] * t180 + Z_o[7 * n + k] * t186 + Z_o[8 * n + k] * t193);
+  }
+  real t227 = t118 - 2.0 * t117;
+  real t230 = t176 - 2.0 * t175;
+  real t233 = t107 + t171;
+  real t235 = Rc[0] * t227 + Rc[3] * t230 + Rc[6] * t233;
+  real t241 = Rc[1] * t227 + Rc[4] * t230 + Rc[7] * t233;
+  real t248 = Rc[2] * t227 + Rc[5] * t230 + Rc[8] * t233;
+  for (int k = 0; k < n; ++k) {
+    Z_z[2 * n + k] += Rc[6] * (Z_o[k] + (t75 * Z_o[8 * n + k] - t77 * Z_o[7 * n + k] + (w[1] * Z_o[5
+      * n + k] - w[2] * Z_o[4 * n + k]))) + Rc[7] * (Z_o[n + k] + (t77 * Z_o[6 * n + k] - t87 *
+      Z_o[8 * n + k] + (w[2] * Z_o[3 * n + k] - w[0] * Z_o[5 * n + k]))) + Rc[8] * (Z_o[2 * n + k] +
+      (t87 * Z_o[7 * n + k] - t75 * Z_o[6 * n + k] + (w[0] * Z_o[4 * n + k] - w[1] * Z_o[3 * n +
+      k]))) + (Z_o[6 * n + k] * t235 + Z_o[7 * n + k] * t241 + Z_o[8 * n + k] * t248);
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[3 * n + k] += Rc[0] * Z_o[3 * n + k] + Rc[1] * Z_o[4 * n + k] + Rc[2] * Z_o[5 * n + k] +
+      (t22 * Z_o[6 * n + k] + t26 * Z_o[7 * n + k] + t31 * Z_o[8 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[4 * n + k] += Rc[3] * Z_o[3 * n + k] + Rc[4] * Z_o[4 * n + k] + Rc[5] * Z_o[5 * n + k] +
+      (t42 * Z_o[6 * n + k] + t46 * Z_o[7 * n + k] + t51 * Z_o[8 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[5 * n + k] += Rc[6] * Z_o[3 * n + k] + Rc[7] * Z_o[4 * n + k] + Rc[8] * Z_o[5 * n + k] +
+      (t62 * Z_o[6 * n + k] + t66 * Z_o[7 * n + k] + t71 * Z_o[8 * n + k]);
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[6 * n + k] += Rc[0] * Z_o[6 * n + k] + Rc[1] * Z_o[7 * n + k] + Rc[2] * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[7 * n + k] += Rc[3] * Z_o[6 * n + k] + Rc[4] * Z_o[7 * n + k] + Rc[5] * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[8 * n + k] += Rc[6] * Z_o[6 * n + k] + Rc[7] * Z_o[7 * n + k] + Rc[8] * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] += B[9 * k] * Z_o[l] + B[9 * k + 1] * Z_o[n + l] + B[9 * k + 2] * Z_o[2 * n +
+        l] + B[9 * k + 3] * Z_o[3 * n + l] + B[9 * k + 4] * Z_o[4 * n + l] + B[9 * k + 5] * Z_o[5 *
+        n + l] + B[9 * k + 6] * Z_o[6 * n + l] + B[9 * k + 7] * Z_o[7 * n + l] + B[9 * k + 8] *
+        Z_o[8 * n + l] + (K_o[6 * k] * H[l] + K_o[6 * k + 1] * H[n + l] + K_o[6 * k + 2] * H[2 * n +
+        l] + K_o[6 * k + 3] * H[3 * n + l] + K_o[6 * k + 4] * H[4 * n + l] + K_o[6 * k + 5] * H[5 *
+        n + l]);
+    }
+  }
+  return 0;
+}
+
+int mstmm_sweep_tangent_carry_columns(int n, in_t Rc, in_t r, in_t w_I, in_t v, in_t w, in_t H,
+    in_t B, in_t K_o, in_t Z_o, out_t K, out_t Z_z, out_t Z_x)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_carry_columns_sized(1, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  case 2: return mstmm_sweep_tangent_carry_columns_sized(2, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  case 3: return mstmm_sweep_tangent_carry_columns_sized(3, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  case 4: return mstmm_sweep_tangent_carry_columns_sized(4, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  default: return mstmm_sweep_tangent_carry_columns_sized(n, Rc, r, w_I, v, w, H, B, K_o, Z_o, K, Z_z, Z_x);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_tangent_carry_columns, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
+  in[7], in[8], out[0], out[1], out[2]))
+
+/* rows of outboard stations by a known change
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Z_o[9][n] rows of the outboard stations
+ * in  b[9] known change of motion or pose
+ * out e_f[n] load of the rows, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_outboard_rows_sized(int n, in_t Z_o, in_t b, out_t e_f)
+{
+  for (int k = 0; k < n; ++k) {
+    e_f[k] += b[0] * Z_o[k] + b[1] * Z_o[n + k] + b[2] * Z_o[2 * n + k] + b[3] * Z_o[3 * n + k] +
+      b[4] * Z_o[4 * n + k] + b[5] * Z_o[5 * n + k] + b[6] * Z_o[6 * n + k] + b[7] * Z_o[7 * n + k]
+      + b[8] * Z_o[8 * n + k];
+  }
+  return 0;
+}
+
+int mstmm_sweep_tangent_outboard_rows(int n, in_t Z_o, in_t b, out_t e_f)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_outboard_rows_sized(1, Z_o, b, e_f);
+  case 2: return mstmm_sweep_tangent_outboard_rows_sized(2, Z_o, b, e_f);
+  case 3: return mstmm_sweep_tangent_outboard_rows_sized(3, Z_o, b, e_f);
+  case 4: return mstmm_sweep_tangent_outboard_rows_sized(4, Z_o, b, e_f);
+  default: return mstmm_sweep_tangent_outboard_rows_sized(n, Z_o, b, e_f);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_tangent_outboard_rows, (n, in[0], in[1], out[0]))
+
 /* unknowns eliminated from a right-hand side
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -1966,6 +2147,113 @@ int mstmm_sweep_tangent_placed_port(int n, in_t Rc, in_t r, in_t H, in_t B_p, in
 MSTMM_CALL(mstmm_sweep_tangent_placed_port, (n, in[0], in[1], in[2], in[3], in[4], in[5], out[0],
   out[1], out[2]))
 
+/* outboard stations by the pose, along the unknowns of their body
+ * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
+ * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
+ * in  Rc[3][3] rotation, body axes to parent axes
+ * in  r[3] (m) P of the body from P of the parent, parent axes
+ * in  B_p[n][9] change of pose along the unknowns
+ * in  Z_o[9][n] rows by the pose, one row per entry
+ * out Z_p[9][n], added to what is there
+ * out Z_z[9][n], added to what is there
+ * out Z_x[n][n], added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_tangent_placed_carry_columns_sized(int n, in_t Rc, in_t r, in_t B_p, in_t Z_o,
+    out_t Z_p, out_t Z_z, out_t Z_x)
+{
+  real t7 = Rc[6] * r[1] - Rc[3] * r[2];
+  real t11 = Rc[7] * r[1] - Rc[4] * r[2];
+  real t16 = Rc[8] * r[1] - Rc[5] * r[2];
+  for (int k = 0; k < n; ++k) {
+    Z_p[k] += Rc[0] * Z_o[k] + Rc[1] * Z_o[n + k] + Rc[2] * Z_o[2 * n + k] + (t7 * Z_o[3 * n + k] +
+      t11 * Z_o[4 * n + k] + t16 * Z_o[5 * n + k]);
+  }
+  real t27 = Rc[0] * r[2] - Rc[6] * r[0];
+  real t31 = Rc[1] * r[2] - Rc[7] * r[0];
+  real t36 = Rc[2] * r[2] - Rc[8] * r[0];
+  for (int k = 0; k < n; ++k) {
+    Z_p[n + k] += Rc[3] * Z_o[k] + Rc[4] * Z_o[n + k] + Rc[5] * Z_o[2 * n + k] + (Z_o[3 * n + k] *
+      t27 + Z_o[4 * n + k] * t31 + Z_o[5 * n + k] * t36);
+  }
+  real t47 = Rc[3] * r[0] - Rc[0] * r[1];
+  real t51 = Rc[4] * r[0] - Rc[1] * r[1];
+  real t56 = Rc[5] * r[0] - Rc[2] * r[1];
+  for (int k = 0; k < n; ++k) {
+    Z_p[2 * n + k] += Rc[6] * Z_o[k] + Rc[7] * Z_o[n + k] + Rc[8] * Z_o[2 * n + k] + (Z_o[3 * n + k]
+      * t47 + Z_o[4 * n + k] * t51 + Z_o[5 * n + k] * t56);
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[3 * n + k] += Rc[0] * Z_o[3 * n + k] + Rc[1] * Z_o[4 * n + k] + Rc[2] * Z_o[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[4 * n + k] += Rc[3] * Z_o[3 * n + k] + Rc[4] * Z_o[4 * n + k] + Rc[5] * Z_o[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[5 * n + k] += Rc[6] * Z_o[3 * n + k] + Rc[7] * Z_o[4 * n + k] + Rc[8] * Z_o[5 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[6 * n + k] += Rc[0] * Z_o[6 * n + k] + Rc[1] * Z_o[7 * n + k] + Rc[2] * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[7 * n + k] += Rc[3] * Z_o[6 * n + k] + Rc[4] * Z_o[7 * n + k] + Rc[5] * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_p[8 * n + k] += Rc[6] * Z_o[6 * n + k] + Rc[7] * Z_o[7 * n + k] + Rc[8] * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[k] += t7 * Z_o[6 * n + k] + t11 * Z_o[7 * n + k] + t16 * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[n + k] += t27 * Z_o[6 * n + k] + t31 * Z_o[7 * n + k] + t36 * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[2 * n + k] += t47 * Z_o[6 * n + k] + t51 * Z_o[7 * n + k] + t56 * Z_o[8 * n + k];
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[3 * n + k] += 0.0;
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[4 * n + k] += 0.0;
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[5 * n + k] += 0.0;
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[6 * n + k] += 0.0;
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[7 * n + k] += 0.0;
+  }
+  for (int k = 0; k < n; ++k) {
+    Z_z[8 * n + k] += 0.0;
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < n; ++l) {
+      Z_x[n * k + l] += B_p[9 * k] * Z_o[l] + B_p[9 * k + 1] * Z_o[n + l] + B_p[9 * k + 2] * Z_o[2 *
+        n + l] + B_p[9 * k + 3] * Z_o[3 * n + l] + B_p[9 * k + 4] * Z_o[4 * n + l] + B_p[9 * k + 5]
+        * Z_o[5 * n + l] + B_p[9 * k + 6] * Z_o[6 * n + l] + B_p[9 * k + 7] * Z_o[7 * n + l] + B_p[9
+        * k + 8] * Z_o[8 * n + l];
+    }
+  }
+  return 0;
+}
+
+int mstmm_sweep_tangent_placed_carry_columns(int n, in_t Rc, in_t r, in_t B_p, in_t Z_o, out_t Z_p,
+    out_t Z_z, out_t Z_x)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_tangent_placed_carry_columns_sized(1, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  case 2: return mstmm_sweep_tangent_placed_carry_columns_sized(2, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  case 3: return mstmm_sweep_tangent_placed_carry_columns_sized(3, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  case 4: return mstmm_sweep_tangent_placed_carry_columns_sized(4, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  default: return mstmm_sweep_tangent_placed_carry_columns_sized(n, Rc, r, B_p, Z_o, Z_p, Z_z, Z_x);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_tangent_placed_carry_columns, (n, in[0], in[1], in[2], in[3], out[0], out[1],
+  out[2]))
+
 /* rows less their change by the change of pose
  * source: Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)
  * source: Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)
@@ -2015,6 +2303,15 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
     {"G", 6, "", 0, 1}, {"W", 1, "", 0, 2}, {"S", 54, "", 0, 0}, {"T", 54, "", 0, 0}}, (const
     mstmm_port[]){{"K_x", 6, "", 0, 1}, {"K", 6, "", 1, 1}, {"Z_z", 9, "", 1, 1}, {"Z_x", 1, "", 1,
     2}}, "2218412bb0ca7b90be362b3af23dddb803a8e83884886bec43519a12773f3e35", 0, NULL},
+  {"carry_columns", MSTMM_FUNCTIONS(mstmm_sweep_tangent_carry_columns), 9, 3, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"w_I", 3, "rad/s", 0, 0}, {"v", 3,
+    "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"H", 6, "", 0, 1}, {"B", 9, "", 0, 1}, {"K_o", 6, "", 0,
+    1}, {"Z_o", 9, "", 0, 1}}, (const mstmm_port[]){{"K", 6, "", 1, 1}, {"Z_z", 9, "", 1, 1},
+    {"Z_x", 1, "", 1, 2}}, "c9ef962fa92885dbae899cc75a1be083fc944b1e652840370edba55e8745821c", 0,
+    NULL},
+  {"outboard_rows", MSTMM_FUNCTIONS(mstmm_sweep_tangent_outboard_rows), 2, 1, (const
+    mstmm_port[]){{"Z_o", 9, "", 0, 1}, {"b", 9, "", 0, 0}}, (const mstmm_port[]){{"e_f", 1, "", 1,
+    1}}, "4919d389eb9a859f77f135724d07893b240667409978fc7dc5d9cf41bcafbd83", 0, NULL},
   {"column_load", MSTMM_FUNCTIONS(mstmm_sweep_tangent_column_load), 5, 4, (const mstmm_port[]){{"H",
     6, "", 0, 1}, {"V", 6, "", 0, 1}, {"D", 1, "", 0, 2}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "",
     0, 1}}, (const mstmm_port[]){{"rest", 1, "", 0, 1}, {"y", 1, "", 0, 1}, {"e_c", 6, "N, N*m", 0,
@@ -2059,6 +2356,10 @@ static const mstmm_kernel mstmm_sweep_tangent_kernels[] = {
     1}, {"S_p", 54, "", 0, 0}, {"T_p", 54, "", 0, 0}}, (const mstmm_port[]){{"K", 6, "", 1, 1},
     {"Z_p", 9, "", 1, 1}, {"Z_x", 1, "", 1, 2}},
     "e136c13e266f295146747a05b9f87fd6d09230ebb5d6a00cff5ca44ee9d9d9ce", 0, NULL},
+  {"placed_carry_columns", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_carry_columns), 4, 3, (const
+    mstmm_port[]){{"Rc", 9, "", 0, 0}, {"r", 3, "m", 0, 0}, {"B_p", 9, "", 0, 1}, {"Z_o", 9, "", 0,
+    1}}, (const mstmm_port[]){{"Z_p", 9, "", 1, 1}, {"Z_z", 9, "", 1, 1}, {"Z_x", 1, "", 1, 2}},
+    "2414f09bfbaca2c6357c07952adb179f071bc003d2e0f79dcfb9874bdd1b866b", 0, NULL},
   {"placed_remainder", MSTMM_FUNCTIONS(mstmm_sweep_tangent_placed_remainder), 2, 1, (const
     mstmm_port[]){{"gain", 9, "", 0, 1}, {"p", 9, "", 0, 0}}, (const mstmm_port[]){{"y", 1, "", 1,
     1}}, "c57923e563454b7fb91ffda55bde66b5ad3c093c014a142179ce426b2dc30b44", 0, NULL},
@@ -2068,7 +2369,7 @@ const mstmm_element mstmm_sweep_tangent = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "tangent",
-    .hash = "a680043fed1b697f2d6f05f4cede846cc719a7e25c3bd775b176cca7b908df29",
+    .hash = "886b0063f33081658a0df0eadab5055a62618cba6c025f5a01793b7bf941a64c",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -2078,6 +2379,6 @@ const mstmm_element mstmm_sweep_tangent = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 14,
+    .n_kernels = 17,
     .kernels = mstmm_sweep_tangent_kernels,
 };

@@ -328,6 +328,8 @@ _DIFFERENTIATED: dict[str, dict[str, tuple[str, str]]] = {
         "section": ("eta etad", ""),
         "end_motion": ("x Psi xd Psid xdd Psidd", ""),
         "frame_motion": ("x Psi xd Psid xdd Psidd", ""),
+        "segment": ("eta etad", ""),
+        "segment_motion": ("Om Omd Omdd", ""),
         "subspace": ("H6 Phi", ""),
         "prescribed_bias": ("H s c", ""),
         "modal_effort": ("H e e_f", ""),

@@ -48,6 +48,7 @@ from ..flexible import (
     modal_residual,
     modal_sweep,
     section,
+    segment,
 )
 from ..lower.kernel_lowering import lower
 from .registry import Element, builtin_elements, kind_of
@@ -293,6 +294,8 @@ def modal_kernels() -> tuple[Kernel, ...]:
         Kernel("section", section.section()),
         Kernel("end_motion", section.end_motion(), turns),
         Kernel("frame_motion", section.frame_motion(), turns),
+        Kernel("segment", segment.segment()),
+        Kernel("segment_motion", segment.segment_motion(), segment.rotation_guards()),
         Kernel("subspace", section.subspace()),
         Kernel("prescribed_bias", section.prescribed_bias()),
         *(
@@ -310,6 +313,8 @@ def tangent_kernels() -> tuple[Kernel, ...]:
             tangent_sweep.invert,
             tangent_sweep.node,
             tangent_sweep.assemble_port,
+            tangent_sweep.carry_columns,
+            tangent_sweep.outboard_rows,
             tangent_sweep.column_load,
             tangent_sweep.column_solution,
             tangent_sweep.port_motion,
@@ -320,6 +325,7 @@ def tangent_kernels() -> tuple[Kernel, ...]:
             placed.placed_reduce,
             placed.placed_node,
             placed.placed_port,
+            placed.placed_carry_columns,
             placed.placed_remainder,
         )
     )

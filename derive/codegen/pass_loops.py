@@ -251,7 +251,8 @@ _BODY_VARIABLES = ("block", "d_block", "tangent", "nu", "nq")
 #: Traits of steps that concern few bodies of a scene.
 _RARE_TRAITS = {
     **dict.fromkeys(
-        ("modal", "section", "outward", "placed", "drag", "imposed", "parts", "curved"), True
+        ("modal", "section", "outward", "segment", "placed", "drag", "imposed", "parts", "curved"),
+        True,
     ),
     "directed": False,
 }

@@ -35,7 +35,8 @@ MODE_SLOTS = {
 SECTION_SLOTS = {
     "section.Phi": (6, 0), "section.H": (6, 0), "section.push": (6, 0), "section.H6": (0, 36),
     "section.x": (0, 3), "section.Psi": (0, 3), "section.xd": (0, 3), "section.Psid": (0, 3),
-    "section.xdd": (0, 3), "section.Psidd": (0, 3),
+    "section.xdd": (0, 3), "section.Psidd": (0, 3), "section.dC1": (6, 0), "section.dC2": (6, 0),
+    "section.S_rf": (6, 0),
 }  # fmt: skip
 #: Numbers of the tangent by body: slot -> so many, and so many times nu, nu nu, nq nq, nq nu.
 TANGENT_SLOTS = {
@@ -63,7 +64,8 @@ BEND_SLOTS = {
 }  # fmt: skip
 PORT_SLOTS = {
     "port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0),
-    "port.place_B": (9, 0),
+    "port.place_B": (9, 0), "port.outboard_K": (6, 0), "port.outboard_Z_z": (9, 0),
+    "port.outboard_Z_p": (9, 0),
 }  # fmt: skip
 #: Numbers of a hinge that closes a loop, in their order: slot -> how many.
 CLOSURE_SLOTS = {
@@ -81,7 +83,9 @@ SHARED_SLOTS = {
     # Only one of the two tangents exists at a time.
     "mass.S": "tangent.S", "mass.F": "tangent.gain", "mass.G": "tangent.V",
     "shapes.S_rf": "bend.V", "shapes.S_rf_I": "bend.G", "shapes.S_ff": "bend.D",
-    "shapes.right": "bend.right", "shapes.gain": "bend.gain",
+    "shapes.right": "bend.right", "shapes.gain": "bend.gain", "port.S_rf": "port.outboard_K",
+    # Displacement and rotation vector are adjacent.
+    "section.Om": "section.x", "section.Omd": "section.xd", "section.Omdd": "section.xdd",
 }  # fmt: skip
 
 _MOMENTS = {
@@ -93,6 +97,22 @@ _MOMENTS = {
 _STATE = {"given": "given", "efforts": "efforts", "udot": "udot", "required": "required",
           "column": "column", "answer": "answer"}  # fmt: skip
 
+
+def _station_text(numbers: str, section_slot: str, modal_slot: str) -> str:
+    """C expression of columns at the station before a segment; of the modes at the first one."""
+    offset = "tangent" if "tangents" in numbers else "place"
+    return (
+        f"{numbers} + (section->before"
+        f" ? section->before->{offset} + {_macro_name(section_slot)}(n)"
+        f" : modal->{offset} + {_macro_name(modal_slot)}(n))"
+    )
+
+
+def _macro_name(slot: str) -> str:
+    return f"MSTMM_{slot.replace('.', '_').upper()}"
+
+
+_TANGENT_NUMBERS = "state->tangents->numbers"
 _INBOARD_TANGENT = "state->tangents->numbers + mstmm_tangent_at(state, body->parent)"
 #: C expressions of scene data and of results.
 _SLOT_TEXTS = {
@@ -107,6 +127,12 @@ _SLOT_TEXTS = {
     "modes.K": "modal->stiffness", "modes.D": "modal->damping",
     **{f"moments.{name}": f"modal->moments.{to}" for name, to in _MOMENTS.items()},
     **{f"drag.{name}": f"modal->drag->{to}" for name, to in _MOMENTS.items()},
+    "section.b": "section->rest", "section.Bm": "section->shapes",
+    "inboard.S_rf": _station_text("state->workspace", "section.S_rf", "modes.S_rf"),
+    "inboard.shapes_S_rf": _station_text(_TANGENT_NUMBERS, "port.outboard_K", "bend.V"),
+    "inboard.K": _station_text(_TANGENT_NUMBERS, "port.outboard_K", "bend.K"),
+    "inboard.Z_z": _station_text(_TANGENT_NUMBERS, "port.outboard_Z_z", "bend.Z_z"),
+    "inboard.Z_p": _station_text(_TANGENT_NUMBERS, "port.outboard_Z_p", "bend.place_Z"),
     "section.r": "section->point", "section.phi": "section->phi",
     "section.theta": "section->theta", "section.end": "section->end",
     **{f"section.g_{a}": f"section->drawn[{k}]" for k, a in enumerate("xyz")},
@@ -338,10 +364,6 @@ def _stored_expression(slot: str) -> str | None:
     if slot in PLACE_SLOTS:
         return f"place + {_macro_name(slot)}(body->nu, body->nq)"
     return None
-
-
-def _macro_name(slot: str) -> str:
-    return f"MSTMM_{slot.replace('.', '_').upper()}"
 
 
 def _offset_constants(layout: Mapping[str, int], total: str) -> list[str]:

@@ -30,7 +30,7 @@ from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde
 from ..definition.notation import column, part, stack, symbol
 from .riccati_sweep import SHIFT, R
 from .tangent_hinge_elimination import DISPLACEMENT, ROTATION
-from .tangent_sweep import OWN_D, OWN_K, SOLUTION, SOURCES, V_REL, Z_PARENT, D, H, N, V
+from .tangent_sweep import OWN_D, OWN_K, OWN_ROWS, SOLUTION, SOURCES, V_REL, Z_PARENT, D, H, N, V
 
 P = Quantity(vector("p", 9), "", "change of pose: rotation, position and velocity of P, own axes")
 _P_PARENT = Quantity(vector("p_I", 9), "", "change of the parent's pose, parent axes")
@@ -261,6 +261,36 @@ def placed_port() -> Derivation:
             Equation("X^T S_p B_p", load.symbol, parent_load),
             Equation("H^T S_p Th_p", rows.symbol, s_th.symbol * H.symbol),
             Equation("H^T S_p B_p", by_unknowns.symbol, k.T * H.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_carry_columns() -> Derivation:
+    """`tangent_sweep.carry_columns` for rows by the pose p = Th_p p_I + Th_z z_I + B_p x."""
+    outboard = Quantity(sp.MatrixSymbol("Z_o", 9, N), "", "rows by the pose, one row per entry")
+    rows = Quantity(_OWN_ROWS.symbol, accumulate=True)
+    by_motion = Quantity(OWN_ROWS.symbol, accumulate=True)
+    by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
+    turn, position, velocity = (R.symbol * outboard.symbol[3 * i : 3 * i + 3, :] for i in range(3))
+    lever = tilde(column(SHIFT.symbol))
+    return Derivation(
+        "tangent",
+        "outboard stations by the pose, along the unknowns of their body",
+        (R, SHIFT, _B, outboard),
+        (rows, by_motion, by_unknowns),
+        (
+            Equation(
+                "Th_p^T Z",
+                rows.symbol,
+                sp.BlockMatrix([[turn + lever * position], [position], [velocity]]),
+            ),
+            Equation(
+                "Th_z^T Z",
+                by_motion.symbol,
+                sp.BlockMatrix([[lever * velocity], [sp.ZeroMatrix(3, N)], [sp.ZeroMatrix(3, N)]]),
+            ),
+            Equation("B_p Z", by_unknowns.symbol, _B.symbol * outboard.symbol),
         ),
         sources=SOURCES,
     )

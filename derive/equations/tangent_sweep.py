@@ -164,6 +164,11 @@ def _rows(name: str, width: int, meaning: str) -> Quantity:
     return Quantity(sp.MatrixSymbol(name, N, width), "", meaning)
 
 
+def _columns(name: str, meaning: str) -> Quantity:
+    """Array with a row per entry of a motion or displacement, and a column per unknown."""
+    return Quantity(sp.MatrixSymbol(name, 9, N), "", meaning)
+
+
 def _square(name: str, meaning: str) -> Quantity:
     return Quantity(sp.MatrixSymbol(name, N, N), "", meaning)
 
@@ -246,6 +251,62 @@ def assemble_port() -> Derivation:
             Equation("H^T S Th", rows.symbol, s_th.symbol * H.symbol),
             Equation("H^T K + W", by_unknowns.symbol, k.symbol.T * H.symbol + W.symbol),
         ),
+        sources=SOURCES,
+    )
+
+
+def carry_columns() -> Derivation:
+    """Contribution of the stations outboard of a station: load and rows along the unknowns.
+
+    The station moves by z = Th z_I + B x, so that rows Z z become Z Th z_I + Z B x.
+    """
+    outboard_load, outboard_rows = _rows("K_o", 6, "load"), _columns("Z_o", "rows by the motion")
+    load = Quantity(OWN_K.symbol, accumulate=True)
+    rows = Quantity(OWN_ROWS.symbol, accumulate=True)
+    by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
+    k, z = outboard_load.symbol, outboard_rows.symbol
+    force, lever = R.symbol * k[:, :3].T, tilde(column(SHIFT.symbol))
+    relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
+    turn, rate, linear = (z[3 * i : 3 * i + 3, :] for i in range(3))
+    acceleration = R.symbol * linear
+    carried_turn = (
+        R.symbol * (turn + relative * rate + 2 * (velocity * linear))
+        - _spin_acceleration().T * acceleration
+    )
+    return Derivation(
+        "tangent",
+        "outboard stations along the unknowns of their body",
+        (R, SHIFT, PARENT_RATE, V_REL, W_REL, H, B, outboard_load, outboard_rows),
+        (load, rows, by_unknowns),
+        (
+            Equation(
+                "X^T K",
+                load.symbol,
+                sp.BlockMatrix([[force.T, (R.symbol * k[:, 3:].T + lever * force).T]]),
+            ),
+            Equation(
+                "Th^T Z",
+                rows.symbol,
+                sp.BlockMatrix(
+                    [[carried_turn], [R.symbol * rate + lever * acceleration], [acceleration]]
+                ),
+            ),
+            Equation("K^T H + B Z", by_unknowns.symbol, k * H.symbol + B.symbol * z),
+        ),
+        sources=SOURCES,
+    )
+
+
+def outboard_rows() -> Derivation:
+    """Rows of the stations outboard of a station by a known change of its motion or pose."""
+    rows, change = _columns("Z_o", "rows of the outboard stations"), symbol("b", 9)
+    load = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows", accumulate=True)
+    return Derivation(
+        "tangent",
+        "rows of outboard stations by a known change",
+        (rows, Quantity(change, "", "known change of motion or pose")),
+        (load,),
+        (Equation("Z^T b", load.symbol, rows.symbol.T * change),),
         sources=SOURCES,
     )
 

@@ -33,6 +33,7 @@ MODAL_SUBSPACE = modal_columns("H", 6, "motion subspace of the modes, rows v the
 WORK = modal_columns("U", 6, "S H")
 MODAL_ACCELERATIONS = modal_vector("etadd", "modal accelerations")
 MODAL_EFFORTS = modal_vector("tau", "efforts on the modes")
+RELATED_COLUMNS = modal_columns("S_rf_I", 6, "S_rf + S H")
 MODAL_GAIN = Quantity(sp.MatrixSymbol("Gg", N, 7), "", "etadd = g - G a: columns of G, then -g")
 
 
@@ -44,8 +45,6 @@ def _accumulating(quantity: Quantity) -> Quantity:
 def assemble_port() -> Derivation:
     """Modal rows of the bodies outboard of a port; its frame rows are carried as by a weld."""
     force, moment = WORK.symbol[:3, :], WORK.symbol[3:, :]
-    lever = tilde(part(SHIFT.symbol, 0))
-    rotated_force = R.symbol * force
     return Derivation(
         "modal",
         "S and e of a port along the modes",
@@ -53,11 +52,7 @@ def assemble_port() -> Derivation:
         (WORK, _accumulating(S_RF), _accumulating(S_FF), _accumulating(E_F)),
         (
             Equation("U = S H", WORK.symbol, S.symbol * MODAL_SUBSPACE.symbol),
-            Equation(
-                "X^T U",
-                S_RF.symbol,
-                stack(rotated_force, R.symbol * moment + lever * rotated_force),
-            ),
+            Equation("X^T U", S_RF.symbol, _carried(force, moment)),
             Equation("H^T U", S_FF.symbol, MODAL_SUBSPACE.symbol.T * WORK.symbol),
             Equation("H^T e", E_F.symbol, MODAL_SUBSPACE.symbol.T * E.symbol),
         ),
@@ -67,7 +62,7 @@ def assemble_port() -> Derivation:
 
 def rebase() -> Derivation:
     """Modal rows and columns for the frame acceleration a_I + H etadd."""
-    rebased = modal_columns("S_rf_I", 6, "S_rf + S H")
+    rebased = RELATED_COLUMNS
     coupling = S_RF.symbol
     return Derivation(
         "modal",
@@ -84,6 +79,26 @@ def rebase() -> Derivation:
         ),
         sources=SOURCES,
     )  # fmt: skip
+
+
+def carry_columns() -> Derivation:
+    """Frame rows of the modes at a station, carried to the station before it: X^T S_rf."""
+    force, moment = RELATED_COLUMNS.symbol[:3, :], RELATED_COLUMNS.symbol[3:, :]
+    return Derivation(
+        "modal",
+        "columns of the modes carried along a segment",
+        (R, SHIFT, RELATED_COLUMNS),
+        (_accumulating(S_RF),),
+        (Equation("X^T S_rf", S_RF.symbol, _carried(force, moment)),),
+        sources=SOURCES,
+    )
+
+
+def _carried(force: sp.Basic, moment: sp.Basic) -> sp.BlockMatrix:
+    """Columns of forces and moments at a port, in the axes and about the origin of the frame."""
+    lever = tilde(part(SHIFT.symbol, 0))
+    rotated_force = R.symbol * force
+    return stack(rotated_force, R.symbol * moment + lever * rotated_force)
 
 
 def condense() -> Derivation:
@@ -257,6 +272,6 @@ def strain_load() -> Derivation:
 
 
 STEPS = (
-    assemble_port, rebase, condense, recover, port_deviation, prescribed_load, modal_effort,
-    column_load, column_acceleration, step_stiffness, strain_load,
+    assemble_port, rebase, carry_columns, condense, recover, port_deviation, prescribed_load,
+    modal_effort, column_load, column_acceleration, step_stiffness, strain_load,
 )  # fmt: skip

@@ -92,9 +92,11 @@ def _displacement_of_rates(at_rest: sp.Basic, now: sp.Basic) -> sp.Basic:
     return half * (at_rest * eta) + half * (now * eta)
 
 
-def even_series(first: int, s: sp.Expr, derivative: bool = False) -> sp.Expr:
+def even_series(
+    first: int, s: sp.Expr, derivative: bool = False, term_count: int = SERIES_TERM_COUNT
+) -> sp.Expr:
     """sum_k (-s)^k / (2 k + first)!, or its derivative by s, in Horner's form."""
-    signs = [sp.Integer((-1) ** k) / sp.factorial(2 * k + first) for k in range(SERIES_TERM_COUNT)]
+    signs = [sp.Integer((-1) ** k) / sp.factorial(2 * k + first) for k in range(term_count)]
     terms = [k * c for k, c in enumerate(signs)][1:] if derivative else signs
     value = sp.Integer(0)
     for coefficient in reversed(terms):
@@ -144,7 +146,7 @@ def _spin_rate(sign: int) -> sp.ImmutableDenseMatrix:
     )
 
 
-_OUTPUTS = (
+MOTION_OUTPUTS = (
     Quantity(sp.MatrixSymbol("R", 3, 3), "", "rotation, outboard axes to inboard axes"),
     Quantity(vector("d", 3), "m", "outboard point from the inboard one, inboard axes"),
     Quantity(
@@ -161,27 +163,27 @@ def _motion_derivation(title: str, definitions: tuple[Equation, ...]) -> Derivat
         "modal",
         title,
         (END_ROTATION, *SECTION_MOTION),
-        _OUTPUTS,
+        MOTION_OUTPUTS,
         (*_coefficient_equations(), *definitions),
         sources=SOURCES,
     )
 
 
 def _velocity_equations(subspace: sp.Basic) -> tuple[Equation, ...]:
-    h6 = _OUTPUTS[2].symbol
+    h6 = MOTION_OUTPUTS[2].symbol
     rates = stack(POSITION_RATE.symbol, ROTATION_VECTOR_RATE.symbol)
     velocities = vector("vw", 6)
     return (
         Equation("H6", h6, subspace),
         Equation("relative velocities", velocities, h6 * rates),
-        Equation("v", _OUTPUTS[3].symbol, part(velocities, 0)),
-        Equation("w", _OUTPUTS[4].symbol, part(velocities, 3)),
+        Equation("v", MOTION_OUTPUTS[3].symbol, part(velocities, 0)),
+        Equation("w", MOTION_OUTPUTS[4].symbol, part(velocities, 3)),
     )
 
 
 def end_motion() -> Derivation:
     """Motion from the floating frame (inboard) to an end (outboard), as a hinge kernel."""
-    rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
+    rotation, end_rotation = MOTION_OUTPUTS[0].symbol, END_ROTATION.symbol
     zero_block = sp.zeros(3, 3)
     subspace = sp.BlockMatrix(
         [[rotation.T, zero_block], [zero_block, end_rotation.T * _tangent_operator(1)]]
@@ -190,11 +192,11 @@ def end_motion() -> Derivation:
         "end of a flexible body relative to its floating frame",
         (
             Equation("rotation", rotation, _rotation_matrix() * end_rotation),
-            Equation("place", _OUTPUTS[1].symbol, part(POSITION.symbol, 0)),
+            Equation("place", MOTION_OUTPUTS[1].symbol, part(POSITION.symbol, 0)),
             *_velocity_equations(subspace),
             Equation(
                 "bias",
-                _OUTPUTS[5].symbol,
+                MOTION_OUTPUTS[5].symbol,
                 stack(rotation.T * POSITION_BIAS.symbol, end_rotation.T * _spin_rate(1)),
             ),
         ),
@@ -207,7 +209,7 @@ def frame_motion() -> Derivation:
     The inverse of `end_motion`: w = -W with W = T(-Psi) Psid the spin of the section in frame
     axes, v = W x x - xd.
     """
-    rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
+    rotation, end_rotation = MOTION_OUTPUTS[0].symbol, END_ROTATION.symbol
     lever = tilde(part(POSITION.symbol, 0))
     spin, rate = vector("W", 3), vector("Wd", 3)
     zero_block = sp.zeros(3, 3)
@@ -229,11 +231,11 @@ def frame_motion() -> Derivation:
         "floating frame relative to the supported end of the body",
         (
             Equation("rotation", rotation, end_rotation.T * _rotation_matrix().T),
-            Equation("place", _OUTPUTS[1].symbol, -rotation * POSITION.symbol),
+            Equation("place", MOTION_OUTPUTS[1].symbol, -rotation * POSITION.symbol),
             *_velocity_equations(subspace),
-            Equation("spin of the section", spin, -part(_OUTPUTS[4].symbol, 0)),
+            Equation("spin of the section", spin, -part(MOTION_OUTPUTS[4].symbol, 0)),
             Equation("its rate", rate, _spin_rate(-1)),
-            Equation("bias", _OUTPUTS[5].symbol, stack(linear, -part(rate, 0))),
+            Equation("bias", MOTION_OUTPUTS[5].symbol, stack(linear, -part(rate, 0))),
         ),
     )
 
@@ -252,9 +254,9 @@ def subspace() -> Derivation:
     return Derivation(
         "modal",
         "subspace of a port",
-        (_OUTPUTS[2], JACOBIAN),
+        (MOTION_OUTPUTS[2], JACOBIAN),
         (h,),
-        (Equation("H = H6 Phi", h.symbol, _OUTPUTS[2].symbol * JACOBIAN.symbol),),
+        (Equation("H = H6 Phi", h.symbol, MOTION_OUTPUTS[2].symbol * JACOBIAN.symbol),),
         sources=SOURCES,
     )
 
@@ -267,8 +269,8 @@ def prescribed_bias() -> Derivation:
     return Derivation(
         "modal",
         "bias of a port with prescribed modal accelerations",
-        (h, s, _OUTPUTS[5]),
+        (h, s, MOTION_OUTPUTS[5]),
         (total,),
-        (Equation("c + H s", total.symbol, _OUTPUTS[5].symbol + h.symbol * s.symbol),),
+        (Equation("c + H s", total.symbol, MOTION_OUTPUTS[5].symbol + h.symbol * s.symbol),),
         sources=SOURCES,
     )

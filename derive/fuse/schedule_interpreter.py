@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from fractions import Fraction
@@ -291,10 +292,9 @@ class ScheduleInterpreter(RowSlots):
         _, _, entries = slot.partition("[")
         if entries:
             return len(entries.split())
-        size = SLOTS[slot].size
-        if size.isdigit():
-            return int(size)
-        return self.modal.n if size == "n" else self.body.nu
+        factors = SLOTS[slot].size.split()
+        sizes = {"nu": self.body.nu, "n": self.modal.n if "n" in factors else 0}
+        return math.prod(sizes[x] if x in sizes else int(x) for x in factors)
 
     def _add(self, step: Add) -> None:
         terms = self.get(step.source, 0)
@@ -437,6 +437,7 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "modal": lambda replay, body: body.modal is not None,
     "section": lambda replay, body: body.section is not None,
     "outward": lambda replay, body: body.section is not None and not body.section.inward,
+    "segment": lambda replay, body: body.section is not None and body.section.is_segment,
     "drag": lambda replay, body: body.modal is not None and bool(body.modal.drag),
     "moving": lambda replay, body: body.section is None and bool(replay.free_speeds()),
     "cut": lambda replay, body: replay.closure() is not None,

@@ -155,6 +155,8 @@ class Slots:
 
     def _key(self, slot: str) -> Hashable:
         owner, _, name = slot.partition(".")
+        if slot == "inboard.S_rf":
+            return self._inboard_columns()
         if owner in ROLES:
             return self.subject.roles[owner], f"body.{name}"
         if owner in ("modes", "moments", "drag"):
@@ -164,6 +166,13 @@ class Slots:
         if owner in ("law", "load", "force", "drive", "speed"):
             return self.subject.index, slot
         return self.index, slot
+
+    def _inboard_columns(self) -> Hashable:
+        """Key of the modal columns at the station before a segment, or of the flexible body."""
+        parent = self.subject.roles["parent"]
+        if parent == self.frame:
+            return self.frame, "modes.S_rf"
+        return parent, "section.S_rf"
 
     # --- scene data ------------------------------------------------------------------------------
 

@@ -40,7 +40,8 @@ _SLOTS = {
         )
     },
     **{f"modes.{name}": f"shapes.{name}" for name in ("S_rf", "S_rf_I", "S_ff", "right", "gain")},
-    "modes.work": "bend.work", "section.push": "port.K",
+    "modes.work": "bend.work", "section.push": "port.K", "section.S_rf": "port.S_rf",
+    "inboard.S_rf": "inboard.shapes_S_rf",
 }  # fmt: skip
 _NAME = "laws"
 
@@ -51,6 +52,7 @@ LAWS_OWN = Pass(
         Copy(to="mass.S", source="body.S", when="modal"),
         call("frames.pivot_floor", S="mass.S", floor="body.floor"),
         Copy(to="tangent.laws"),
+        Copy(to="port.S_rf", when="segment"),
         *only(
             "modal",
             Copy(to="shapes.S_rf", source="modes.S_rf"),

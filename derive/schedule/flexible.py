@@ -14,6 +14,7 @@ _SECTION_DATA = {
     name: f"section.{name}"
     for name in ("r", "phi", "theta", "g_x", "g_y", "g_z", "h_x", "h_y", "h_z")
 }
+_SEGMENT_MOTION = {name: f"section.{name}" for name in ("Om", "Omd", "Omdd")}
 _STATE = {"eta": "modes.eta", "etad": "modes.etad"}
 _MOTION_PORTS = {name: f"section.{name}" for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
 _HINGE_PORTS = {
@@ -24,8 +25,13 @@ _HINGE_PORTS = {
 SECTION_MOTION = Pass(
     "section_motion", "body", "Relative motion across a section of a flexible body.",
     (
-        call("modal.section", **_SECTION_DATA, **_STATE, Phi="section.Phi", **_MOTION_PORTS),
-        call("modal.end_motion", when="outward", fails="section", R_end="section.end",
+        call("modal.segment", when="segment", b="section.b", Bm="section.Bm", **_STATE,
+             dC1="section.dC1", dC2="section.dC2", Phi="section.Phi", **_SEGMENT_MOTION),
+        call("modal.segment_motion", when="segment", fails="section", R_end="section.end",
+             **_SEGMENT_MOTION, **_HINGE_PORTS),
+        call("modal.section", when="!segment", **_SECTION_DATA, **_STATE, Phi="section.Phi",
+             **_MOTION_PORTS),
+        call("modal.end_motion", when="outward !segment", fails="section", R_end="section.end",
              **_MOTION_PORTS, **_HINGE_PORTS),
         call("modal.frame_motion", when="!outward", fails="section", R_end="section.end",
              **_MOTION_PORTS, **_HINGE_PORTS),
@@ -67,10 +73,16 @@ MODAL_CONDENSE = Pass(
     ),
 )  # fmt: skip
 
-#: Contribution of the bodies outboard of an end to the modes of the flexible body.
-PORT_ASSEMBLY = call(
-    "modal.assemble_port", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
-    U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f",
+#: Contribution of the bodies outboard of an end to the modes of the flexible body.  A station of an
+#: exact beam adds the columns of the stations outboard of it and carries them to the one before.
+PORT_ASSEMBLY = (
+    call("modal.assemble_port", when="!segment", Rc="hinge.R", r="hinge.d", H="section.H",
+         S="body.S", e="body.e", U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff",
+         e_f="modes.e_f"),
+    call("modal.rebase", when="segment", H="section.H", S="body.S", e="body.e",
+         S_rf="section.S_rf", S_rf_I="section.push", S_ff="modes.S_ff", e_f="modes.e_f"),
+    call("modal.carry_columns", when="segment", Rc="hinge.R", r="hinge.d", S_rf_I="section.push",
+         S_rf="inboard.S_rf"),
 )  # fmt: skip
 
 #: Contribution of the modes to the deviation outboard of a section.

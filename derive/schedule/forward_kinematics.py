@@ -47,6 +47,7 @@ FORWARD = Pass(
     "forward", "body", "Hinge motion, bias motion, own inertia and own load of a body.",
     (
         RunPass(whole=SECTION_MOTION, when="section"),
+        Copy(to="section.S_rf", when="segment"),
         RunPass(whole=HINGE_MOTION, when="parts !section !whole"),
         call("hinge.forward", when="own", fails="hinge", **CONNECTION, **COORDINATES, s="body.s",
              motion_I="parent.motion", **BODY, qdot="body.qdot"),

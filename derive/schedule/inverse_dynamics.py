@@ -88,7 +88,7 @@ FACTORISE = Pass(
         RunPass(whole=HINGE_MOTION, when="own"),
         # Loads are carried but not read: each column starts from zero load.
         RunPass(whole=MODAL_CONDENSE, when="modal"),
-        *only("outward", PORT_ASSEMBLY),
+        *only("outward", *PORT_ASSEMBLY),
         *FREE,
         call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
              J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",

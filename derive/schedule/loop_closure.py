@@ -339,7 +339,7 @@ CONDENSE_WITH_ROWS = Pass(
     (
         *only("modal", RunPass(whole=MODAL_CONDENSE), _ROW_CONDENSATION),
         ForEach(of="closings", steps=(RunPass(whole=ROW_ELIMINATION),)),
-        *only("outward", PORT_ASSEMBLY),
+        *only("outward", *PORT_ASSEMBLY),
         *FREE,
         efforts_of("pending.previous_x", "refined"),
         FREE_EFFORTS,

@@ -31,10 +31,10 @@ LOAD = (0, 1, 5)
 _TRAITS = {
     **dict.fromkeys(("own", "free", "moving", "hinged", "known", "poses", "looped"), True),
     **dict.fromkeys(
-        ("parts", "whole", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
-         "rolling", "coupled", "soft", "corrected", "position_gap", "gap_closing", "refined", "qr",
-         "velocity_error", "inverse", "weightless", "balance", "loads_read", "immobile", "linked",
-         "driven", "flexible", "couplings", "product"), False,
+        ("parts", "whole", "staged", "section", "outward", "segment", "modal", "imposed",
+         "distance", "plane", "rolling", "coupled", "soft", "corrected", "position_gap",
+         "gap_closing", "refined", "qr", "velocity_error", "inverse", "weightless", "balance",
+         "loads_read", "immobile", "linked", "driven", "flexible", "couplings", "product"), False,
     ),
 }  # fmt: skip
 #: Loops that are empty in such a scene.

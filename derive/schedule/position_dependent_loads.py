@@ -161,9 +161,16 @@ CARRY_TO_PARENT = call(
     "frames.placed_carry", when="placed", **_POSE_PORTS, **_ROW_PORTS, T_p="local.T_p",
     T_w="local.T", S_pI="inboard.place", S_wI="inboard.S",
 )  # fmt: skip
-PORT_ASSEMBLY = call("tangent.placed_port", n="modes", when="outward placed", **_POSE_PORTS,
-                H="section.H", B_p="port.place_B", **_ROW_PORTS, T_p="local.T_p", K="bend.K",
-                Z_p="bend.place_Z", Z_x="bend.Z_x")  # fmt: skip
+_PORT = {**_POSE_PORTS, "H": "section.H", "B_p": "port.place_B", **_ROW_PORTS, "T_p": "local.T_p"}
+PORT_ASSEMBLY = (
+    call("tangent.placed_port", n="modes", when="outward placed !segment", **_PORT, K="bend.K",
+         Z_p="bend.place_Z", Z_x="bend.Z_x"),
+    call("tangent.placed_port", n="modes", when="segment placed", **_PORT, K="inboard.K",
+         Z_p="inboard.Z_p", Z_x="bend.Z_x"),
+    call("tangent.placed_carry_columns", n="modes", when="segment placed", **_POSE_PORTS,
+         B_p="port.place_B", Z_o="port.outboard_Z_p", Z_p="inboard.Z_p", Z_z="inboard.Z_z",
+         Z_x="bend.Z_x"),
+)  # fmt: skip
 
 # --- one right-hand side ------------------------------------------------------------------------
 

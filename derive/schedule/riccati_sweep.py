@@ -131,7 +131,7 @@ CONDENSE = Pass(
     "condense", "body", "S and e of a body, complete, carried across its hinge to the parent.",
     (
         RunPass(whole=MODAL_CONDENSE, when="modal"),
-        *only("outward", PORT_ASSEMBLY),
+        *only("outward", *PORT_ASSEMBLY),
         *only("parts", *FREE, FREE_EFFORTS),
         call("hinge.condense", when="own", fails="undetermined", **BODY, **COORDINATES,
              **_BODY_PORTS, tau="body.tau", **_GAINS, **_PARENT_PORTS),

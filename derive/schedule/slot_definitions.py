@@ -119,6 +119,14 @@ Psidd | 3 | bias of rotation
 H6 | 36 | motion of the end by motion of the section
 H | 6 n | motion subspace of the modes
 push | 6 n | S H of the bodies outboard of the section
+b | 18 | strains of a segment at rest
+Bm | 18 n | strains of a segment per strain coordinate
+dC1 | 6 n | brackets of the strains per strain coordinate
+dC2 | 6 n | brackets of the strains per strain coordinate, second kind
+Om | 6 | displacement and rotation vector along a segment
+Omd | 6 | its rate
+Omdd | 6 | its bias
+S_rf | 6 n | frame rows, modal columns of the stations outboard of a segment
 end | 9 | axes of the end in the section
 """
 _OTHER_SLOTS = """
@@ -277,6 +285,10 @@ port.place_B | 9 n | as bend.place_B
 port.G | 6 n | as bend.G
 port.W | n n | as bend.W
 port.K | 6 n | S B of the bodies outboard of the end
+port.S_rf | 6 n | as section.S_rf, of the mass matrix with laws
+port.outboard_K | 6 n | load along the modes of the stations outboard of a segment
+port.outboard_Z_z | 9 n | rows by the motion of these stations, a row an entry
+port.outboard_Z_p | 9 n | rows by the displacement of these stations, a row an entry
 law.own_slopes | nu | change of the law's efforts along one of its own speeds
 mass.S | 21 | S of the outboard bodies, including derivatives of the laws
 mass.F | nu nu | D = L diag(d) L^T: L, and 1 / d on the diagonal
@@ -289,6 +301,11 @@ shapes.right | 7 n | right-hand sides of the modal elimination
 shapes.gain | 7 n | etadd = g - G a: columns of G, then -g
 law.slopes | nu | change of the law's efforts along the current speed
 inboard.S | 54 | tangent.S of the parent
+inboard.S_rf | 6 n | section.S_rf of the station before, or modes.S_rf
+inboard.shapes_S_rf | 6 n | port.S_rf of the station before, or shapes.S_rf
+inboard.K | 6 n | port.outboard_K of the station before, or bend.K
+inboard.Z_z | 9 n | port.outboard_Z_z of the station before, or bend.Z_z
+inboard.Z_p | 9 n | port.outboard_Z_p of the station before, or bend.place_Z
 inboard.place | 54 | place.S of the parent
 inboard.z | 9 | place.z of the parent
 step.rate | 1 | change of the speeds along the unknowns
@@ -335,6 +352,7 @@ TRAITS: dict[str, str] = {
     "modal": "the floating frame of a flexible body",
     "section": "the connection passes a section of a flexible body",
     "outward": "from the frame out to an end",
+    "segment": "from one station of an exact beam out to the next, or to an end",
     "drag": "a flexible body with viscous drag",
     "known": "the motion of hinges is known",
     "coordinate": "a law on one coordinate (otherwise on a quaternion and its turns)",

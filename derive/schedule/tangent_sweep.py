@@ -351,6 +351,9 @@ TANGENT_OWN = Pass(
             ),
         ),
         *position_dependent_loads.OWN_BY_PLACE,
+        Copy(to="port.outboard_K", when="segment"),
+        Copy(to="port.outboard_Z_z", when="segment"),
+        Copy(to="port.outboard_Z_p", when="segment placed"),
         *only("modal !section", Copy(to="bend.B"), Copy(to="bend.G"), Copy(to="bend.W"),
               Copy(to="bend.zero_H")),
     ),
@@ -362,6 +365,10 @@ _OWN = {name: f"bend.{name}" for name in ("K", "Z_z", "Z_x")}
 _NODE = {
     **{name: f"bend.{name}" for name in ("B", "G", "W", "V", "D", "right", "gain", "work")},
     **_OWN, "S": "tangent.S", "S_c": "local.S_c",
+}  # fmt: skip
+_PORT = {
+    "Rc": "body.R", "r": "body.r", "H": "section.H", "B": "port.B", "G": "port.G", "W": "port.W",
+    "S": "tangent.S", "T": "local.T", "K_x": "port.K",
 }  # fmt: skip
 _ROWS = {"K": "local.K", "right": "local.right"}
 _CARRY_PORTS = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
@@ -393,9 +400,13 @@ _ELIMINATION_STEPS = (
     *position_dependent_loads.HINGE_REDUCED,
     call("frames.tangent_carry", **_CARRY_PORTS, S="tangent.S", T="local.T", S_I="inboard.S"),
     position_dependent_loads.CARRY_TO_PARENT,
-    call("tangent.assemble_port", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
-         B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
-    position_dependent_loads.PORT_ASSEMBLY,
+    call("tangent.assemble_port", n="modes", when="outward !segment", **_PORT, **_OWN),
+    call("tangent.assemble_port", n="modes", when="segment", **_PORT, K="inboard.K",
+         Z_z="inboard.Z_z", Z_x="bend.Z_x"),
+    call("tangent.carry_columns", n="modes", when="segment", **_CARRY_PORTS, H="section.H",
+         B="port.B", K_o="port.outboard_K", Z_o="port.outboard_Z_z", K="inboard.K",
+         Z_z="inboard.Z_z", Z_x="bend.Z_x"),
+    *position_dependent_loads.PORT_ASSEMBLY,
 )  # fmt: skip
 
 TANGENT_CONDENSE = Pass(
@@ -574,6 +585,13 @@ _KNOWN_ROWS = (
     *_mode_steps("tangent.known", "local.G", "place.known"),
     Copy(to=D + "modes.e_f", source=D + "modes.load_effort"),
 )
+#: Rows of the stations outboard of a segment, whose modes are not eliminated yet.
+_KNOWN_OUTBOARD_ROWS = (
+    call("tangent.outboard_rows", n="modes", when="segment", Z_o="port.outboard_Z_z",
+         b="tangent.known", e_f=D + "modes.e_f"),
+    call("tangent.outboard_rows", n="modes", when="segment placed", Z_o="port.outboard_Z_p",
+         b="place.known", e_f=D + "modes.e_f"),
+)  # fmt: skip
 _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
 
 #: Rows of a hinge: carried load by the known increments, less the right-hand side and the change of
@@ -585,6 +603,7 @@ INCREMENT_BACKWARD = Pass(
         *only("modal section", *_modal_load_steps("section.H")),
         *only("modal !section", *_modal_load_steps("bend.zero_H")),
         *only("section", _KNOWN, position_dependent_loads.KNOWN_LOAD),
+        *_KNOWN_OUTBOARD_ROWS,
         *only("outward", Add(to=D + "body.e", source="local.row_load"), *_MODAL_EFFORT_CHANGE,
               Add(to=D + "body.e", source="local.G")),
         *only("modal section", _KNOWN_LOAD),

@@ -52,13 +52,18 @@ class SectionStructure:
 
     The connection leads outward from the frame to an end, or inward from the end at the inboard
     hinge.  `numbers` are the inputs r, phi, theta, g_x .. g_z, h_x .. h_z of the kernel "section",
-    by name.
+    by name; for a segment between stations of an exact beam b and Bm of "segment".
     """
 
     frame: int
     inward: bool
     numbers: tuple[tuple[str, Entries], ...]
     end: Entries
+
+    @property
+    def is_segment(self) -> bool:
+        """Whether it leads from one station of an exact beam to the next, or to an end."""
+        return any(name == "Bm" for name, _ in self.numbers)
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,9 @@ class _PartBuilder:
                 self.owner[place] = (len(self.origins), port)
                 yield self._beam(place, body, port)
             else:
-                self.owner[place] = (self.owner[link.parent][0], passages[name].port)
+                end = passages[name].port
+                assert isinstance(end, ModalPort), "exact beams are refused with their frame"
+                self.owner[place] = (self.owner[link.parent][0], end)
 
     def _rigid_part(self, place: int) -> Part:
         kind, springs = self.kinds[place]
@@ -203,6 +205,8 @@ class _PartBuilder:
 def _beam_shapes(body: ModalBody, port: ModalPort, packed: PackedScene) -> Bending:
     """Shapes of a beam.  SceneError for features that the matrices of beams do not contain."""
     label = f'"{body.name}"'
+    if body.stations:
+        raise unsupported_error(label, "exact beams have no matrices")
     if body.shapes is None:
         raise unsupported_error(label, "beams are the only flexible bodies with matrices")
     data = body.shapes.data

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.scene.checks.flexible_bodies import free_axes
 from mstmm.scene.checks.topology import inboard_hinges_by_body
+from mstmm.scene.tables.beam import ROOT
 from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
@@ -28,6 +29,7 @@ from .modal_parts import chunk_slices
 
 if TYPE_CHECKING:
     from mstmm.scene import Body, Hinge, Scene
+    from mstmm.scene.tables.beam import Beam
 
     from .modal_body import ModalBody
     from .modal_parts import ModalPort
@@ -68,6 +70,10 @@ class Supports:
     def __init__(self, scene: Scene) -> None:
         self._inboard_hinges = inboard_hinges_by_body(scene)
         self._bodies = {body.name: body for body in scene.body if body.type == "rigid"}
+        self._beams = {beam.name: beam for beam in scene.beam}
+        self._outboard_hinges: dict[str, list[Hinge]] = {}
+        for hinge in self._inboard_hinges.values():
+            self._outboard_hinges.setdefault(hinge.inboard_body, []).append(hinge)
         self._released = {event.hinge for event in scene.event if event.hinge}
 
     def support_of(self, name: str) -> Support:
@@ -84,7 +90,9 @@ class Supports:
         if motions is None or followed > _MAX_BODIES:
             return ANY
         inboard = self._body_support(hinge.inboard_body, followed)
-        transform = _hinge_transform(self._bodies.get(hinge.inboard_body), hinge)
+        inboard_body = self._bodies.get(hinge.inboard_body)
+        pose = _ORIGIN if inboard_body is None else _end_pose(inboard_body, hinge.inboard_end)
+        transform = _hinge_transform(*pose, hinge)
         return Support(
             np.concatenate([transform @ inboard.motion, motions], axis=1),
             _block_diagonal(inboard.inertia, _rotor_inertia(hinge, motions)),
@@ -102,6 +110,41 @@ class Supports:
             support = self._hinge_support(hinge, followed + 1)
         inertia = support.motion.T @ _spatial_inertia(body) @ support.motion
         return Support(support.motion, support.inertia + inertia)
+
+    def hanging_inertia(self, name: str, end: str, followed: int = 0) -> Array:
+        """Inertia (6, 6) of what hangs on an end of a flexible body, its axes, at q = 0.
+
+        Beams count as rigid rods.  Speeds that a hinge leaves free move without effort.
+        """
+        total = np.zeros((6, 6))
+        for hinge in self._outboard_hinges.get(name, ()):
+            if (hinge.inboard_end or ROOT) == end and followed <= _MAX_BODIES:
+                total += self._inertia_behind(hinge, _ORIGIN, followed)
+        return total
+
+    def _inertia_behind(
+        self, hinge: Hinge, inboard_end: tuple[Array, Array], followed: int
+    ) -> Array:
+        """Inertia (6, 6) outboard of a hinge at an end with that pose, about the pose's origin."""
+        name = hinge.outboard_body
+        body, beam = self._bodies.get(name), self._beams.get(name)
+        if body is None and beam is None:
+            return np.zeros((6, 6))
+        inertia = np.zeros((6, 6)) if body is None else _spatial_inertia(body)
+        if beam is not None:
+            inertia = _rod_inertia(beam)
+        for other in self._outboard_hinges.get(name, ()):
+            if followed < _MAX_BODIES:
+                pose = _end_pose(beam or body, other.inboard_end)
+                inertia += self._inertia_behind(other, pose, followed + 1)
+        back = _twist_at_origin(*_end_pose(beam or body, hinge.outboard_end))
+        inertia = back.T @ inertia @ back
+        free = self._free_motions(hinge)
+        if free is not None and free.shape[1]:
+            response = np.linalg.pinv(free.T @ inertia @ free, hermitian=True)
+            inertia -= inertia @ free @ response @ free.T @ inertia
+        transform = _hinge_transform(*inboard_end, hinge)
+        return np.asarray(transform.T @ inertia @ transform)
 
     def _free_motions(self, hinge: Hinge) -> Array | None:
         """Free motions (6, m) of a hinge, outboard axes; None if they are not known."""
@@ -138,14 +181,42 @@ def _block_diagonal(first: Array, second: Array) -> Array:
     return matrix
 
 
-def _hinge_transform(body: Body | None, hinge: Hinge) -> Array:
+#: Pose of an end that is the origin of its body.
+_ORIGIN = np.zeros(3), np.eye(3)
+
+
+def _end_pose(body: Body | Beam, end: str) -> tuple[Array, Array]:
+    """Position and rotation of an end in the axes of its body."""
+    end = end or (ROOT if ROOT in body.ends else "")
+    if not end:
+        return _ORIGIN
+    return np.array(body.ends[end].position), np.array(body.ends[end].rotation)
+
+
+def _twist_at_origin(position: Array, rotation: Array) -> Array:
+    """Transform (6, 6) from the twist of an end of a body to that of the body's origin."""
+    transform = np.zeros((6, 6))
+    transform[:3, :3] = transform[3:, 3:] = rotation
+    transform[:3, 3:] = _cross_matrix(position) @ rotation
+    return transform
+
+
+def _rod_inertia(beam: Beam) -> Array:
+    """Spatial inertia (6, 6) of a beam as a uniform rigid rod, about its root."""
+    lever = _cross_matrix(np.array([beam.length / 2, 0.0, 0.0]))
+    inertia = np.zeros((6, 6))
+    inertia[:3, :3] = beam.mass * np.eye(3)
+    inertia[:3, 3:], inertia[3:, :3] = -beam.mass * lever, beam.mass * lever
+    inertia[4, 4] = inertia[5, 5] = beam.mass * beam.length**2 / 3
+    return inertia
+
+
+def _hinge_transform(end_position: Array, end_rotation: Array, hinge: Hinge) -> Array:
     """Transform (6, 6) from the twist of the inboard body to that of the hinge's outboard end.
 
-    At q = 0, from the body's origin and axes to those of the end.  Without a rigid body only the
-    axes change, because its support allows any motion.
+    At q = 0, from the body's origin and axes to those of the hinge's outboard end; the pose is that
+    of the hinge's inboard end.
     """
-    end_rotation = np.eye(3) if body is None else np.array(body.end_rotation(hinge.inboard_end))
-    end_position = np.zeros(3) if body is None else np.array(body.end_position(hinge.inboard_end))
     lever = end_position + end_rotation @ np.array(hinge.position)
     inverse = (end_rotation @ np.array(hinge.rotation)).T
     transform = np.zeros((6, 6))

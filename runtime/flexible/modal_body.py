@@ -23,7 +23,7 @@ from mstmm.ir import KernelIR
 from mstmm.ir.element_spec import builtin_kernel
 
 from .beam.section_ports import BeamShapes
-from .modal_parts import MassPoint, ModalPort, Moments, Truncation
+from .modal_parts import MassPoint, ModalPort, Moments, Station, Truncation
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,15 @@ class Skin:
 class ModalBody(Moments):
     """One flexible body: mass moments, stiffness, damping, ports and initial deformation.
 
-    With `points` (quadrature variant) the mass sits in them and the moments are not used.
+    With `points` (quadrature variant) or `stations` (exact beam: its sections, ordered so that
+    each comes after the one before it on its way from the supported section) the mass sits in them
+    and the moments, of first order in eta, are not used for the motion.
     `drag` are the moments of the viscous drag per length (N s/m^2 in place of kg/m; motion of the
-    axis only), None without drag.  `resolved` is the highest frequency (rad/s) that the shapes of
-    an elastic body resolve, `truncation` their truncation error in deflections; both None for
-    beams.  `frame` is the kind of floating frame: "tangent", "chord", "mean", or one of them per
-    bending plane ("chord/tangent": of y, of z).
+    axis only), None without drag.  `line_loads` of an exact beam give for each load per length the
+    stations on which it acts and the length (m) that each of them stands for.  `resolved` is the
+    highest frequency (rad/s) that the shapes of an elastic body resolve, `truncation` their
+    truncation error in deflections; both None for beams.  `frame` is the kind of floating frame:
+    "tangent", "chord", "mean", or one of them per bending plane ("chord/tangent": of y, of z).
     """
 
     name: str
@@ -57,6 +60,8 @@ class ModalBody(Moments):
     D: Array  #: (n, n)
     ports: Mapping[str, ModalPort]
     points: tuple[MassPoint, ...] = ()
+    stations: tuple[Station, ...] = ()
+    line_loads: Mapping[str, tuple[tuple[int, float], ...]] = field(default_factory=dict)
     drag: Moments | None = None
     eta: Array = field(default_factory=lambda: np.zeros(0))
     etad: Array = field(default_factory=lambda: np.zeros(0))
@@ -141,6 +146,11 @@ def section_inputs(port: ModalPort) -> dict[str, Array]:
     )
 
 
+def segment_inputs(station: Station) -> dict[str, Array]:
+    """Inputs b, Bm of the kernel "segment" of ("sweep", "modal")."""
+    return {"b": station.rest, "Bm": station.shapes}
+
+
 M = TypeVar("M", bound=Moments)
 
 
@@ -158,6 +168,7 @@ def transform_body(body: ModalBody, rotation: Array, origin: Array) -> ModalBody
         points=tuple(
             replace(point, port=transform_section(point.port, axes, shift)) for point in body.points
         ),
+        stations=tuple(transform_station(station, axes, shift) for station in body.stations),
         drag=None if body.drag is None else _transform_moments(body.drag, axes, shift),
     )
 
@@ -187,6 +198,31 @@ def transform_section(port: ModalPort, rotation: Array, origin: Array) -> ModalP
         r.T @ (port.position - origin), r.T @ port.rotation, r.T @ port.phi, r.T @ port.theta,
         np.concatenate([_rotate_components(r, part) for part in np.split(port.second_order, 2)]),
     )  # fmt: skip
+
+
+def transform_station(station: Station, rotation: Array, origin: Array) -> Station:
+    """Station of a body in other axes about another origin; arguments as in `transform_body`.
+
+    The axes of all sections are turned alike, so that strains and slices are in the new axes; those
+    of an end stay.
+    """
+    if np.any(origin):
+        raise ValueError("the supported section of an exact beam is its origin")
+    r = rotation
+    return replace(
+        station,
+        rest=_rotate_triples(r, station.rest),
+        shapes=_rotate_triples(r, station.shapes),
+        center=r.T @ station.center,
+        inertia=r.T @ station.inertia @ r,
+        rotation=r.T @ station.rotation if station.end else station.rotation,
+    )
+
+
+def _rotate_triples(rotation: Array, values: Array) -> Array:
+    """Vectors (3) stacked along the first axis in the axes `rotation`."""
+    vectors = values.reshape(-1, 3, *values.shape[1:])
+    return np.asarray(np.einsum("ia,ki...->ka...", rotation, vectors)).reshape(values.shape)
 
 
 def _rotate_components(rotation: Array, vectors: Array) -> Array:

@@ -62,6 +62,32 @@ class MassPoint:
 
 
 @dataclass(frozen=True)
+class Station:
+    """Node of an exact beam: a section at the end of a segment, with a part of the mass.
+
+    The segment starts at the node with the index `previous`; -1 is the supported section, whose
+    axes are those of the flexible body.  `rest` and `shapes` are B1, B2, B3 of
+    `derive.flexible.segment` at eta = 0 and per strain coordinate.  The rigid slice has `mass`,
+    mass centre `center` and `inertia` about that centre, in the axes of the section.
+
+    Attributes:
+        x: section, m from the root.
+        end: name of the end that the node is; "" for a station, which has mass only.
+        rotation: (3, 3) axes of the end -> axes of the section.
+    """
+
+    x: float
+    previous: int
+    rest: Array  #: (18,)
+    shapes: Array  #: (18, n)
+    mass: float = 0.0  #: kg
+    center: Array = field(default_factory=lambda: np.zeros(3))  #: m
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))  #: kg m^2
+    end: str = ""
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+
+
+@dataclass(frozen=True)
 class Truncation:
     """Static deflection of an elastic body under unit loads, in full and by its shapes.
 

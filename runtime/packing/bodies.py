@@ -16,10 +16,13 @@ from ..flexible.modal_body import (
     ModalBody,
     moment_inputs,
     section_inputs,
+    segment_inputs,
     transform_body,
     transform_section,
+    transform_station,
     without_mass,
 )
+from ..flexible.modal_parts import Station
 from ..kernels.prebuilt_kernels import Elements, declared_numbers
 from . import internal_frames
 from .coordinate_layout import HingeSlots, Layout
@@ -144,12 +147,16 @@ class Bodies:
         frame = self.scene.bodies.find(passage.body)
         assert frame is not None
         if not passage.inward:
-            floating_frame = self.placement(frame)
-            port = transform_section(
-                port, np.array(floating_frame.rotation), np.array(floating_frame.origin)
+            placed = self.placement(frame)
+            axes = np.array(placed.rotation), np.array(placed.origin)
+            port = (
+                transform_station(port, *axes)
+                if isinstance(port, Station)
+                else transform_section(port, *axes)
             )
+        inputs = segment_inputs(port) if isinstance(port, Station) else section_inputs(port)
         return modal, SectionNumbers(
-            self.topology.position_of_body(frame), passage.inward, Arrays(section_inputs(port)),
+            self.topology.position_of_body(frame), passage.inward, Arrays(inputs),
             tuple(port.rotation.ravel().tolist()),
         )  # fmt: skip
 
@@ -243,7 +250,7 @@ def _modal_numbers(body: ModalBody, slots: HingeSlots) -> ModalNumbers:
     """Modal numbers of a flexible body given in the axes of its frame node."""
     return ModalNumbers(
         len(body.modes), slots.q, slots.u,
-        Arrays(moment_inputs(without_mass(body) if body.points else body)),
+        Arrays(moment_inputs(without_mass(body) if body.points or body.stations else body)),
         None if body.drag is None else Arrays(moment_inputs(body.drag)),
         Arrays({"stiffness": body.K, "damping": body.D}),
     )  # fmt: skip

@@ -36,7 +36,7 @@ from mstmm.scene.tables.loads import Load
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
 from ..flexible.modal_body import ModalBody
-from ..flexible.modal_parts import MassPoint, ModalPort
+from ..flexible.modal_parts import MassPoint, ModalPort, Station
 from ..kernels.prebuilt_kernels import Element
 from .coordinate_layout import OF_CONSTRAINT
 from .rigid_substitution import RigidSubstitution, scale_expression
@@ -180,15 +180,18 @@ def _frame(name: str, ends: Mapping[str, End]) -> Body:
 
 # --- flexible bodies ------------------------------------------------------------------------------
 
-HELD, POINT = "held", "point"
+HELD, POINT, STATION = "held", "point", "station"
 
 
 @dataclass(frozen=True)
 class Passage:
-    """Connection through a section of the flexible body `body`, inward to its frame or outward."""
+    """Connection through a section of the flexible body `body`, inward to its frame or outward.
+
+    A `Station` stands for the segment that leads to it.
+    """
 
     body: str
-    port: ModalPort
+    port: ModalPort | Station
     inward: bool
 
 
@@ -206,6 +209,7 @@ class ExpandedScene:
         inboard_ends: flexible body -> its end on the inboard hinge.
         rigidified: substitution of bodies that are rigid in the run; None without any.
         cuts: cut hinges and constraints that close loops.
+        load_parts: number of a load of the user -> further loads of `scene` that belong to it.
     """
 
     scene: Scene
@@ -217,6 +221,7 @@ class ExpandedScene:
     inboard_ends: dict[str, str] = field(default_factory=dict)
     rigidified: RigidSubstitution | None = None
     cuts: tuple[Cut, ...] = ()
+    load_parts: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
     def is_node(self, name: str) -> bool:
         """Whether a body of the expanded scene belongs to a flexible body."""
@@ -264,7 +269,7 @@ class _Expansion:
         fields = {name: getattr(self.scene, name) for name in type(self.scene).model_fields}
         fields |= {
             "body": tuple(self.body), "hinge": (*hinges, *self.internal), "chain": tuple(chains),
-            "load": tuple(map(self._point_load, self.scene.load)),
+            "load": self._point_loads(),
         }  # fmt: skip
         self.expanded.scene = Scene.model_construct(**fields)
         self.expanded.cuts = tuple(replace(cut, body=self._node(cut.body)) for cut in self.cuts)
@@ -296,6 +301,30 @@ class _Expansion:
         """Flexible body -> its end on the inboard hinge."""
         ends = (split_reference(self._full_reference(h.outboard)) for h in self.scene.hinge)
         return {name: end for name, end in ends if name in self.expanded.bodies}
+
+    def _point_loads(self) -> tuple[Load, ...]:
+        """Loads on nodes in the order of the user's; further parts of line loads come last."""
+        loads, parts = list[Load](), list[Load]()
+        for number, load in enumerate(self.scene.load):
+            name = split_reference(load.on)[0]
+            body = self.expanded.bodies.get(name)
+            pieces = body.line_loads.get(load.name, ()) if body is not None else ()
+            if not pieces:
+                loads.append(self._point_load(load))
+                continue
+            own = [self._station_load(load, name, *piece) for piece in pieces]
+            loads.append(own[0])
+            first = len(self.scene.load) + len(parts)
+            parts += own[1:]
+            self.expanded.load_parts[number] = tuple(range(first, first + len(own) - 1))
+        return (*loads, *parts)
+
+    def _station_load(self, load: Load, name: str, station: int, length: float) -> Load:
+        """Part of a load per length on the station of an exact beam, for a length (m) of it."""
+        force = tuple(scale_expression(entry, length) for entry in load.force_per_length or ())
+        axes = name if load.axes == "body" else load.axes
+        on = f"{name}/{STATION} {station + 1}"
+        return load.model_copy(update={"on": on, "force": force, "axes": axes})
 
     def _point_load(self, load: Load) -> Load:
         """The load on a node; a distributed one acts on the node of its weighted mean section."""
@@ -343,9 +372,11 @@ class _Expansion:
             frame = frame.model_copy(update={"ends": {inboard_end: end}})
             target = f"{name}.{inboard_end}"
         self.body.append(frame.model_copy(update={"name": name}))
+        self._add_stations(name, body)
+        segment_ends = {station.end for station in body.stations}
         for end_name, end_port in body.ports.items():
-            if end_name != inboard_end or not moves:
-                self._add_end(name, end_name, end_port)
+            if end_name not in segment_ends and (end_name != inboard_end or not moves):
+                self._add_end(name, end_name, Passage(name, end_port, inward=False), name)
         for k, point in enumerate(body.points):
             self._add_mass_point(name, k, point)
         return [
@@ -353,11 +384,12 @@ class _Expansion:
             for hinge in hinges
         ]
 
-    def _add_end(self, name: str, end: str, port: ModalPort) -> None:
+    def _add_end(self, name: str, end: str, passage: Passage, inboard: str) -> None:
+        """Add the massless node of an end, outboard of the node `inboard`."""
         node = f"{name}/{end}"
         self.body.append(Body(name="end", mass=0.0).model_copy(update={"name": node}))
-        self._add_weld(node, name, node)
-        self.expanded.passages[node] = Passage(name, port, inward=False)
+        self._add_weld(node, inboard, node)
+        self.expanded.passages[node] = passage
         self.expanded.nodes[f"{name}.{end}"] = node
         loaded = any(
             load.name == end and split_reference(load.on)[0] == name for load in self.scene.load
@@ -367,15 +399,36 @@ class _Expansion:
 
     def _add_mass_point(self, name: str, k: int, point: MassPoint) -> None:
         node = f"{name}/{POINT} {k + 1}"
-        j = point.inertia
+        self._add_slice(node, name, point)
+        self.expanded.passages[node] = Passage(name, point.port, inward=False)
+
+    def _add_stations(self, name: str, body: ModalBody) -> None:
+        """Add the chain of stations of an exact beam, and its ends."""
+        nodes: list[str] = []
+        for k, station in enumerate(body.stations):
+            inboard = nodes[station.previous] if station.previous >= 0 else name
+            passage = Passage(name, station, inward=False)
+            if station.end:
+                self._add_end(name, station.end, passage, inboard)
+                nodes.append(f"{name}/{station.end}")
+                continue
+            nodes.append(f"{name}/{STATION} {k + 1}")
+            self._add_slice(nodes[-1], inboard, station)
+            self.expanded.passages[nodes[-1]] = passage
+
+    def _add_slice(self, node: str, inboard: str, piece: MassPoint | Station) -> None:
+        """Add a node with the mass of a slice, outboard of the node `inboard`."""
+        j = piece.inertia
         entries = (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2])
         body = Body(
-            name="point", mass=float(point.mass), inertia=tuple(map(float, entries)),
+            name="point", mass=float(piece.mass), inertia=tuple(map(float, entries)),
             allow_unphysical_inertia=True,
         )  # fmt: skip
-        self.body.append(body.model_copy(update={"name": node}))
-        self._add_weld(node, name, node)
-        self.expanded.passages[node] = Passage(name, point.port, inward=False)
+        update: dict[str, object] = {"name": node}
+        if isinstance(piece, Station):
+            update["center_of_mass"] = tuple(map(float, piece.center))
+        self.body.append(body.model_copy(update=update))
+        self._add_weld(node, inboard, node)
 
     def _add_weld(self, name: str, inboard: str, outboard: str) -> None:
         weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="frame")

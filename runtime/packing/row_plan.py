@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from mstmm.graph.closure_plan import ClosurePlan, GroupClosure, plan_closures
 from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph, RowGroup
 
@@ -105,10 +107,11 @@ class FlexibleRowPlan:
         ends = [tuple(map(nodes.outer_node, group.ends)) for group in groups]
         counts = [group.count for group in groups]
         plan = plan_rows(nodes.parents, _row_groups(ends, counts))
-        inner = {row.group: row.body for row in plan.rows if nodes.is_inner(row.body)}
-        if inner:
-            for group, node in inner.items():
-                ends[group] = (*ends[group], node - 1)  # the outer node, so that it closes there
+        outer = {row.group: nodes.outer_of_inner(row.body) for row in plan.rows}
+        if any(node is not None for node in outer.values()):
+            for group, node in outer.items():
+                if node is not None:
+                    ends[group] = (*ends[group], node)  # so that it closes there
             plan = plan_rows(nodes.parents, _row_groups(ends, counts))
         self.rows_by_group, self.pairs = plan.rows_by_group, plan.pairs
         self.rows = [replace(row, body=nodes.body(row.body)) for row in plan.rows]
@@ -119,7 +122,10 @@ class FlexibleRowPlan:
 
 
 class _RowTree:
-    """Tree with two nodes for each flexible body; `parents` are the parents of the nodes."""
+    """Tree with two nodes for each flexible body; `parents` are the parents of the nodes.
+
+    Rows cannot close inside a flexible body: at its inner node, or at a station of an exact beam.
+    """
 
     def __init__(self, system: System) -> None:
         self._first, self._body = list[int](), list[int]()
@@ -127,6 +133,8 @@ class _RowTree:
         for body, flexible in enumerate(is_flexible):
             self._first.append(len(self._body))
             self._body += [body] * (2 if flexible else 1)
+        #: Station -> its flexible body.
+        self._frames = _frames_of_stations(system)
         last = [*self._first[1:], len(self._body)]
         self.parents = [self._first[body] for body in self._body]
         for body, parent in enumerate(system.parents.tolist()):
@@ -143,6 +151,24 @@ class _RowTree:
     def is_inner(self, node: int) -> bool:
         """Whether a node is the inner one of a flexible body."""
         return node != GROUND and self._first[self._body[node]] != node
+
+    def outer_of_inner(self, node: int) -> int | None:
+        """Outer node of the flexible body inside which a node is; None for other nodes."""
+        if self.is_inner(node):
+            return node - 1
+        frame = self._frames.get(self.body(node))
+        return None if frame is None else self.outer_node(frame)
+
+
+def _frames_of_stations(system: System) -> dict[int, int]:
+    """Station of an exact beam with further segments outboard of it -> its flexible body."""
+    frames: dict[int, int] = {}
+    parents = system.parents.tolist()
+    for place in np.flatnonzero(system.rows(lambda body: body.section is not None)).tolist():
+        section = system.body(place).section
+        if section is not None and section.is_segment and parents[place] != section.frame:
+            frames[parents[place]] = section.frame
+    return frames
 
 
 def _row_groups(ends: Sequence[tuple[int, ...]], counts: Sequence[int]) -> list[RowGroup]:

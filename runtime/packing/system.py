@@ -70,7 +70,7 @@ class SectionNumbers:
     Attributes:
         frame: position of the floating frame.
         inward: whether the connection leads to the frame, or from it.
-        inputs: of the kernel "section".
+        inputs: of the kernel "section", or of "segment" between stations of an exact beam.
         end: axes of the section in the undeformed body (9).
     """
 
@@ -78,6 +78,11 @@ class SectionNumbers:
     inward: bool
     inputs: Arrays
     end: Numbers
+
+    @property
+    def is_segment(self) -> bool:
+        """Whether it leads from one station of an exact beam to the next, or to an end."""
+        return "Bm" in self.inputs.named
 
 
 @dataclass(frozen=True, slots=True)

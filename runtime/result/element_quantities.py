@@ -225,24 +225,31 @@ class LoadValues(ElementValues):
     def __init__(self, acting: AppliedLoads, element: Any, number: int) -> None:
         super().__init__(acting, element)
         self._number = number
+        parts = acting.observations.engine.packed.expanded.load_parts
+        self._parts = (number, *parts.get(number, ()))
 
     def kinds(self) -> Iterator[QuantityKind]:
         has_moment = any(index >= 0 for index in self.acting.system.loads[self._number].moment)
         return (kind for kind in super().kinds() if kind.name != "moment" or has_moment)
 
     def force(self) -> Array:
-        indices = self.acting.system.loads[self._number].force
-        return inertial_components(self.acting, self._number, indices)
+        return np.sum([self._components("force", part) for part in self._parts], axis=0)
 
     def moment(self) -> Array:
-        indices = self.acting.system.loads[self._number].moment
-        return inertial_components(self.acting, self._number, indices)
+        return np.sum([self._components("moment", part) for part in self._parts], axis=0)
 
     def power(self) -> Array:
-        points = self.acting.load(self._number)[0]
+        return np.sum([self._power(part) for part in self._parts], axis=0)
+
+    def _components(self, name: str, part: int) -> Array:
+        return inertial_components(self.acting, part, getattr(self.acting.system.loads[part], name))
+
+    def _power(self, part: int) -> Array:
+        points = self.acting.load(part)[0]
         velocity, spin = (points[:, POINT_COLUMNS[k]] for k in ("velocity", "angular_velocity"))
-        force_power = np.einsum("ni,ni->n", self.force(), velocity)
-        return np.asarray(force_power + np.einsum("ni,ni->n", self.moment(), spin))
+        force_power = np.einsum("ni,ni->n", self._components("force", part), velocity)
+        moment_power = np.einsum("ni,ni->n", self._components("moment", part), spin)
+        return np.asarray(force_power + moment_power)
 
 
 def inertial_components(acting: AppliedLoads, number: int, indices: tuple[int, ...]) -> Array:

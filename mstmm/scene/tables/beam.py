@@ -29,7 +29,11 @@ from .flexible_keys import AUTO, FlexibleTable, frame_field, or_auto
 from .shape_functions import shape_problem
 
 GIVEN = "given"
-BASES = (AUTO, "clamped-free", "free-free", "simply-supported", "static+fixed-interface", GIVEN)
+#: Bases of shapes of second-order beams, and of strains of exact beams.
+SHAPE_BASES = ("clamped-free", "free-free", "simply-supported", "static+fixed-interface", GIVEN)
+STRAIN_BASES = ("modes", "legendre")
+BASES = (AUTO, *SHAPE_BASES, *STRAIN_BASES)
+SECOND_ORDER, EXACT = "second-order", "exact"
 ROOT, TIP = "root", "tip"
 
 #: Directions of the shapes in the order of the modal coordinates: deflection along y, along z,
@@ -211,7 +215,7 @@ _ENDS = texts.ends_rule(
 
 
 class Beam(FlexibleTable, SectionTable):
-    """Euler-Bernoulli beam.
+    """Euler-Bernoulli beam, to second order in its slopes or with exact kinematics.
 
     `modes` and `quadrature` are None for "auto".  `ends` also contains "root" and "tip".  Keys that
     are left out in an entry of `section` have the value of the beam; `sections` are the completed
@@ -222,6 +226,7 @@ class Beam(FlexibleTable, SectionTable):
     section: tuple[Section, ...] = ()
     modes: Annotated[Modes | None, _MODES] = None
     frame: Annotated[str, frame_field(AUTO, "tangent", "chord", "mean", at_end=True)] = AUTO
+    kinematics: Annotated[str, texts.choice_rule(SECOND_ORDER, EXACT)] = SECOND_ORDER
     basis: Annotated[str, texts.choice_rule(*BASES)] = AUTO
     shapes: Shapes | None = None
     quadrature: Annotated[bool | None, or_auto(texts.flag_rule())] = None
@@ -310,6 +315,7 @@ def _beam_problems(beam: Beam) -> Iterator[Problem]:
         yield from _polar_inertia_problems(beam)
         yield from _magnitude_problems(beam)
     yield from _shape_problems(beam)
+    yield from _kinematics_problems(beam)
     yield from _end_problems(beam)
     yield from _list_problems(beam)
 
@@ -458,6 +464,41 @@ def _ratio_problems(beam: Beam) -> Iterator[Problem]:
                     "rounding; model the light part as a separate beam",
                 )
                 return
+
+
+#: Keys without meaning for exact beams -> the value that they may have, and why.
+_KEYS_OF_SECOND_ORDER: dict[str, tuple[object, str]] = {
+    "frame": (AUTO, "its frame is the section at the inboard hinge"),
+    "shapes": (None, "its shapes are strains"),
+    "quadrature": (None, "its mass is always in points"),
+    "stiffening": (True, "its kinematics includes every order"),
+    "viscous_drag": (0.0, "drag acts only on second-order beams"),
+}
+
+
+def _kinematics_problems(beam: Beam) -> Iterator[Problem]:
+    """Problems of keys that the kinematics of a beam do not have."""
+    if beam.kinematics != EXACT:
+        if beam.basis in STRAIN_BASES:
+            yield (
+                ("basis",),
+                f'"{beam.basis}" is a basis of strains; write kinematics = "exact", or choose '
+                f"another basis: {', '.join(SHAPE_BASES)}",
+            )
+        return
+    for key, (allowed, reason) in _KEYS_OF_SECOND_ORDER.items():
+        if getattr(beam, key) != allowed:
+            yield (key,), f"an exact beam has no {key}: {reason}; leave it out"
+    if beam.basis in SHAPE_BASES:
+        yield (
+            ("basis",),
+            f'expected "auto", "modes" or "legendre" for an exact beam, found "{beam.basis}"',
+        )
+    if beam.model == "one-way":
+        yield (
+            ("model",),
+            'expected "flexible" or "rigid": the one-way response is linear; leave out kinematics',
+        )
 
 
 def _shape_problems(beam: Beam) -> Iterator[Problem]:

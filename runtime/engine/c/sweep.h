@@ -29,11 +29,14 @@ typedef struct {
     int64_t tangent; /* of its numbers in those of the tangent */
 } mstmm_modal;
 
-/* A section of a flexible body, and the direction in which it is passed. */
-typedef struct {
+/* A section of a flexible body, and the direction in which it is passed.  A segment of an exact
+ * beam, which leads from one station to the next, has `rest` and `shapes` in place of fields. */
+typedef struct mstmm_section {
     mstmm_modal *modal;
     int inward; /* 1: from the inboard section to the floating frame; 0: outboard, to an end */
     const real *point, *phi, *theta, *drawn[3], *turned[3], *end; /* g and h of second order */
+    const real *rest, *shapes; /* see derive/flexible/segment.py; NULL: no segment */
+    const struct mstmm_section *before; /* that of the station before; NULL: the first segment */
     int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
     int64_t tangent; /* of its numbers in those of the tangent */
 } mstmm_section;

@@ -10,7 +10,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.scene.tables.beam import Modes
+from mstmm.scene.tables.beam import AUTO, EXACT, ROOT, Modes
 from mstmm.scene.tables.loads import Load
 
 from ..mass_definiteness import Support, Supports, is_definite_with_first_shape, is_mass_definite
@@ -27,6 +27,7 @@ from .automatic_choices import (
 from .beam_data import BeamData, beam_data
 from .beam_integrals import drag_moments, mass_moments, mass_points, stiffness
 from .boundary_conditions import BeamEnvironment, BoundaryConditions, boundary_conditions
+from .exact_beam import LEGENDRE, STRAIN_MODES, ExactBeamSetting, exact_beam_body
 from .frame_conditions import modes_in_frame
 from .planar_motion import PlanarMotionCheck
 from .section_ports import BeamShapes
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 
 #: What determines the body of a beam.
 _Source = tuple["Beam", BeamData, BoundaryConditions, Support, frozenset[str]]
+#: Default numbers of strain shapes of an exact beam, per bending plane and of twist.
+DEFAULT_BENDING_COUNT, DEFAULT_TWIST_COUNT = 3, 2
 #: Largest number of bodies kept, for equal beams of this and of later scenes.
 _MAX_CACHED_BODIES = 64
 
@@ -56,6 +59,8 @@ class BeamBodies:
     def body(self, beam: Beam) -> ModalBody:
         """Modal body of one beam.  Raises SceneError for linearly dependent shapes."""
         data = beam_data(beam)
+        if beam.kinematics == EXACT:
+            return self._exact_body(beam, data)
         conditions = boundary_conditions(self._environment, beam, data)
         idle = self._idle_directions(beam)
         support = self._supports.support_of(beam.name)
@@ -73,12 +78,60 @@ class BeamBodies:
         messages = tuple(f'beam "{beam.name}": {text}' for text in body.warnings)
         return replace(body, name=beam.name, ports={**body.ports, **spans}, warnings=messages)
 
+    def _exact_body(self, beam: Beam, data: BeamData) -> ModalBody:
+        hinge = self._environment.inboard_hinges[beam.name]
+        inboard_end = hinge.outboard_end or ROOT
+        spans = {
+            load.name: _span(load, data.length)
+            for _, load in self._environment.load_elements.get(beam.name, ())
+            if isinstance(load, Load) and load.force_per_length is not None
+        }
+        setting = ExactBeamSetting(
+            data, dict(zip(DIRECTIONS, self.modes(beam).counts, strict=True)),
+            self._exact_basis(beam), self._supports.support_of(beam.name), inboard_end,
+            {end: self._supports.hanging_inertia(beam.name, end) for end in data.ends}, spans,
+        )  # fmt: skip
+        what = f'beam "{beam.name}"'
+        body = checked_result(what, lambda: exact_beam_body(beam, setting))
+        blocks = _name_blocks(body.modes)
+        eta, etad = _initial_modal_state(beam, body.modes)
+        d = damping(body.Mff, body.K, beam.damping.ratio, beam.damping.stiffness, blocks, beam.name)
+        return replace(body, D=d, eta=eta, etad=etad)
+
+    def _exact_basis(self, beam: Beam) -> str:
+        """Basis of an exact beam; "auto" is Legendre where an end carries a load of its own."""
+        if beam.basis != AUTO:
+            return beam.basis
+        environment = self._environment
+        acting = environment.load_elements.get(beam.name, ())
+        is_loaded = any(getattr(element, "force_per_length", None) is None for _, element in acting)
+        closes = any(
+            environment.inboard_hinges.get(hinge.outboard_body) is not hinge
+            for hinge in environment.outboard_hinges.get(beam.name, ())
+        )
+        is_loaded = is_loaded or closes or beam.name in environment.cut_hinges
+        return LEGENDRE if is_loaded else STRAIN_MODES
+
     def modes(self, beam: Beam) -> Modes:
         """Number of shapes of a beam by direction, also where the scene leaves it open."""
+        if beam.kinematics == EXACT:
+            return self._exact_modes(beam)
         data = beam_data(beam)
         conditions = boundary_conditions(self._environment, beam, data)
         chosen = direction_choices(beam, data, conditions, self._idle_directions(beam))
         return Modes(**{choice.direction: choice.count for choice in chosen})
+
+    def _exact_modes(self, beam: Beam) -> Modes:
+        """Three shapes in each plane that the beam can leave, and two of twist where it can."""
+        if beam.modes is not None:
+            return beam.modes
+        idle = self._idle_directions(beam)
+        counts = {d: 0 if d in idle else DEFAULT_BENDING_COUNT for d in BENDING}
+        section = beam.sections[0]
+        can_twist = None not in (section.torsional_stiffness, section.polar_inertia_per_length)
+        if can_twist and all(counts.values()):
+            counts["twist"] = DEFAULT_TWIST_COUNT
+        return Modes(**counts)
 
     def _idle_directions(self, beam: Beam) -> frozenset[str]:
         """Directions without load and without buckling before another one, for modes = "auto"."""
@@ -188,7 +241,7 @@ def _body_of_choices(
         name=beam.name,
         modes=names,
         K=k,
-        D=damping(mass, k, ratio, beam.damping.stiffness, _direction_blocks(modes), beam.name),
+        D=damping(mass, k, ratio, beam.damping.stiffness, _name_blocks(names), beam.name),
         ports={name: shapes_all.section(x, rotation) for name, (x, rotation) in data.ends.items()},
         drag=drag_moments(shapes_all),
         eta=eta,
@@ -244,9 +297,9 @@ def damping(
     return d
 
 
-def _direction_blocks(modes: list[Mode]) -> list[list[int]]:
-    """Indices of the modes by direction."""
-    blocks = ([i for i, m in enumerate(modes) if m.direction == d] for d in DIRECTIONS)
+def _name_blocks(names: tuple[str, ...]) -> list[list[int]]:
+    """Indices of the modes by direction, from their names."""
+    blocks = ([i for i, name in enumerate(names) if name.startswith(d)] for d in DIRECTIONS)
     return [block for block in blocks if block]
 
 

@@ -84,7 +84,8 @@ class BodyRecords:
         if body.modal is not None:
             record.modal = self.modal.add_modal(place, body.modal)
         if body.section is not None:
-            record.section = self.modal.add_section(place, body.section)
+            parent = int(self.system.parents[place])
+            record.section = self.modal.add_section(place, parent, body.section)
 
     def _fill_numbers(self, record: Any, body: BodyNumbers) -> None:
         """Write the numbers of a body side by side in memory."""
@@ -209,19 +210,25 @@ class ModalRecords:
         self._modal[place] = record
         return record
 
-    def add_section(self, place: int, section: SectionNumbers) -> Any:
-        """Create the `mstmm_section *` in the connection of the body at position `place`."""
+    def add_section(self, place: int, parent: int, section: SectionNumbers) -> Any:
+        """Create the `mstmm_section *` between the bodies at positions `parent` and `place`."""
         record, array = self.memory.new("mstmm_section *"), self.memory.array
         modal = self._modal[section.frame]
         record.modal, record.inward = modal, int(section.inward)
         inputs = section.inputs.named
-        record.point, record.end = array(inputs["r"]), self.memory.reals(section.end)
+        record.end = self.memory.reals(section.end)
+        self.sections[place] = self._reserve(self.lib.mstmm_section_numbers(modal.n))
+        self._sections[place] = record
+        if section.is_segment:
+            record.rest, record.shapes = array(inputs["b"]), array(inputs["Bm"])
+            if parent != section.frame:
+                record.before = self._sections[parent]
+            return record
+        record.point = array(inputs["r"])
         record.phi, record.theta = array(inputs["phi"]), array(inputs["theta"])
         for k, axis in enumerate(_AXES):
             record.drawn[k] = array(inputs[f"g_{axis}"])
             record.turned[k] = array(inputs[f"h_{axis}"])
-        self.sections[place] = self._reserve(self.lib.mstmm_section_numbers(modal.n))
-        self._sections[place] = record
         return record
 
     def shift_offsets(self, first: int) -> int:

@@ -256,12 +256,13 @@ class _LoopWriter:
     def _pending_records(self, body: int, rows: list[int]) -> Any:
         """Records of the rows that pass the inboard hinge of a body."""
         records = self.pools["mstmm_pending"].next_records(len(rows))
-        speeds = self.system.body(body).nu
+        numbers = self.system.body(body)
+        speeds, flexible_body = numbers.nu, numbers.section.frame if numbers.section else -1
         for k, row in enumerate(rows):
             records[k].row = row
             records[k].column = self.columns[body, row]
             records[k].onward = self._column(self.parents[body], row)
-            records[k].modes = self.modes.get((self.parents[body], row), 0)
+            records[k].modes = self.modes.get((flexible_body, row), 0)
             records[k].y = self._reserve(speeds)
             records[k].tau = self.coupled.get((body, row), -1)
             records[k].pairs = self._entries(row, rows[: k + 1])

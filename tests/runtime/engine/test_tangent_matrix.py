@@ -67,7 +67,10 @@ def worst(found: Array, expected: Array) -> float:
 
 
 def check_direction(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
-    _, tangent = model_and_tangent(scene)
+    check_tangent_direction(model_and_tangent(scene)[1], q, u, rng)
+
+
+def check_tangent_direction(tangent: TangentMatrix, q: Array, u: Array, rng: Generator) -> None:
     a = rng.normal(size=tangent.nu)
     direction: tuple[Any, ...] = (
         1.0,
@@ -100,7 +103,10 @@ def dense(tangent: TangentMatrix, step: float) -> tuple[Array, Any]:
 
 
 def check_solution(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
-    _, tangent = model_and_tangent(scene)
+    check_tangent_solution(model_and_tangent(scene)[1], q, u, rng)
+
+
+def check_tangent_solution(tangent: TangentMatrix, q: Array, u: Array, rng: Generator) -> None:
     tangent.residual(TIME, q, u, rng.normal(size=tangent.nu))
     matrix, rows = dense(tangent, factor_tangent(tangent))
     right, expected = rng.normal(size=tangent.nu), np.zeros(tangent.nu)
