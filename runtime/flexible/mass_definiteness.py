@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.scene.checks.flexible_bodies import free_axes
 from mstmm.scene.checks.topology import inboard_hinges_by_body
-from mstmm.scene.tables.beam import ROOT
+from mstmm.scene.tables.beam import ROOT, Beam
 from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND
 
@@ -29,7 +29,6 @@ from .modal_parts import chunk_slices
 
 if TYPE_CHECKING:
     from mstmm.scene import Body, Hinge, Scene
-    from mstmm.scene.tables.beam import Beam
 
     from .modal_body import ModalBody
     from .modal_parts import ModalPort
@@ -127,17 +126,15 @@ class Supports:
     ) -> Array:
         """Inertia (6, 6) outboard of a hinge at an end with that pose, about the pose's origin."""
         name = hinge.outboard_body
-        body, beam = self._bodies.get(name), self._beams.get(name)
-        if body is None and beam is None:
+        carrier = self._bodies.get(name) or self._beams.get(name)
+        if carrier is None:
             return np.zeros((6, 6))
-        inertia = np.zeros((6, 6)) if body is None else _spatial_inertia(body)
-        if beam is not None:
-            inertia = _rod_inertia(beam)
+        inertia = _rod_inertia(carrier) if isinstance(carrier, Beam) else _spatial_inertia(carrier)
         for other in self._outboard_hinges.get(name, ()):
             if followed < _MAX_BODIES:
-                pose = _end_pose(beam or body, other.inboard_end)
+                pose = _end_pose(carrier, other.inboard_end)
                 inertia += self._inertia_behind(other, pose, followed + 1)
-        back = _twist_at_origin(*_end_pose(beam or body, hinge.outboard_end))
+        back = _twist_at_origin(*_end_pose(carrier, hinge.outboard_end))
         inertia = back.T @ inertia @ back
         free = self._free_motions(hinge)
         if free is not None and free.shape[1]:

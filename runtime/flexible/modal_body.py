@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from mstmm.ir.element_spec import builtin_kernel
 
 from .beam.section_ports import BeamShapes
 from .modal_parts import MassPoint, ModalPort, Moments, Station, Truncation
+
+if TYPE_CHECKING:
+    from .beam.exact_sections import ExactSections
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,8 @@ class ModalBody(Moments):
     each comes after the one before it on its way from the supported section) the mass sits in them
     and the moments, of first order in eta, are not used for the motion.
     `drag` are the moments of the viscous drag per length (N s/m^2 in place of kg/m; motion of the
-    axis only), None without drag.  `line_loads` of an exact beam give for each load per length the
+    axis only), None without drag.  `shapes` are those of a second-order beam, `exact` the strain
+    shapes of an exact one.  `line_loads` of an exact beam give for each load per length the
     stations on which it acts and the length (m) that each of them stands for.  `resolved` is the
     highest frequency (rad/s) that the shapes of an elastic body resolve, `truncation` their
     truncation error in deflections; both None for beams.  `frame` is the kind of floating frame:
@@ -61,6 +65,7 @@ class ModalBody(Moments):
     ports: Mapping[str, ModalPort]
     points: tuple[MassPoint, ...] = ()
     stations: tuple[Station, ...] = ()
+    exact: ExactSections | None = None
     line_loads: Mapping[str, tuple[tuple[int, float], ...]] = field(default_factory=dict)
     drag: Moments | None = None
     eta: Array = field(default_factory=lambda: np.zeros(0))
@@ -78,6 +83,11 @@ class ModalBody(Moments):
     def n(self) -> int:
         """Number of modes."""
         return len(self.modes)
+
+    @property
+    def has_axis(self) -> bool:
+        """Whether it is a beam, with sections along an axis."""
+        return self.shapes is not None or self.exact is not None
 
     @property
     def Mff(self) -> Array:

@@ -215,7 +215,7 @@ class Quantities:
         """Kinds of a body or of one of its ends that methods of `Result` compute."""
         flexible = self._flexible.model.flexible_bodies.get(body)
         if end:
-            has_axis = flexible is not None and flexible.shapes is not None
+            has_axis = flexible is not None and flexible.has_axis
             yield from END_QUANTITIES.values() if has_axis else ()
             return
         for kind in MASS_QUANTITIES.values():

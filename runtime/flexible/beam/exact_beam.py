@@ -23,6 +23,7 @@ from ..mass_definiteness import Support
 from ..modal_body import ModalBody
 from ..modal_parts import ModalPort, Moments, Station
 from .beam_data import BeamData
+from .exact_sections import ExactSections
 from .strain_shapes import STRAIN_ROWS, Chain, StrainShapes, gauss_sections, legendre_shapes
 
 if TYPE_CHECKING:
@@ -84,6 +85,7 @@ def exact_beam_body(beam: Beam, setting: ExactBeamSetting) -> ModalBody:
     return ModalBody(
         **vars(moments), name=beam.name, modes=shapes.names, K=stiffness,
         D=np.zeros_like(stiffness), ports=_ports(setting, chain), stations=stations,
+        exact=ExactSections(setting.data, chain),
         line_loads=_line_loads(setting, stations, lengths), frame="tangent",
         notes=_notes(setting),
     )  # fmt: skip

@@ -10,7 +10,8 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.scene.tables.beam import AUTO, EXACT, ROOT, Modes
+from mstmm.scene.tables.beam import EXACT, ROOT, Modes
+from mstmm.scene.tables.flexible_keys import AUTO
 from mstmm.scene.tables.loads import Load
 
 from ..mass_definiteness import Support, Supports, is_definite_with_first_shape, is_mass_definite

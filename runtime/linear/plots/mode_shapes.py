@@ -167,7 +167,7 @@ class _SceneObservation:
         """Lines (n, m, 3) of bodies, and lines from inboard to outboard ends of hinges."""
         for name in self.names:
             flexible = self.model.flexible_bodies.get(name)
-            if flexible is not None and flexible.shapes is not None:
+            if flexible is not None and flexible.has_axis:
                 yield self._axis(name)
             else:
                 yield from self._star(name)
@@ -197,7 +197,7 @@ class _SceneObservation:
         eta = self.q[:, self.model.coordinate_layout.modal[name].q_slice]
         frame = pose[:, 0:3], pose[:, 15:24].reshape(-1, 3, 3)
         motion = still_motion(body, np.zeros(len(eta)), eta, *frame)
-        return observe.deflected_axis(motion, np.linspace(0.0, motion.shapes.length, _FINE))
+        return observe.deflected_axis(motion, np.linspace(0.0, motion.length, _FINE))
 
     def springs(self) -> Iterator[Array]:
         """Lines (n, 2, 3) of springs and bushings."""

@@ -123,7 +123,8 @@ def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
     lengths = {name: line.length for name, line in beam_lines(flexible.model.scene).items()}
     return tuple(
         _model_range(flexible, name, shares.get(name), lengths.get(name))
-        for name in flexible.modal_bodies
+        for name, body in flexible.modal_bodies.items()
+        if body.exact is None
     )
 
 

@@ -23,6 +23,7 @@ from .motion import Motion, tilde
 
 if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
+    from ...flexible.modal_parts import MassPoint, Station
     from .motion import Motion
     from .section_loads import FlexibleBodies
 
@@ -138,24 +139,31 @@ class Momenta:
 
     def _flexible_momentum(self, name: str) -> Momentum:
         motion = self.flexible.motion(name)
-        if motion.body.points:
+        if motion.body.points or motion.body.stations:
             return self._point_momentum(motion)
         linear, about_origin, first = frame_momentum(motion)
         return equivalent_momentum(motion, linear, about_origin, first / motion.body.mass)
 
     def _point_momentum(self, motion: Motion) -> Momentum:
-        """Momentum of a body with mass points, summed over the points."""
-        name, parts = motion.body.name, []
-        for k in range(len(motion.body.points)):
-            parts.append(self._rigid_momentum(f"{name}/point {k + 1}"))
+        """Momentum of a body with mass points or stations, summed over them."""
+        name = motion.body.name
+        slices: dict[str, MassPoint | Station] = {
+            f"{name}/point {k}": piece for k, piece in enumerate(motion.body.points, 1)
+        }
+        slices |= {
+            f"{name}/station {k}": piece
+            for k, piece in enumerate(motion.body.stations, 1)
+            if piece.mass
+        }
+        parts = [self._rigid_momentum(node) for node in slices]
         linear = np.sum([part.linear for part in parts], axis=0)
         angular = np.sum([part.angular for part in parts], axis=0)
         first = np.zeros_like(linear)
-        for part, point in zip(parts, motion.body.points, strict=True):
+        for part, point in zip(parts, slices.values(), strict=True):
             arm = part.center - motion.position
             angular = angular + np.cross(arm, part.linear)
             first += point.mass * arm
-        center = first / sum(point.mass for point in motion.body.points)
+        center = first / sum(point.mass for point in slices.values())
         inward = motion.inward
         return equivalent_momentum(motion, inward(linear), inward(angular), inward(center))
 

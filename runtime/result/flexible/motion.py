@@ -19,6 +19,7 @@ from mstmm.array_validation import Array, finite_array
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
+    from ...flexible.beam.exact_sections import ExactSections
     from ...flexible.beam.section_ports import BeamShapes
     from ...flexible.beam.shape_fields import ShapeValues
     from ...flexible.modal_body import ModalBody
@@ -73,6 +74,11 @@ class Motion:
         """Shape functions along the axis of a beam; SceneError for a body without any."""
         return shapes_of(self.body, "a quantity along its axis")
 
+    @property
+    def length(self) -> float:
+        """Length of a beam, m."""
+        return axis_of(self.body, "a quantity along its axis").length
+
     # --- floating frame in its own axes ---------------------------------------------------------
 
     def inward(self, vectors: Array) -> Array:
@@ -107,19 +113,29 @@ class Motion:
 # --- sections along a beam ------------------------------------------------------------------------
 
 
-def shapes_of(body: ModalBody, what: str) -> BeamShapes:
-    """Shape functions of a beam along its axis; SceneError for a body without an axis."""
-    if body.shapes is None:
+def axis_of(body: ModalBody, what: str) -> BeamShapes | ExactSections:
+    """Sections along the axis of a beam; SceneError for a body without an axis."""
+    axis = body.exact or body.shapes
+    if axis is None:
         raise SceneError(
             f'"{body.name}": {what} exists along beams only; for this elastic body use '
             "the position of its ends and modal_energy"
         )
+    return axis
+
+
+def shapes_of(body: ModalBody, what: str) -> BeamShapes:
+    """Shape functions of a second-order beam; SceneError for other bodies."""
+    if body.exact is not None:
+        raise SceneError(f'"{body.name}": {what} exists for second-order beams only')
+    axis_of(body, what)
+    assert body.shapes is not None
     return body.shapes
 
 
 def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
     """Positions x in m as (m,); SceneError for a position off the beam or not a number."""
-    length = float(shapes_of(body, what).length)
+    length = float(axis_of(body, what).length)
     positions = np.atleast_1d(finite_array(f'{what} of "{body.name}": x', x))
     if positions.ndim != 1:
         raise SceneError(f"{what}: x has shape {positions.shape}, expected one number or (m,)")
@@ -152,6 +168,8 @@ def _cached_values(shapes: BeamShapes, positions: bytes) -> ShapeValues:
 
 def deflection(motion: Motion, positions: Array) -> Array:
     """Elastic displacement (n, m, 3) in m of the axis at x, frame axes, second order included."""
+    if motion.body.exact is not None:
+        return local_axis(motion, positions) - axis_at_rest(motion, positions)
     first = first_order_field(values_at(motion.shapes, positions).phi, motion.eta)
     return first - 0.5 * second_order_motion(motion, positions, "eta", "eta")[..., :3]
 
@@ -163,6 +181,13 @@ def rotation_vectors(motion: Motion, positions: Array) -> Array:
     """
     first = first_order_field(values_at(motion.shapes, positions).theta, motion.eta)
     return first - 0.5 * second_order_motion(motion, positions, "eta", "eta")[..., 3:]
+
+
+def section_rotation_matrices(motion: Motion, positions: Array) -> Array:
+    """Rotations (n, m, 3, 3) of the sections at x, section axes to frame axes."""
+    if motion.body.exact is not None:
+        return motion.body.exact.poses(motion.eta, positions)[0]
+    return section_rotations(rotation_vectors(motion, positions))
 
 
 def first_order_field(field: Array, modal: Array) -> Array:
@@ -186,23 +211,54 @@ def second_order_motion(
 
 
 def slope(motion: Motion, positions: Array) -> Array:
-    """Slopes (n, m, 2) of the axis, v' and w', relative to the frame's x axis."""
+    """Slopes (n, m, 2) of the axis, v' and w', relative to the frame's x axis.
+
+    Of an exact beam they are the components of the section's normal along y and z: sines.
+    """
+    if motion.body.exact is not None:
+        return section_rotation_matrices(motion, positions)[:, :, 1:, 0]
     rotation = rotation_vectors(motion, positions)
     return np.stack([rotation[:, :, 2], -rotation[:, :, 1]], axis=2)
 
 
 def curvature(motion: Motion, positions: Array) -> Array:
     """Curvature (n, m, 2) in 1/m about y, -w'', and about z, v''."""
+    if motion.body.exact is not None:
+        return motion.body.exact.strains(motion.eta, positions)[..., 4:]
     curvature_of_modes = values_at(motion.shapes, positions).curvature[:, 1:]
     return np.einsum("mak,tk->tma", curvature_of_modes, motion.eta)
 
 
+def strain(motion: Motion, positions: Array) -> Array:
+    """Strains (n, m, 6) of an exact beam beyond those at rest; SceneError for other bodies."""
+    if motion.body.exact is None:
+        raise SceneError(
+            f'"{motion.body.name}": strain exists for beams with kinematics = "exact" only; '
+            "use curvature"
+        )
+    return motion.body.exact.strains(motion.eta, positions)
+
+
 def deflected_axis(motion: Motion, positions: Array) -> Array:
     """Inertial positions (n, m, 3) in m of the deflected axis."""
+    local = local_axis(motion, positions)
+    return motion.position[:, None, :] + motion.outward(local)
+
+
+def axis_at_rest(motion: Motion, positions: Array) -> Array:
+    """Positions (m, 3) in m of the axis at rest, frame axes."""
+    if motion.body.exact is not None:
+        return motion.body.exact.poses(np.zeros((1, motion.body.n)), positions)[1][0]
     at_rest = np.zeros((len(positions), 3))
     at_rest[:, 0] = positions
-    local = at_rest + deflection(motion, positions)
-    return motion.position[:, None, :] + motion.outward(local)
+    return at_rest
+
+
+def local_axis(motion: Motion, positions: Array) -> Array:
+    """Positions (n, m, 3) in m of the deflected axis, frame axes."""
+    if motion.body.exact is not None:
+        return motion.body.exact.poses(motion.eta, positions)[1]
+    return axis_at_rest(motion, positions) + deflection(motion, positions)
 
 
 def section_rotations(turned: Array) -> Array:
@@ -227,15 +283,19 @@ def tilde(v: Array) -> Array:
 
 def elastic_moment(motion: Motion, positions: Array) -> Array:
     """Bending moments (n, m, 2) in N*m of the curvature of the shapes, about y and about z."""
-    sections = motion.shapes.sections(positions)
+    sections = axis_of(motion.body, "bending_moment").sections(positions)
     stiffness = np.stack([sections.EI_y, sections.EI_z], axis=1)
     return curvature(motion, positions) * stiffness
 
 
 def elastic_force(motion: Motion, positions: Array) -> Array:
     """Axial force (n, m), EA s' in N, of the axial shapes; SceneError for a beam without them."""
-    values = values_at(motion.shapes, positions)
-    if not values.axial_strain.any():
+    exact = motion.body.exact
+    if exact is not None and "axial" in exact.shapes.coefficients:
+        stretch = exact.strains(motion.eta, positions)[..., 0]
+        return np.asarray(stretch * exact.sections(positions).EA)
+    values = None if exact is not None else values_at(motion.shapes, positions)
+    if values is None or not values.axial_strain.any():
         raise SceneError(
             f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
             'use source = "equilibrium"'

@@ -15,6 +15,7 @@ from . import momentum
 from . import motion as observe
 from .momentum import Momenta
 from .section_loads import FlexibleBodies, section_loads
+from .station_loads import station_loads
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -59,12 +60,13 @@ class FlexibleResults:
 
     @staticmethod
     def _end_position(motion: Motion, end: str, what: str) -> float:
-        observe.shapes_of(motion.body, what)
+        observe.axis_of(motion.body, what)
         port = motion.body.ports.get(end)
         if port is None:
             known = ", ".join(motion.body.ports)
             raise SceneError(f'{what}: "{motion.body.name}" has no end "{end}"; it has {known}')
-        return float(port.position[0])
+        exact = motion.body.exact
+        return float(port.position[0] if exact is None else exact.data.ends[end][0])
 
     # --- along beams ----------------------------------------------------------------------------
 
@@ -85,6 +87,13 @@ class FlexibleResults:
     def curvature(self, body: str, x: ArrayLike | str) -> Array:
         """Curvature (n, 2) in 1/m at x about y, -w'', and about z, v''."""
         return self._evaluate_along(body, x, "curvature", observe.curvature)
+
+    def strain(self, body: str, x: ArrayLike | str) -> Array:
+        """Strains (n, 6) of an exact beam at x beyond those at rest, section axes.
+
+        Stretch and shear along y and z (m/m), twist rate and curvature about y and z (rad/m).
+        """
+        return self._evaluate_along(body, x, "strain", observe.strain)
 
     def section_force(self, body: str, x: ArrayLike | str) -> Array:
         """Section force (n, 3) in N at x, section axes, from equilibrium.
@@ -130,6 +139,8 @@ class FlexibleResults:
                 "balance its vibration, so that section loads do not follow from equilibrium; use "
                 'source = "shapes" of bending_moment and axial_force, or model = "flexible"'
             )
+        if motion.body.exact is not None:
+            return station_loads(self._flexible, motion, positions)
         return section_loads(
             motion, positions, flexible.gravity, flexible.inboard_position(name),
             flexible.point_loads(name), flexible.line_loads(name),
@@ -140,7 +151,7 @@ class FlexibleResults:
         if points < 2:
             raise SceneError(f"shape: points = {points}: expected 2 or more")
         motion = self._flexible.motion(body, "shape")
-        length = observe.shapes_of(motion.body, "shape").length
+        length = observe.axis_of(motion.body, "shape").length
         return observe.deflected_axis(motion, np.linspace(0.0, length, points))
 
     # --- of a flexible body ---------------------------------------------------------------------

@@ -284,10 +284,9 @@ def _strip_panel(result: Record, bodies: list[str] | None) -> ShapePanel:
 def _body_strip(result: Record, name: str, some: NDArray[np.int64]) -> Strip:
     motion = result._flexible.motion(name).select_samples(some)
     body = motion.body
-    if body.shapes is not None:
-        x = np.linspace(0.0, body.shapes.length, _STATION_COUNT)
-        local = np.zeros((len(x), 3))
-        local[:, 0] = x
+    if body.has_axis:
+        x = np.linspace(0.0, motion.length, _STATION_COUNT)
+        local = observe.axis_at_rest(motion, x)
         deflected = observe.deflected_axis(motion, x)
     else:
         local = np.array([port.position for port in body.ports.values()])
@@ -309,7 +308,7 @@ def _rigid_lines(result: Record, some: NDArray[np.int64]) -> list[Array]:
 
 def _draw_body_deflections(result: Record, name: str, figure: Any, axis: Any) -> None:
     motion = result._flexible.motion(name).select_samples(_drawn_samples(result))
-    length = observe.shapes_of(motion.body, "deflection").length
+    length = motion.length
     x = np.linspace(0.0, length, _STATION_COUNT)
     displacement = observe.deflection(motion, x)
     k = 1 + int(np.argmax(np.abs(displacement[:, :, 1:]).max(axis=(0, 1))))

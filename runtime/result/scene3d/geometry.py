@@ -142,7 +142,7 @@ def beam_tube(
 ) -> DeformingSurface:
     """Surface of a beam in bending and twist, with unscaled deflections."""
     motion = motion_at(run, name, when, poses)
-    length = float(motion.shapes.length)
+    length = float(motion.length)
     x = np.linspace(0.0, length, _STATION_COUNT)
     radius = np.pad(_section_radii(motion, x, length, size), 1, mode="edge")
     radius = np.pad(radius, 1)  # discs close its ends, with sharp rims
@@ -150,8 +150,8 @@ def beam_tube(
     angles = 2 * np.pi * np.arange(_TUBE_CORNERS) / _TUBE_CORNERS
     circle = np.stack([np.zeros(_TUBE_CORNERS), np.cos(angles), np.sin(angles)], axis=1)
     rings = radius[:, None, None] * circle
-    sections = observed.section_rotations(observed.rotation_vectors(motion, x))
-    axis = np.column_stack([x, 0 * x, 0 * x]) + observed.deflection(motion, x)
+    sections = observed.section_rotation_matrices(motion, x)
+    axis = observed.local_axis(motion, x)
     local = axis[:, :, None] + np.einsum("fmij,maj->fmai", sections, rings)
     inertial = poses.position[:, None] + motion.outward(local.reshape(len(local), -1, 3))
     return DeformingSurface(f"beams/{name}", inertial, tube_faces(len(x), _TUBE_CORNERS), colour)
@@ -204,7 +204,7 @@ def _section_radii(shown: observed.Motion, x: Array, length: float, size: float)
 
     EI / EA = r^2 / 4.
     """
-    sections = shown.shapes.sections(x)
+    sections = observed.axis_of(shown.body, "view").sections(x)
     usual_radius = bar_radius(length, size)
     stretch, bend = np.asarray(sections.EA), np.maximum(sections.EI_y, sections.EI_z)
     with np.errstate(divide="ignore", invalid="ignore"):

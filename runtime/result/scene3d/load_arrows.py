@@ -81,7 +81,7 @@ class LoadArrows:
 
     def _points_along(self, load: Load, pose: Poses) -> list[Array]:
         motion = motion_at(self.run, split_reference(load.on)[0], self.frame_times, pose)
-        first, last = load.span or (0.0, float(motion.shapes.length))
+        first, last = load.span or (0.0, motion.length)
         return list(
             np.moveaxis(
                 observed.deflected_axis(motion, np.linspace(first, last, _ARROWS_PER_LINE_LOAD)),

@@ -161,7 +161,7 @@ class _SceneBuilder:
         shaped = {shape.owner for shape in self.scene.shape}
         for name, body in self.run.model.flexible_bodies.items():
             pose, colour = self.poses[f"bodies/{name}"], self._colour(name)
-            if body.shapes is not None:
+            if body.has_axis:
                 yield geometry.beam_tube(self.run, name, self.frame_times, pose, self.size, colour)
             elif body.skin is not None and name not in shaped:
                 r = 0.3 * self.radius

@@ -97,7 +97,8 @@ def segment_pose(station: Station, eta: Array) -> Array:
 
 
 def _pin(angle: complex) -> Array:
-    return np.asarray(expm(_hat(np.array([0, 0, 0, *AXIS]) * angle)))
+    axis: Array = np.array([0, 0, 0, *AXIS])
+    return np.asarray(expm(_hat(axis) * angle))
 
 
 def _slices(body: ModalBody, y: Array) -> list[tuple[Array, float, Array, Array]]:
