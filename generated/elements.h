@@ -771,6 +771,7 @@ int mstmm_sweep_modal_condense(int n, in_t S, in_t e, in_t S_rf, in_t S_ff, in_t
 int mstmm_sweep_modal_recover(int n, in_t Gg, in_t delta_I, out_t etadd);
 int mstmm_sweep_modal_port_deviation(int n, in_t H, in_t etadd, in_t delta_I, out_t delta);
 int mstmm_sweep_modal_prescribed_load(int n, in_t S_rf, in_t S_ff, in_t s, out_t e, out_t e_f);
+int mstmm_sweep_modal_outboard_load(int n, in_t S_rf, in_t etadd, out_t e);
 int mstmm_sweep_modal_modal_effort(int n, in_t H, in_t e, in_t e_f, out_t tau);
 int mstmm_sweep_modal_column_load(int n, in_t Gg, in_t e, in_t e_f, out_t e_c);
 int mstmm_sweep_modal_column_acceleration(int n, in_t S_ff, in_t e_f, in_t Gg, in_t delta_I,

@@ -624,6 +624,17 @@ static inline int mstmm_modal_prescribed_load_by(struct mstmm_modal_prescribed_l
 }
 #define mstmm_modal_prescribed_load(...) MSTMM_NAMED(mstmm_modal_prescribed_load, __VA_ARGS__)
 
+struct mstmm_modal_outboard_load {
+    int n;
+    const real *S_rf, *etadd;
+    real *e;
+};
+static inline int mstmm_modal_outboard_load_by(struct mstmm_modal_outboard_load to)
+{
+    return mstmm_sweep_modal_outboard_load(to.n, to.S_rf, to.etadd, to.e);
+}
+#define mstmm_modal_outboard_load(...) MSTMM_NAMED(mstmm_modal_outboard_load, __VA_ARGS__)
+
 struct mstmm_modal_modal_effort {
     int n;
     const real *H, *e, *e_f;

@@ -2849,6 +2849,62 @@ int mstmm_sweep_modal_prescribed_load(int n, in_t S_rf, in_t S_ff, in_t s, out_t
 
 MSTMM_CALL(mstmm_sweep_modal_prescribed_load, (n, in[0], in[1], in[2], out[0], out[1]))
 
+/* load of the outboard stations by modal accelerations
+ * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
+ * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
+ * in  S_rf[6][n] rows of the frame, columns of the modes: [Ct; Gt]
+ * in  etadd[n] modal accelerations
+ * out e[6] (N, N*m) force part of f = S a + e, at P, added to what is there
+ */
+static inline __attribute__((always_inline))
+int mstmm_sweep_modal_outboard_load_sized(int n, in_t S_rf, in_t etadd, out_t e)
+{
+  real t1 = 0;
+  for (int k = 0; k < n; ++k) {
+    t1 += S_rf[k] * etadd[k];
+  }
+  e[0] += t1;
+  real t3 = 0;
+  for (int k = 0; k < n; ++k) {
+    t3 += etadd[k] * S_rf[n + k];
+  }
+  e[1] += t3;
+  real t5 = 0;
+  for (int k = 0; k < n; ++k) {
+    t5 += etadd[k] * S_rf[2 * n + k];
+  }
+  e[2] += t5;
+  real t7 = 0;
+  for (int k = 0; k < n; ++k) {
+    t7 += etadd[k] * S_rf[3 * n + k];
+  }
+  e[3] += t7;
+  real t9 = 0;
+  for (int k = 0; k < n; ++k) {
+    t9 += etadd[k] * S_rf[4 * n + k];
+  }
+  e[4] += t9;
+  real t11 = 0;
+  for (int k = 0; k < n; ++k) {
+    t11 += etadd[k] * S_rf[5 * n + k];
+  }
+  e[5] += t11;
+  return 0;
+}
+
+int mstmm_sweep_modal_outboard_load(int n, in_t S_rf, in_t etadd, out_t e)
+{
+  switch (n) { /* loops over a known number are unrolled */
+  case 1: return mstmm_sweep_modal_outboard_load_sized(1, S_rf, etadd, e);
+  case 2: return mstmm_sweep_modal_outboard_load_sized(2, S_rf, etadd, e);
+  case 3: return mstmm_sweep_modal_outboard_load_sized(3, S_rf, etadd, e);
+  case 4: return mstmm_sweep_modal_outboard_load_sized(4, S_rf, etadd, e);
+  default: return mstmm_sweep_modal_outboard_load_sized(n, S_rf, etadd, e);
+  }
+}
+
+MSTMM_CALL(mstmm_sweep_modal_outboard_load, (n, in[0], in[1], out[0]))
+
 /* efforts on the modes
  * source: Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)
  * source: Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)
@@ -6764,6 +6820,9 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     mstmm_port[]){{"S_rf", 6, "", 0, 1}, {"S_ff", 1, "", 0, 2}, {"s", 1, "", 0, 1}}, (const
     mstmm_port[]){{"e", 6, "N, N*m", 1, 0}, {"e_f", 1, "", 1, 1}},
     "fcf1c4d4fdaefe7e2fe7357c7c07af213453e04a19ecc16677f4347476928123", 0, NULL},
+  {"outboard_load", MSTMM_FUNCTIONS(mstmm_sweep_modal_outboard_load), 2, 1, (const
+    mstmm_port[]){{"S_rf", 6, "", 0, 1}, {"etadd", 1, "", 0, 1}}, (const mstmm_port[]){{"e", 6,
+    "N, N*m", 1, 0}}, "fc8894272136b152b593d2b3a085255603c0db12f872d74fa0b6008f6a936235", 0, NULL},
   {"modal_effort", MSTMM_FUNCTIONS(mstmm_sweep_modal_modal_effort), 3, 1, (const mstmm_port[]){{"H",
     6, "", 0, 1}, {"e", 6, "N, N*m", 0, 0}, {"e_f", 1, "", 0, 1}}, (const mstmm_port[]){{"tau", 1,
     "", 0, 1}}, "27ec8ed3004d46d61109410ff6e0840af443fddcf24cd8616623cace6450521e", 0, NULL},
@@ -6877,7 +6936,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "2d2aeacd6c9a1a8f1821ba59c1358723e7639590833dda6964f040fd4485bbca",
+    .hash = "70f06877897abd0adc9b149cd88ee00b2ca7419de8089d454c94383fdb5a7182",
     .nq = 0,
     .nu = 0,
     .np = 0,
@@ -6887,6 +6946,6 @@ const mstmm_element mstmm_sweep_modal = {
     .u_units = NULL,
     .p_names = NULL,
     .p_units = NULL,
-    .n_kernels = 37,
+    .n_kernels = 38,
     .kernels = mstmm_sweep_modal_kernels,
 };

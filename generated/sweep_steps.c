@@ -1172,6 +1172,17 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
     }
+    if (body->section && body->section->shapes && (state->observed || state->balance)) {
+        real *block = state->workspace + body->block;
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        mstmm_modal_outboard_load(
+            .n = modal->n, .S_rf = laid + MSTMM_SECTION_S_RF(n),
+            .etadd = modes + MSTMM_MODES_ETADD(n), .e = block + MSTMM_BLOCK_E);
+    }
     return 0;
 }
 
@@ -1670,6 +1681,16 @@ static int mstmm_at_recover_with_rows(mstmm_state *state, int index)
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .etadd = modes + MSTMM_MODES_ETADD(n),
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
+    }
+    if (body->section && body->section->shapes && (state->observed || state->balance)) {
+        const mstmm_modal *modal = mstmm_modal_of(body);
+        const int n = mstmm_modes_of(modal);
+        real *modes = modal ? state->workspace + modal->place : NULL;
+        const mstmm_section *section = body->section;
+        real *laid = section ? state->workspace + section->place : NULL;
+        mstmm_modal_outboard_load(
+            .n = modal->n, .S_rf = laid + MSTMM_SECTION_S_RF(n),
+            .etadd = modes + MSTMM_MODES_ETADD(n), .e = block + MSTMM_BLOCK_E);
     }
     if (mstmm_imposed_count(body, state->memory) && state->balance) {
         code = mstmm_at_hinge_motion(state, index);

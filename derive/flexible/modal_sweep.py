@@ -182,6 +182,19 @@ def prescribed_load() -> Derivation:
     )
 
 
+def outboard_load() -> Derivation:
+    """Load on a station by the modal accelerations of the stations outboard of it."""
+    load = Quantity(E.symbol, E.unit, E.meaning, accumulate=True)
+    return Derivation(
+        "modal",
+        "load of the outboard stations by modal accelerations",
+        (S_RF, MODAL_ACCELERATIONS),
+        (load,),
+        (Equation("S_rf etadd", E.symbol, S_RF.symbol * MODAL_ACCELERATIONS.symbol),),
+        sources=SOURCES,
+    )
+
+
 def modal_effort() -> Derivation:
     """Required efforts on the modes: e_f + H^T e."""
     return Derivation(
@@ -273,5 +286,5 @@ def strain_load() -> Derivation:
 
 STEPS = (
     assemble_port, rebase, carry_columns, condense, recover, port_deviation, prescribed_load,
-    modal_effort, column_load, column_acceleration, step_stiffness, strain_load,
+    outboard_load, modal_effort, column_load, column_acceleration, step_stiffness, strain_load,
 )  # fmt: skip

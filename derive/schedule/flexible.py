@@ -92,6 +92,10 @@ PORT_MOTION = (
     Copy(to="body.delta", source="local.delta"),
 )  # fmt: skip
 
+#: Part of the load on a station that S and e of its outboard part do not contain.
+STATION_LOAD = call("modal.outboard_load", when="segment loads_read", S_rf="section.S_rf",
+                    etadd="modes.etadd", e="body.e")  # fmt: skip
+
 #: Modal efforts of the load on a section.
 MODAL_EFFORT = (
     call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.load_effort"),

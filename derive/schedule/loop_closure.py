@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
+from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION, STATION_LOAD
 from .forward_kinematics import HINGE_MOTION
 from .loads import (
     BIAS_EFFORTS_TO_KNOWN,
@@ -384,6 +384,7 @@ RECOVER_WITH_ROWS = Pass(
         ForEach(of="openings", steps=(RunPass(whole=ROW_MULTIPLIER),)),
         *only("modal", *_MODAL_SOLUTION),
         *only("section", *PORT_MOTION),
+        STATION_LOAD,
         # The elimination has overwritten H.
         RunPass(whole=HINGE_MOTION, when="!staged imposed balance"),
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION
+from .flexible import MODAL_CONDENSE, PORT_ASSEMBLY, PORT_MOTION, STATION_LOAD
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import (
     TIPS_TO_ROOT,
@@ -178,6 +178,7 @@ RECOVER = Pass(
         Copy(to="modes.udot", source="modes.etadd", when="modal"),
         Add(to="modes.udot", source="modes.given", when="modal refined"),
         *only("section", *PORT_MOTION),
+        STATION_LOAD,
     ),
     skip="idle", given=("parent.delta",),
 )  # fmt: skip

@@ -6,13 +6,13 @@ slices and ends.  The load of a slice is spread evenly over the length that it s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.array_validation import Array
-
-from .motion import section_rotation_matrices
 
 if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
@@ -29,52 +29,63 @@ def station_loads(flexible: FlexibleBodies, motion: Motion, x: Array) -> tuple[A
     exact = motion.body.exact
     assert exact is not None
     start = exact.chain.start
-    positions = exact.poses(motion.eta, x)[1]
+    outer = x >= start if start < exact.length else x > start
+    rotations, positions = exact.poses(motion.eta, x)
     force, moment = np.zeros((2, len(motion.t), len(x), 3))
-    for section, place, own_force, own_moment in _own_loads(flexible, motion):
-        outer = x >= start if start < exact.length else x > start
-        share = np.clip((section[1] - x) / max(section[1] - section[0], 1e-300), 0.0, 1.0)
-        share = np.where(outer, share, share - 1.0)
-        share[outer != (np.mean(section) >= start)] = 0.0
-        force += share[:, None] * own_force[:, None]
-        lever = place[:, None] - positions
-        moment += share[:, None] * (own_moment[:, None] + np.cross(lever, own_force[:, None]))
-    rotations = section_rotation_matrices(motion, x)
+    for load in _own_loads(flexible, motion):
+        begin, end = load.part
+        length, is_outer = end - begin, (begin + end) / 2 >= start
+        cut = np.clip(x, begin, end)
+        # Part of the load beyond the section, and how far its centre is from that of the whole.
+        beyond = end - cut if is_outer else cut - begin
+        share = beyond / length if length else (begin >= x if is_outer else x >= begin)
+        share = np.where(outer == is_outer, share, 0.0) * (1.0 if is_outer else -1.0)
+        shift = (length - beyond) / 2 * (1.0 if is_outer else -1.0)
+        place = load.place[:, None] + load.axis[:, None] * shift[:, None]
+        own_force = load.force[:, None]
+        force += share[:, None] * own_force
+        moment += share[:, None] * (load.moment[:, None] + np.cross(place - positions, own_force))
     return np.einsum("tmji,tmj->tmi", rotations, force), np.einsum(
         "tmji,tmj->tmi", rotations, moment
     )
 
 
-def _own_loads(
-    flexible: FlexibleBodies, motion: Motion
-) -> list[tuple[tuple[float, float], Array, Array, Array]]:
-    """Part of the beam, point, force and moment (n, 3) of the load on each station and end.
+@dataclass(frozen=True)
+class _OwnLoad:
+    """Inertia, gravity and outer loads of a station or an end, frame axes.
 
-    Inertia, gravity and loads from outside, in frame axes; an end is a part without length.
+    It acts on `part` of the beam (m), at `place` (n, 3) with the axis of the beam along `axis`.
     """
+
+    part: tuple[float, float]
+    place: Array
+    axis: Array
+    force: Array
+    moment: Array
+
+
+def _own_loads(flexible: FlexibleBodies, motion: Motion) -> Iterator[_OwnLoad]:
+    """Loads of the stations and ends: that across each segment less those of the next ones."""
     body = motion.body
     assert body.exact is not None
-    across = [
-        flexible.load_at_end(body.name, station.end or f"station {k + 1}")
-        for k, station in enumerate(body.stations)
-    ]
+    across: list[tuple[Array, Array] | None] = []
+    for k, station in enumerate(body.stations):
+        load = flexible.load_at_end(body.name, station.end or f"station {k + 1}")
+        across.append(load and (motion.inward(load[0]), motion.inward(load[1])))
     sections = np.array([station.x for station in body.stations])
-    points = body.exact.poses(motion.eta, sections)[1]
+    rotations, points = body.exact.poses(motion.eta, sections)
     parts = _parts(body)
-    loads = []
     for k, load in enumerate(across):
         if load is None:
             continue
-        force, moment = motion.inward(load[0]), motion.inward(load[1])
+        force, moment = load
         for j, station in enumerate(body.stations):
-            beyond = across[j]
-            if station.previous == k and beyond is not None:
-                outer_force, outer_moment = map(motion.inward, beyond)
-                force = force - outer_force
+            next_load = across[j]
+            if station.previous == k and next_load is not None:
                 lever = points[:, j] - points[:, k]
-                moment = moment - outer_moment - np.cross(lever, outer_force)
-        loads.append((parts[k], points[:, k], force, moment))
-    return loads
+                moment = moment - next_load[1] - np.cross(lever, next_load[0])
+                force = force - next_load[0]
+        yield _OwnLoad(parts[k], points[:, k], rotations[:, k, :, 0], force, moment)
 
 
 def _parts(body: ModalBody) -> list[tuple[float, float]]:
