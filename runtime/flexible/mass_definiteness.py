@@ -83,6 +83,14 @@ class Supports:
         hinge = self._inboard_hinges.get(name)
         return ANY if hinge is None else self._hinge_support(hinge)
 
+    def own_support(self, name: str) -> Support:
+        """Support of a flexible body by its inboard hinge alone, whose inboard side rests."""
+        hinge = self._inboard_hinges.get(name)
+        motions = None if hinge is None else self._free_motions(hinge)
+        if hinge is None or motions is None:
+            return ANY
+        return Support(motions, _rotor_inertia(hinge, motions))
+
     def _hinge_support(self, hinge: Hinge, followed: int = 0) -> Support:
         """Support at the outboard end of a hinge, its axes, `followed` bodies inboard."""
         motions = self._free_motions(hinge)

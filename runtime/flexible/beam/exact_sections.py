@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from mstmm.array_validation import Array
+from mstmm.ir.element_spec import builtin_kernel
 
 from ...kernels.numpy_kernels import evaluate
-from ..modal_body import kernel
 from ..modal_parts import chunk_slices
 from .beam_data import BeamData, BeamSections
 from .strain_shapes import STRAIN_ROWS, Chain, StrainShapes
@@ -81,9 +81,11 @@ def _poses(chain: Chain, eta: Array) -> tuple[Array, Array]:
     inputs = {
         "b": chain.rest, "Bm": chain.slopes, "eta": eta[:, None], "etad": np.zeros(n),
     }  # fmt: skip
-    segment = evaluate(kernel("segment"), inputs, n)
+    segment = evaluate(builtin_kernel("sweep_modal", "segment"), inputs, n)
     outputs = {name: segment[name] for name in ("Om", "Omd", "Omdd")}
-    motion = evaluate(kernel("segment_motion"), {"R_end": np.eye(3), **outputs})
+    motion = evaluate(
+        builtin_kernel("sweep_modal", "segment_motion"), {"R_end": np.eye(3), **outputs}
+    )
     rotations, positions = motion["R"].copy(), motion["d"].copy()
     for k, (_, before) in enumerate(chain.links):
         if before >= 0:

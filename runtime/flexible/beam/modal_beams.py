@@ -89,7 +89,7 @@ class BeamBodies:
         }
         setting = ExactBeamSetting(
             data, dict(zip(DIRECTIONS, self.modes(beam).counts, strict=True)),
-            self._exact_basis(beam), self._supports.support_of(beam.name), inboard_end,
+            self._exact_basis(beam), self._supports.own_support(beam.name), inboard_end,
             {end: self._supports.hanging_inertia(beam.name, end) for end in data.ends}, spans,
         )  # fmt: skip
         what = f'beam "{beam.name}"'

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from mstmm.array_validation import Array
+from mstmm.ir.element_spec import builtin_kernel
 
 from ...kernels.numpy_kernels import evaluate
-from ..modal_body import kernel
 from .gauss_quadrature import gauss_rule
 
 #: Direction of a beam's shapes -> row of its strain and its sign: bending along y turns sections
@@ -149,9 +149,9 @@ class Chain:
         """
         n, zeros = self.shapes.n, np.zeros(self.shapes.n)
         inputs = {"b": self.rest, "Bm": self.slopes, "eta": zeros, "etad": zeros}
-        found = evaluate(kernel("segment"), inputs, n)
+        found = evaluate(builtin_kernel("sweep_modal", "segment"), inputs, n)
         motion = evaluate(
-            kernel("segment_motion"),
+            builtin_kernel("sweep_modal", "segment_motion"),
             {"R_end": np.eye(3), **{name: found[name] for name in ("Om", "Omd", "Omdd")}},
         )
         own = motion["H6"] @ found["Phi"]
