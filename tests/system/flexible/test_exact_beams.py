@@ -139,7 +139,7 @@ def test_spin_up() -> None:
     assert np.abs(found - clamped.tips(times, 1e-8)).max() < 2e-3
 
 
-SPATIAL = {
+SPATIAL: Scene = {
     "stiffness": [1.0, 2.0], "torsional_stiffness": 1.0, "polar_inertia_per_length": 0.01,
     "modes": {"y": 4, "z": 4, "twist": 3}, "ends": {"mid": 0.5},
 }  # fmt: skip
