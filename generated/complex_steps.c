@@ -6707,7 +6707,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
             .S_wI = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -6722,7 +6722,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -6748,7 +6748,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && !body->section->inward && body->placed && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && body->placed && !(body->section && body->section->Bm)) {
         complex_t *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -6763,7 +6763,7 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .K = bend + MSTMM_BEND_K(n), .Z_p = bend + MSTMM_BEND_PLACE_Z(n),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && body->section->shapes && body->placed) {
+    if (body->section && body->section->Bm && body->placed) {
         complex_t *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);

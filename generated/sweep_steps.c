@@ -338,10 +338,10 @@ static const real mstmm_directions[18] = {
     -1, 0, 0,
 };
 
-int64_t mstmm_modal_numbers(int n) { return (int64_t)40 * n + 2 * (int64_t)n * n; }
-int64_t mstmm_section_numbers(int n) { return (int64_t)36 * n + 54; }
-int64_t mstmm_bend_numbers(int n) { return (int64_t)89 * n + 4 * (int64_t)n * n; }
-int64_t mstmm_port_numbers(int n) { return (int64_t)54 * n + 1 * (int64_t)n * n; }
+int64_t mstmm_modal_numbers(int n) { return MSTMM_MODES_NUMBERS(n); }
+int64_t mstmm_section_numbers(int n) { return MSTMM_SECTION_NUMBERS(n); }
+int64_t mstmm_bend_numbers(int n) { return MSTMM_BEND_NUMBERS(n); }
+int64_t mstmm_port_numbers(int n) { return MSTMM_PORT_NUMBERS(n); }
 
 /* Given accelerations: all, or zero. */
 static int mstmm_at_prescribed_accelerations(mstmm_state *state, int index)
@@ -384,10 +384,10 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
     const mstmm_section *section = body->section;
     real *laid = section ? state->workspace + section->place : NULL;
     int code;
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         real *block = state->workspace + body->block;
         mstmm_modal_segment(
-            .n = modal->n, .b = section->rest, .Bm = section->shapes, .eta = state->q + modal->q,
+            .n = modal->n, .b = section->b, .Bm = section->Bm, .eta = state->q + modal->q,
             .etad = state->u + modal->u, .dC1 = laid + MSTMM_SECTION_DC1(n),
             .dC2 = laid + MSTMM_SECTION_DC2(n), .Phi = laid + MSTMM_SECTION_PHI(n),
             .Om = laid + MSTMM_SECTION_X(n), .Omd = laid + MSTMM_SECTION_XD(n),
@@ -401,16 +401,15 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
         if (code) return mstmm_fail(state, MSTMM_FAILED_SECTION, index, code);
     } else {
         mstmm_modal_section(
-            .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
-            .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
-            .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
-            .eta = state->q + modal->q, .etad = state->u + modal->u,
-            .Phi = laid + MSTMM_SECTION_PHI(n), .x = laid + MSTMM_SECTION_X(n),
-            .Psi = laid + MSTMM_SECTION_PSI(n), .xd = laid + MSTMM_SECTION_XD(n),
-            .Psid = laid + MSTMM_SECTION_PSID(n), .xdd = laid + MSTMM_SECTION_XDD(n),
-            .Psidd = laid + MSTMM_SECTION_PSIDD(n));
+            .n = modal->n, .r = section->r, .phi = section->phi, .theta = section->theta,
+            .g_x = section->g_x, .g_y = section->g_y, .g_z = section->g_z, .h_x = section->h_x,
+            .h_y = section->h_y, .h_z = section->h_z, .eta = state->q + modal->q,
+            .etad = state->u + modal->u, .Phi = laid + MSTMM_SECTION_PHI(n),
+            .x = laid + MSTMM_SECTION_X(n), .Psi = laid + MSTMM_SECTION_PSI(n),
+            .xd = laid + MSTMM_SECTION_XD(n), .Psid = laid + MSTMM_SECTION_PSID(n),
+            .xdd = laid + MSTMM_SECTION_XDD(n), .Psidd = laid + MSTMM_SECTION_PSIDD(n));
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         real *block = state->workspace + body->block;
         code = mstmm_modal_end_motion(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
@@ -473,12 +472,12 @@ static int mstmm_at_modal_own(mstmm_state *state, int index)
     const int n = mstmm_modes_of(modal);
     real *modes = modal ? state->workspace + modal->place : NULL;
     mstmm_modal_residual(
-        .n = modal->n, .p = modal->moments.rigid, .C = modal->moments.c, .P = modal->moments.p,
-        .B = modal->moments.b, .Z_xx = modal->moments.z[0], .Z_xy = modal->moments.z[1],
-        .Z_xz = modal->moments.z[2], .Z_yy = modal->moments.z[3], .Z_yz = modal->moments.z[4],
-        .Z_zz = modal->moments.z[5], .Y_x = modal->moments.y[0], .Y_y = modal->moments.y[1],
-        .Y_z = modal->moments.y[2], .G_x = modal->moments.g[0], .G_y = modal->moments.g[1],
-        .G_z = modal->moments.g[2], .M = modal->moments.m, .K = modal->stiffness,
+        .n = modal->n, .p = modal->moments.p, .C = modal->moments.C, .P = modal->moments.P,
+        .B = modal->moments.B, .Z_xx = modal->moments.Z_xx, .Z_xy = modal->moments.Z_xy,
+        .Z_xz = modal->moments.Z_xz, .Z_yy = modal->moments.Z_yy, .Z_yz = modal->moments.Z_yz,
+        .Z_zz = modal->moments.Z_zz, .Y_x = modal->moments.Y_x, .Y_y = modal->moments.Y_y,
+        .Y_z = modal->moments.Y_z, .G_x = modal->moments.G_x, .G_y = modal->moments.G_y,
+        .G_z = modal->moments.G_z, .M = modal->moments.M, .K = modal->stiffness,
         .D = modal->damping, .eta = state->q + modal->q, .etad = state->u + modal->u,
         .motion = block + MSTMM_BLOCK_MOTION, .S = block + MSTMM_BLOCK_S,
         .S_rf = modes + MSTMM_MODES_S_RF(n), .A = modes + MSTMM_MODES_A(n),
@@ -505,7 +504,7 @@ int mstmm_at_forward(mstmm_state *state, int index, const real *parent_motion)
         code = mstmm_at_section_motion(state, index);
         if (code) return code;
     }
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -772,12 +771,12 @@ static int mstmm_at_drag(mstmm_state *state, int index)
     real *modes = modal ? state->workspace + modal->place : NULL;
     if (!(body->modal && body->modal->drag)) return 0;
     mstmm_modal_momentum(
-        .n = modal->n, .p = modal->drag->rigid, .C = modal->drag->c, .P = modal->drag->p,
-        .B = modal->drag->b, .Z_xx = modal->drag->z[0], .Z_xy = modal->drag->z[1],
-        .Z_xz = modal->drag->z[2], .Z_yy = modal->drag->z[3], .Z_yz = modal->drag->z[4],
-        .Z_zz = modal->drag->z[5], .Y_x = modal->drag->y[0], .Y_y = modal->drag->y[1],
-        .Y_z = modal->drag->y[2], .G_x = modal->drag->g[0], .G_y = modal->drag->g[1],
-        .G_z = modal->drag->g[2], .M = modal->drag->m, .eta = state->q + modal->q,
+        .n = modal->n, .p = modal->drag->p, .C = modal->drag->C, .P = modal->drag->P,
+        .B = modal->drag->B, .Z_xx = modal->drag->Z_xx, .Z_xy = modal->drag->Z_xy,
+        .Z_xz = modal->drag->Z_xz, .Z_yy = modal->drag->Z_yy, .Z_yz = modal->drag->Z_yz,
+        .Z_zz = modal->drag->Z_zz, .Y_x = modal->drag->Y_x, .Y_y = modal->drag->Y_y,
+        .Y_z = modal->drag->Y_z, .G_x = modal->drag->G_x, .G_y = modal->drag->G_y,
+        .G_z = modal->drag->G_z, .M = modal->drag->M, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
         .S = S, .S_rf = modes + MSTMM_MODES_S_RF_I(n), .A = modes + MSTMM_MODES_A_DRAG(n),
         .h = h, .h_f = modes + MSTMM_MODES_RIGHT(n), .T = T);
@@ -962,7 +961,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         code = mstmm_at_modal_condense(state, index);
         if (code) return code;
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         real *block = state->workspace + body->block;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -976,7 +975,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
     }
-    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+    if (body->section && !body->section->inward && body->section && body->section->Bm) {
         real *block = state->workspace + body->block;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -1172,7 +1171,7 @@ int mstmm_at_recover(mstmm_state *state, int index, const real *parent_delta)
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
     }
-    if (body->section && body->section->shapes && (state->observed || state->balance)) {
+    if (body->section && body->section->Bm && (state->observed || state->balance)) {
         real *block = state->workspace + body->block;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -1441,7 +1440,7 @@ static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
         code = mstmm_at_row_elimination(state, r);
         if (code) return code;
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         real *modes = modal ? state->workspace + modal->place : NULL;
         mstmm_modal_assemble_port(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
@@ -1450,7 +1449,7 @@ static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
     }
-    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+    if (body->section && !body->section->inward && body->section && body->section->Bm) {
         real *modes = modal ? state->workspace + modal->place : NULL;
         mstmm_modal_rebase(
             .n = modal->n, .H = laid + MSTMM_SECTION_H(n), .S = block + MSTMM_BLOCK_S,
@@ -1682,7 +1681,7 @@ static int mstmm_at_recover_with_rows(mstmm_state *state, int index)
             .delta_I = block + MSTMM_BLOCK_DELTA, .delta = delta);
         memcpy(block + MSTMM_BLOCK_DELTA, delta, 6 * sizeof(real));
     }
-    if (body->section && body->section->shapes && (state->observed || state->balance)) {
+    if (body->section && body->section->Bm && (state->observed || state->balance)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *modes = modal ? state->workspace + modal->place : NULL;
@@ -2404,7 +2403,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
         code = mstmm_at_modal_condense(state, index);
         if (code) return code;
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *modes = modal ? state->workspace + modal->place : NULL;
@@ -2417,7 +2416,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
             .S_rf = modes + MSTMM_MODES_S_RF(n), .S_ff = modes + MSTMM_MODES_S_FF(n),
             .e_f = modes + MSTMM_MODES_E_F(n));
     }
-    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+    if (body->section && !body->section->inward && body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         real *modes = modal ? state->workspace + modal->place : NULL;
@@ -2614,10 +2613,10 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
     const mstmm_section *section = body->section;
     real *laid = section ? state->workspace + section->place : NULL;
     real *d_laid = section ? state->slope->workspace + section->place : NULL;
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         real *d_block = state->slope->workspace + body->block;
         mstmm_modal_segment_slope(
-            .n = modal->n, .b = section->rest, .Bm = section->shapes, .eta = state->q + modal->q,
+            .n = modal->n, .b = section->b, .Bm = section->Bm, .eta = state->q + modal->q,
             .etad = state->u + modal->u, .dC1 = laid + MSTMM_SECTION_DC1(n),
             .dC2 = laid + MSTMM_SECTION_DC2(n), .d_eta = state->slope->q + modal->q,
             .d_etad = state->slope->u + modal->u, .d_dC1 = d_laid + MSTMM_SECTION_DC1(n),
@@ -2634,17 +2633,17 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
             .d_c = d_block + MSTMM_BLOCK_HINGE_C);
     } else {
         mstmm_modal_section_slope(
-            .n = modal->n, .r = section->point, .phi = section->phi, .theta = section->theta,
-            .g_x = section->drawn[0], .g_y = section->drawn[1], .g_z = section->drawn[2],
-            .h_x = section->turned[0], .h_y = section->turned[1], .h_z = section->turned[2],
-            .eta = state->q + modal->q, .etad = state->u + modal->u,
-            .Phi = laid + MSTMM_SECTION_PHI(n), .d_eta = state->slope->q + modal->q,
-            .d_etad = state->slope->u + modal->u, .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
-            .d_x = d_laid + MSTMM_SECTION_X(n), .d_Psi = d_laid + MSTMM_SECTION_PSI(n),
-            .d_xd = d_laid + MSTMM_SECTION_XD(n), .d_Psid = d_laid + MSTMM_SECTION_PSID(n),
-            .d_xdd = d_laid + MSTMM_SECTION_XDD(n), .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n));
+            .n = modal->n, .r = section->r, .phi = section->phi, .theta = section->theta,
+            .g_x = section->g_x, .g_y = section->g_y, .g_z = section->g_z, .h_x = section->h_x,
+            .h_y = section->h_y, .h_z = section->h_z, .eta = state->q + modal->q,
+            .etad = state->u + modal->u, .Phi = laid + MSTMM_SECTION_PHI(n),
+            .d_eta = state->slope->q + modal->q, .d_etad = state->slope->u + modal->u,
+            .d_Phi = d_laid + MSTMM_SECTION_PHI(n), .d_x = d_laid + MSTMM_SECTION_X(n),
+            .d_Psi = d_laid + MSTMM_SECTION_PSI(n), .d_xd = d_laid + MSTMM_SECTION_XD(n),
+            .d_Psid = d_laid + MSTMM_SECTION_PSID(n), .d_xdd = d_laid + MSTMM_SECTION_XDD(n),
+            .d_Psidd = d_laid + MSTMM_SECTION_PSIDD(n));
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         real *d_block = state->slope->workspace + body->block;
         mstmm_modal_end_motion_slope(
             .R_end = section->end, .x = laid + MSTMM_SECTION_X(n),
@@ -2716,12 +2715,12 @@ static int mstmm_at_modal_own_slope(mstmm_state *state, int index)
     real *d_block = state->slope->workspace + body->block;
     real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
     mstmm_modal_residual_slope(
-        .n = modal->n, .p = modal->moments.rigid, .C = modal->moments.c, .P = modal->moments.p,
-        .B = modal->moments.b, .Z_xx = modal->moments.z[0], .Z_xy = modal->moments.z[1],
-        .Z_xz = modal->moments.z[2], .Z_yy = modal->moments.z[3], .Z_yz = modal->moments.z[4],
-        .Z_zz = modal->moments.z[5], .Y_x = modal->moments.y[0], .Y_y = modal->moments.y[1],
-        .Y_z = modal->moments.y[2], .G_x = modal->moments.g[0], .G_y = modal->moments.g[1],
-        .G_z = modal->moments.g[2], .M = modal->moments.m, .K = modal->stiffness,
+        .n = modal->n, .p = modal->moments.p, .C = modal->moments.C, .P = modal->moments.P,
+        .B = modal->moments.B, .Z_xx = modal->moments.Z_xx, .Z_xy = modal->moments.Z_xy,
+        .Z_xz = modal->moments.Z_xz, .Z_yy = modal->moments.Z_yy, .Z_yz = modal->moments.Z_yz,
+        .Z_zz = modal->moments.Z_zz, .Y_x = modal->moments.Y_x, .Y_y = modal->moments.Y_y,
+        .Y_z = modal->moments.Y_z, .G_x = modal->moments.G_x, .G_y = modal->moments.G_y,
+        .G_z = modal->moments.G_z, .M = modal->moments.M, .K = modal->stiffness,
         .D = modal->damping, .eta = state->q + modal->q, .etad = state->u + modal->u,
         .motion = block + MSTMM_BLOCK_MOTION, .S_rf = modes + MSTMM_MODES_S_RF(n),
         .A = modes + MSTMM_MODES_A(n), .d_eta = state->slope->q + modal->q,
@@ -2904,12 +2903,12 @@ static int mstmm_at_drag_slope(mstmm_state *state, int index)
     real *d_modes = modal ? state->slope->workspace + modal->place : NULL;
     if (!(body->modal && body->modal->drag)) return 0;
     mstmm_modal_momentum_slope(
-        .n = modal->n, .p = modal->drag->rigid, .C = modal->drag->c, .P = modal->drag->p,
-        .B = modal->drag->b, .Z_xx = modal->drag->z[0], .Z_xy = modal->drag->z[1],
-        .Z_xz = modal->drag->z[2], .Z_yy = modal->drag->z[3], .Z_yz = modal->drag->z[4],
-        .Z_zz = modal->drag->z[5], .Y_x = modal->drag->y[0], .Y_y = modal->drag->y[1],
-        .Y_z = modal->drag->y[2], .G_x = modal->drag->g[0], .G_y = modal->drag->g[1],
-        .G_z = modal->drag->g[2], .M = modal->drag->m, .eta = state->q + modal->q,
+        .n = modal->n, .p = modal->drag->p, .C = modal->drag->C, .P = modal->drag->P,
+        .B = modal->drag->B, .Z_xx = modal->drag->Z_xx, .Z_xy = modal->drag->Z_xy,
+        .Z_xz = modal->drag->Z_xz, .Z_yy = modal->drag->Z_yy, .Z_yz = modal->drag->Z_yz,
+        .Z_zz = modal->drag->Z_zz, .Y_x = modal->drag->Y_x, .Y_y = modal->drag->Y_y,
+        .Y_z = modal->drag->Y_z, .G_x = modal->drag->G_x, .G_y = modal->drag->G_y,
+        .G_z = modal->drag->G_z, .M = modal->drag->M, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
         .S_rf = modes + MSTMM_MODES_S_RF_I(n), .A = modes + MSTMM_MODES_A_DRAG(n),
         .h_f = modes + MSTMM_MODES_RIGHT(n), .d_eta = state->slope->q + modal->q,
@@ -3618,7 +3617,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
         memset(d_block + MSTMM_BLOCK_X, 0, 3 * sizeof(real));
         memset(d_block + MSTMM_BLOCK_V, 0, 3 * sizeof(real));
     }
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -3628,7 +3627,7 @@ static int mstmm_at_tangent_own(mstmm_state *state, int index)
         for (int j = 0; j < 9 * n; j++)
             (port + MSTMM_PORT_OUTBOARD_Z_Z(n))[j] = 0;
     }
-    if (body->section && body->section->shapes && body->placed) {
+    if (body->section && body->section->Bm && body->placed) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -4334,7 +4333,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .S_pI = state->tangents->numbers + mstmm_place_at(state->model, body->parent),
             .S_wI = state->tangents->numbers + mstmm_tangent_at(state, body->parent));
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -4349,7 +4348,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .K_x = port + MSTMM_PORT_K(n), .K = bend + MSTMM_BEND_K(n),
             .Z_z = bend + MSTMM_BEND_Z_Z(n), .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -4375,7 +4374,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && !body->section->inward && body->placed && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && body->placed && !(body->section && body->section->Bm)) {
         real *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -4390,7 +4389,7 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .K = bend + MSTMM_BEND_K(n), .Z_p = bend + MSTMM_BEND_PLACE_Z(n),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
-    if (body->section && body->section->shapes && body->placed) {
+    if (body->section && body->section->Bm && body->placed) {
         real *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5032,7 +5031,7 @@ static int mstmm_at_increment_backward(mstmm_state *state, int index)
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq),
             .b_p = place + MSTMM_PLACE_KNOWN(body->nu, body->nq), .e_S = row_load, .e_b = known);
     }
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         real *tangent = state->tangents->numbers + body->tangent;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5044,7 +5043,7 @@ static int mstmm_at_increment_backward(mstmm_state *state, int index)
             .b = tangent + MSTMM_TANGENT_KNOWN(body->nu, body->nq),
             .e_f = d_modes + MSTMM_MODES_E_F(n));
     }
-    if (body->section && body->section->shapes && body->placed) {
+    if (body->section && body->section->Bm && body->placed) {
         real *place = state->tangents->numbers + body->place;
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
@@ -5360,7 +5359,7 @@ static int mstmm_at_laws_own(mstmm_state *state, int index)
         .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body),
         .floor_ = block + MSTMM_BLOCK_FLOOR);
     mstmm_set_zero(tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq), nu * nu);
-    if (body->section && body->section->shapes) {
+    if (body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -5511,7 +5510,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         code = mstmm_at_laws_modal_condense(state, index);
         if (code) return code;
     }
-    if (body->section && !body->section->inward && !(body->section && body->section->shapes)) {
+    if (body->section && !body->section->inward && !(body->section && body->section->Bm)) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -5528,7 +5527,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
             .S_rf = bend + MSTMM_BEND_V(n), .S_ff = bend + MSTMM_BEND_D(n),
             .e_f = d_modes + MSTMM_MODES_E_F(n));
     }
-    if (body->section && !body->section->inward && body->section && body->section->shapes) {
+    if (body->section && !body->section->inward && body->section && body->section->Bm) {
         const mstmm_modal *modal = mstmm_modal_of(body);
         const int n = mstmm_modes_of(modal);
         const mstmm_section *section = body->section;
@@ -5745,12 +5744,12 @@ int mstmm_at_momentum(mstmm_state *state, int index, real *given_S, real *given_
     const int n = mstmm_modes_of(modal);
     real *modes = modal ? state->workspace + modal->place : NULL;
     mstmm_modal_momentum(
-        .n = modal->n, .p = modal->moments.rigid, .C = modal->moments.c, .P = modal->moments.p,
-        .B = modal->moments.b, .Z_xx = modal->moments.z[0], .Z_xy = modal->moments.z[1],
-        .Z_xz = modal->moments.z[2], .Z_yy = modal->moments.z[3], .Z_yz = modal->moments.z[4],
-        .Z_zz = modal->moments.z[5], .Y_x = modal->moments.y[0], .Y_y = modal->moments.y[1],
-        .Y_z = modal->moments.y[2], .G_x = modal->moments.g[0], .G_y = modal->moments.g[1],
-        .G_z = modal->moments.g[2], .M = modal->moments.m, .eta = state->q + modal->q,
+        .n = modal->n, .p = modal->moments.p, .C = modal->moments.C, .P = modal->moments.P,
+        .B = modal->moments.B, .Z_xx = modal->moments.Z_xx, .Z_xy = modal->moments.Z_xy,
+        .Z_xz = modal->moments.Z_xz, .Z_yy = modal->moments.Z_yy, .Z_yz = modal->moments.Z_yz,
+        .Z_zz = modal->moments.Z_zz, .Y_x = modal->moments.Y_x, .Y_y = modal->moments.Y_y,
+        .Y_z = modal->moments.Y_z, .G_x = modal->moments.G_x, .G_y = modal->moments.G_y,
+        .G_z = modal->moments.G_z, .M = modal->moments.M, .eta = state->q + modal->q,
         .etad = state->u + modal->u, .v = block + MSTMM_BLOCK_V, .w = block + MSTMM_BLOCK_MOTION,
         .S = given_S, .S_rf = modes + MSTMM_MODES_S_RF_I(n), .A = modes + MSTMM_MODES_A(n),
         .h = given_h, .h_f = modes + MSTMM_MODES_RIGHT(n), .T = given_T);

@@ -37,7 +37,7 @@ _TRAIT_TEXTS = {
     " && (body->generic || state->required)",
     "directed": "body->kernels->directions && !body->placed && speeds == body->nu",
     "outward": "body->section && !body->section->inward", "modal": "body->modal",
-    "segment": "body->section && body->section->shapes",
+    "segment": "body->section && body->section->Bm",
     "imposed": "mstmm_imposed_count(body, state->memory)",
     "idle": "mstmm_idle(state->observed, body)",
     "drag": "body->modal && body->modal->drag", "inverse": "state->given",

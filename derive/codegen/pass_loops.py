@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass, replace
-from math import prod
 
 from ..schedule.differentiated_passes import D, ports_of
 from ..schedule.pass_steps import (
@@ -23,11 +22,12 @@ from ..schedule.sweeps import SWEEPS
 from .cache_tiling import ChainedPasses, TiledRun, condition_text, tile_sweep
 from .slot_storage import (
     BLOCK_SLOTS,
+    LAYOUTS,
     SHARED_SLOTS,
     SPEED_SLOTS,
-    TANGENT_SLOTS,
     VARIABLES,
     reads_variable,
+    size_terms,
     slot_expression,
     slot_size,
 )
@@ -345,9 +345,7 @@ def _range_of_slot(slot: str) -> _MemoryRange | None:
     slot_location = slot_expression(name)
     if begin is None or slot_location is None or slot_name not in SLOTS:
         return None
-    numbers = prod(
-        int(variable) for variable in SLOTS[slot_name].size.split() if variable.isdigit()
-    )
+    numbers = size_terms(slot_name).total()
     variables_read = (
         variable
         for variable in ("d_block", "block", "tangent")
@@ -375,21 +373,14 @@ def _merge_ranges(stretches: Iterable[_MemoryRange]) -> list[_MemoryRange]:
     return merged
 
 
-def _slot_offsets(layouts: Iterable[Iterable[tuple[str, int]]]) -> dict[str, int]:
+def _slot_offsets() -> dict[str, int]:
     """Offset of each slot in its layout, for a hinge of one speed."""
-    offsets: dict[str, int] = {}
-    for layout in layouts:
-        offset = 0
-        for slot, count in layout:
-            offsets[slot] = offset
-            offset += count
-    return offsets
+    offsets, offset = dict[str, int](), 0
+    for slot in (*BLOCK_SLOTS, *SPEED_SLOTS):
+        offsets[slot] = offset
+        offset += size_terms(slot).total()
+    tangent = LAYOUTS["tangent"].offsets("tangent")
+    return offsets | {slot: terms.total() for slot, terms in tangent.items()}
 
 
-_OFFSETS = _slot_offsets(
-    (
-        [(slot, int(SLOTS[slot].size)) for slot in BLOCK_SLOTS]
-        + [(slot, count) for slot, (_, count) in SPEED_SLOTS.items()],
-        [(slot, sum(counts)) for slot, counts in TANGENT_SLOTS.items()],
-    )
-)
+_OFFSETS = _slot_offsets()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections import Counter
 from dataclasses import dataclass, field
+from math import prod
 
 from mstmm.ir import scene_structure
 
@@ -20,62 +21,69 @@ BLOCK_SLOTS = {
     "hinge.v": "HINGE_V", "hinge.w": "HINGE_W", "hinge.c": "HINGE_C", "body.S": "S",
     "body.e": "E", "body.motion": "MOTION",
 }  # fmt: skip
-#: Slots after them: slot -> (C name, numbers per speed).
+#: Slots after them, which have numbers per speed: slot -> name in C.
 SPEED_SLOTS = {
-    "body.s": ("S", 1), "body.tau": ("TAU", 1), "hinge.H": ("H", 6), "hinge.g": ("OFFSET", 1),
-    "hinge.rates": ("RATES", 1), "hinge.G": ("GAIN", 6), "hinge.H_free": ("H_FREE", 6),
+    "body.s": "S", "body.tau": "TAU", "hinge.H": "H", "hinge.g": "OFFSET", "hinge.rates": "RATES",
+    "hinge.G": "GAIN", "hinge.H_free": "H_FREE",
 }  # fmt: skip
-#: Numbers of a flexible body in the workspace: slot -> (per mode, per pair of modes).
-MODE_SLOTS = {
-    "modes.S_rf": (6, 0), "modes.S_rf_I": (6, 0), "modes.A": (6, 0), "modes.right": (7, 0),
-    "modes.gain": (7, 0), "modes.A_drag": (6, 0), "modes.S_ff": (0, 1),
-    "modes.work": (0, 1), "modes.e_f": (1, 0), "modes.etadd": (1, 0),
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Slots of one owner side by side in memory from the C expression `start` on.
+
+    `arguments` are those of the macros of their offsets, which `parameters` name.
+    """
+
+    start: str
+    names: str
+    parameters: str = ""
+    arguments: str = ""
+
+    def offsets(self, owner: str) -> dict[str, Counter[str]]:
+        """Slot -> its offset, and "" -> the length: so many times products of sizes."""
+        offsets, total = dict[str, Counter[str]](), Counter[str]()
+        for name in self.names.split():
+            offsets[f"{owner}.{name}"] = total.copy()
+            total += size_terms(f"{owner}.{name}")
+        return offsets | {"": total}
+
+
+_COUPLING_NAMES = " ".join(scene_structure.COUPLING_NUMBERS)
+_BODY_SIZES = ("(nu, nq)", "(body->nu, body->nq)")
+#: Owner -> layout: a hinge that closes a loop, a coupling, a row; a flexible body and a section in
+#: the workspace; the tangent of a body, of one whose loads depend on its position, of a flexible
+#: body, and of a section.
+LAYOUTS = {
+    "closure": Layout("closed", "W J_A J_B l R_C d lever gap slip"),
+    "coupling": Layout("loops + coupling->numbers", _COUPLING_NAMES),
+    "row": Layout("line", "K known pivot inverse x previous_x"),
+    "modes": Layout(
+        "modes", "S_rf S_rf_I A right gain A_drag S_ff work e_f etadd", "(n)", "(n)"
+    ),
+    "section": Layout("laid", "Phi H push H6 x Psi xd Psid xdd Psidd dC1 dC2 S_rf", "(n)", "(n)"),
+    "tangent": Layout(
+        "tangent", "S B G W laws H V gain inverse y known along rates_by_speeds"
+        " rates_by_coordinates unit rates Q Q_work", *_BODY_SIZES,
+    ),
+    "place": Layout("place", "S z known B gain", *_BODY_SIZES),
+    "bend": Layout(
+        "bend", "B G W zero_H K Z_z Z_x V D right gain work rest y place_B place_Z place_gain",
+        "(n)", "(n)",
+    ),
+    "port": Layout(
+        "port", "B G W K place_B outboard_K outboard_Z_z outboard_Z_p", "(n)", "(n)"
+    ),
 }  # fmt: skip
-#: Numbers of a section in the workspace: slot -> (per mode, others).
-SECTION_SLOTS = {
-    "section.Phi": (6, 0), "section.H": (6, 0), "section.push": (6, 0), "section.H6": (0, 36),
-    "section.x": (0, 3), "section.Psi": (0, 3), "section.xd": (0, 3), "section.Psid": (0, 3),
-    "section.xdd": (0, 3), "section.Psidd": (0, 3), "section.dC1": (6, 0), "section.dC2": (6, 0),
-    "section.S_rf": (6, 0),
-}  # fmt: skip
-#: Numbers of the tangent by body: slot -> so many, and so many times nu, nu nu, nq nq, nq nu.
-TANGENT_SLOTS = {
-    "tangent.S": (54, 0, 0, 0, 0), "tangent.B": (0, 9, 0, 0, 0), "tangent.G": (0, 6, 0, 0, 0),
-    "tangent.W": (0, 0, 1, 0, 0), "tangent.laws": (0, 0, 1, 0, 0), "tangent.H": (0, 6, 0, 0, 0),
-    "tangent.V": (0, 6, 0, 0, 0), "tangent.gain": (0, 9, 0, 0, 0),
-    "tangent.inverse": (0, 0, 1, 0, 0), "tangent.y": (0, 1, 0, 0, 0),
-    "tangent.known": (9, 0, 0, 0, 0),
-    "tangent.along": (0, 0, 0, 0, 1), "tangent.rates_by_speeds": (0, 0, 0, 0, 1),
-    "tangent.rates_by_coordinates": (0, 0, 0, 1, 0),
-    "tangent.unit": (0, 0, 0, 1, 0), "tangent.rates": (0, 0, 0, 1, 0),
-    "tangent.Q": (0, 0, 0, 1, 0), "tangent.Q_work": (0, 0, 0, 1, 0),
-}  # fmt: skip
-#: Numbers of the tangent of a body whose loads depend on its position.
-PLACE_SLOTS = {
-    "place.S": (54, 0, 0, 0, 0), "place.z": (9, 0, 0, 0, 0), "place.known": (9, 0, 0, 0, 0),
-    "place.B": (0, 9, 0, 0, 0), "place.gain": (0, 9, 0, 0, 0),
-}  # fmt: skip
-#: Numbers of the tangent by flexible body, and by section: slot -> (per mode, per pair of modes).
-BEND_SLOTS = {
-    "bend.B": (9, 0), "bend.G": (6, 0), "bend.W": (0, 1), "bend.zero_H": (6, 0), "bend.K": (6, 0),
-    "bend.Z_z": (9, 0), "bend.Z_x": (0, 1), "bend.V": (6, 0), "bend.D": (0, 1),
-    "bend.right": (9, 0), "bend.gain": (9, 0), "bend.work": (0, 1), "bend.rest": (1, 0),
-    "bend.y": (1, 0), "bend.place_B": (9, 0), "bend.place_Z": (9, 0), "bend.place_gain": (9, 0),
-}  # fmt: skip
-PORT_SLOTS = {
-    "port.B": (9, 0), "port.G": (6, 0), "port.W": (0, 1), "port.K": (6, 0),
-    "port.place_B": (9, 0), "port.outboard_K": (6, 0), "port.outboard_Z_z": (9, 0),
-    "port.outboard_Z_p": (9, 0),
-}  # fmt: skip
-#: Numbers of a hinge that closes a loop, in their order: slot -> how many.
-CLOSURE_SLOTS = {
-    "closure.W": 36, "closure.J_A": 36, "closure.J_B": 36, "closure.l": 6, "closure.R_C": 9,
-    "closure.d": 3, "closure.lever": 3, "closure.gap": 6, "closure.slip": 6,
-}  # fmt: skip
-COUPLING_SLOTS = {f"coupling.{name}": 1 for name in scene_structure.COUPLING_NUMBERS}
-#: Numbers of a row: slot -> how many.
-ROW_SLOTS = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
-             "row.previous_x": 1}  # fmt: skip
+
+
+def size_terms(slot: str) -> Counter[str]:
+    """Length of a slot: product of sizes -> how many times, of a slot without size one number."""
+    factors = SLOTS[slot].size.replace("free", "nu").split() if slot in SLOTS else ["1"]
+    number = prod(int(factor) for factor in factors if factor.isdigit())
+    return Counter({" ".join(factor for factor in factors if not factor.isdigit()): number})
+
+
 #: Slots that share the storage of another slot, which is not needed at that time.
 SHARED_SLOTS = {
     "hinge.F": "hinge.H", "modes.load_effort": "modes.right", "bend.place_right": "bend.right",
@@ -88,14 +96,14 @@ SHARED_SLOTS = {
     "section.Om": "section.x", "section.Omd": "section.xd", "section.Omdd": "section.xdd",
 }  # fmt: skip
 
-_MOMENTS = {
-    "p": "rigid", "C": "c", "P": "p", "B": "b",
-    **{f"Z_{ab}": f"z[{k}]" for k, ab in enumerate(("xx", "xy", "xz", "yy", "yz", "zz"))},
-    **{f"Y_{a}": f"y[{k}]" for k, a in enumerate("xyz")},
-    **{f"G_{a}": f"g[{k}]" for k, a in enumerate("xyz")}, "M": "m",
+#: Vectors of the state and of results that have slots of the same name.
+_STATE = ("given", "efforts", "udot", "required", "column", "answer")
+#: Owner -> C expression of its record, whose fields have the names of other slots of it.
+_RECORDS = {
+    "law": "law->", "load": "load->", "force": "force->", "closure": "closure->",
+    "moments": "modal->moments.", "drag": "modal->drag->", "section": "section->",
+    "pending": "loops + pending->", "own": "loops + own->", "bent": "loops + bent->",
 }  # fmt: skip
-_STATE = {"given": "given", "efforts": "efforts", "udot": "udot", "required": "required",
-          "column": "column", "answer": "answer"}  # fmt: skip
 
 
 def _station_text(numbers: str, section_slot: str, modal_slot: str) -> str:
@@ -120,23 +128,16 @@ _SLOT_TEXTS = {
     "connection.R": "body->connection", "connection.r": "body->connection + 9",
     "body.q": "state->q + body->q", "body.u": "state->u + body->u",
     "body.qdot": "state->qdot + body->q", "body.w": "block + MSTMM_BLOCK_MOTION",
-    **{f"body.{name}": f"state->{to} + body->u" for name, to in _STATE.items()},
+    **{f"body.{name}": f"state->{name} + body->u" for name in _STATE},
     "modes.eta": "state->q + modal->q", "modes.etad": "state->u + modal->u",
     "modes.qdot": "state->qdot + modal->q",
-    **{f"modes.{name}": f"state->{to} + modal->u" for name, to in _STATE.items()},
+    **{f"modes.{name}": f"state->{name} + modal->u" for name in _STATE},
     "modes.K": "modal->stiffness", "modes.D": "modal->damping",
-    **{f"moments.{name}": f"modal->moments.{to}" for name, to in _MOMENTS.items()},
-    **{f"drag.{name}": f"modal->drag->{to}" for name, to in _MOMENTS.items()},
-    "section.b": "section->rest", "section.Bm": "section->shapes",
     "inboard.S_rf": _station_text("state->workspace", "section.S_rf", "modes.S_rf"),
     "inboard.shapes_S_rf": _station_text(_TANGENT_NUMBERS, "port.outboard_K", "bend.V"),
     "inboard.K": _station_text(_TANGENT_NUMBERS, "port.outboard_K", "bend.K"),
     "inboard.Z_z": _station_text(_TANGENT_NUMBERS, "port.outboard_Z_z", "bend.Z_z"),
     "inboard.Z_p": _station_text(_TANGENT_NUMBERS, "port.outboard_Z_p", "bend.place_Z"),
-    "section.r": "section->point", "section.phi": "section->phi",
-    "section.theta": "section->theta", "section.end": "section->end",
-    **{f"section.g_{a}": f"section->drawn[{k}]" for k, a in enumerate("xyz")},
-    **{f"section.h_{a}": f"section->turned[{k}]" for k, a in enumerate("xyz")},
     "drive.value": "mstmm_drive_values(state) + 3 * index",
     "drive.rate": "mstmm_drive_values(state) + 3 * index + 1",
     "drive.acceleration": "mstmm_drive_values(state) + 3 * index + 2",
@@ -144,12 +145,9 @@ _SLOT_TEXTS = {
     "drive.u": "mstmm_filled_u(state) + body->u + drive->speed",
     "drive.s": "block + MSTMM_BLOCK_FIXED + drive->speed",
     "speed.effort": "state->efforts + index", "speed.u": "state->u + index",
-    "law.p": "law->p", "law.q": "state->q + body->q + law->coordinate",
-    "law.u": "state->u + body->u + law->speed", "law.effort": "law->effort",
-    "law.axes": "law->axes", "law.turn": "state->memory + law->twist",
+    "law.q": "state->q + body->q + law->coordinate",
+    "law.u": "state->u + body->u + law->speed", "law.turn": "state->memory + law->twist",
     "law.tau": "block + MSTMM_BLOCK_FIXED + MSTMM_SPEED_TAU * body->nu + law->speed",
-    "load.axes_own": "load->axes_own", "load.offset": "load->offset", "load.force": "load->force",
-    "load.moment": "load->moment", "force.p": "force->p",
     "force.offset_F": "force->offset_f", "force.offset_T": "force->offset_t",
     "force.axes_F": "force->axes_f", "force.axes_T": "force->axes_t",
     "law.slopes": "tangent + MSTMM_TANGENT_LAWS(body->nu, body->nq) + body->nu * c + law->speed",
@@ -165,19 +163,16 @@ _SLOT_TEXTS = {
     "step.q": "&state->tangents->sq", "step.kappa": "&state->tangents->kappa",
     "body.rho": "state->tangents->rho + body->q",
     "body.change": "state->tangents->change + body->q",
-    "closure.turn": "closure->turn", "closure.end": "closure->end", "closure.p": "closure->p",
     "row.floor": "mstmm_row_floor(state, row)",
     "line.softness": "&state->model->rows[closure->rows[c]].softness",
     "side.inner": "loops + closure->inner[c]", "side.outer": "loops + closure->outer[c]",
-    "pending.K": "loops + pending->column", "pending.onward": "loops + pending->onward",
-    "pending.y": "loops + pending->y", "before.y": "loops + looped->pending[b].y",
-    "pending.tau": "loops + pending->tau", "own.tau": "loops + own->tau",
-    "own.inner": "loops + own->inner", "own.outer": "loops + own->outer",
+    "pending.K": "loops + pending->column",
+    "before.y": "loops + looped->pending[b].y",
     "coupling.x": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_X",
     "coupling.previous_x": "loops + MSTMM_ROW * (int64_t)coupling->row + MSTMM_ROW_PREVIOUS_X",
-    "pair.L": "loops + pending->pairs[b]", "pending.modes": "loops + pending->modes",
-    "bent.K": "loops + bent->column", "bent.modes": "loops + bent->modes",
-    "bent.y": "loops + bent->y", "bent_before.modes": "loops + looped->bent[b].modes",
+    "pair.L": "loops + pending->pairs[b]",
+    "bent.K": "loops + bent->column",
+    "bent_before.modes": "loops + looped->bent[b].modes",
     "bent_pair.L": "loops + bent->pairs[b]",
     "other.K": "loops + other->column", "other.L": "loops + other->pair",
     "second.L": "loops + row->others[b].pair", "both.L": "loops + other->pairs[b]",
@@ -342,79 +337,42 @@ def _stored_expression(slot: str) -> str | None:
     if slot in BLOCK_SLOTS:
         return f"block + MSTMM_BLOCK_{BLOCK_SLOTS[slot]}"
     if slot in SPEED_SLOTS:
-        return f"mstmm_of_speeds(block, nu, MSTMM_SPEED_{SPEED_SLOTS[slot][0]})"
-    if slot in CLOSURE_SLOTS:
-        return f"closed + {_macro_name(slot)}"
-    if slot in COUPLING_SLOTS:
-        return f"loops + coupling->numbers + {_macro_name(slot)}"
-    if slot in ROW_SLOTS:
-        return f"line + {_macro_name(slot)}"
+        return f"mstmm_of_speeds(block, nu, MSTMM_SPEED_{SPEED_SLOTS[slot]})"
     if slot in _ROW_INDICES:
         return f"loops + MSTMM_ROW * (int64_t){_ROW_INDICES[slot]} + {_macro_name('row.' + name)}"
-    for layout, start in (
-        (MODE_SLOTS, "modes"),
-        (SECTION_SLOTS, "laid"),
-        (BEND_SLOTS, "bend"),
-        (PORT_SLOTS, "port"),
-    ):
-        if slot in layout:
-            return f"{start} + {_macro_name(slot)}(n)"
-    if slot in TANGENT_SLOTS:
-        return f"tangent + {_macro_name(slot)}(body->nu, body->nq)"
-    if slot in PLACE_SLOTS:
-        return f"place + {_macro_name(slot)}(body->nu, body->nq)"
-    return None
+    layout = LAYOUTS.get(owner)
+    if layout is not None and name in layout.names.split():
+        return f"{layout.start} + {_macro_name(slot)}{layout.arguments}"
+    return f"{_RECORDS[owner]}{name}" if owner in _RECORDS else None
 
 
-def _offset_constants(layout: Mapping[str, int], total: str) -> list[str]:
-    """C constants of the offsets of a layout, and of its length."""
-    lines, offset = [], 0
-    for slot, count in layout.items():
-        lines.append(f"#define {_macro_name(slot)} {offset}")
-        offset += count
-    return [*lines, f"#define {total} {offset}"]
+#: Factor of a length -> C expression of a macro.
+_FACTORS = {"n": "(size_t)(n)", "n n": "(size_t)(n) * (n)"} | {
+    f"{a} {b}".strip(): f"({a}) * ({b})" if b else f"({a})"
+    for a, b in (("nu", ""), ("nu", "nu"), ("nq", "nq"), ("nq", "nu"))
+}
 
 
-def _per_mode_constants(layout: dict[str, tuple[int, int]]) -> list[str]:
+def _layout_macros(owner: str) -> list[str]:
+    """C constants or macros of the offsets of a layout, and of its length."""
+    layout = LAYOUTS[owner]
+    total, lines = f"MSTMM_{owner.upper()}" + "_NUMBERS" * bool(layout.parameters), []
+    for slot, offset in layout.offsets(owner).items():
+        terms = [f"{n} * {_FACTORS[size]}" if size else str(n) for size, n in offset.items() if n]
+        text = " + ".join(terms) or ("0 * (size_t)(n)" if layout.parameters == "(n)" else "0")
+        name = _macro_name(slot) if slot else total
+        text = f"({text})" if layout.parameters else text
+        lines.append(f"#define {name}{layout.parameters} {text}")
+    return lines
+
+
+def _per_mode_constants(owner: str) -> list[str]:
     """C constants of the slots whose offset is a multiple of the number of modes."""
-    lines, count = [], 0
-    for slot, (per_mode, per_pair) in layout.items():
-        lines.append(f"#define {_macro_name(slot)}_PER_MODE {count}")
-        count += per_mode
-        if per_pair:
-            break
-    return lines
-
-
-def _offset_macros(layout: dict[str, tuple[int, int]], second: str) -> list[str]:
-    """C macros of the offsets of a layout, by the number of modes."""
-    lines, counts = [], [0, 0]
-    for slot, sizes in layout.items():
-        lines.append(
-            f"#define {_macro_name(slot)}(n) ({counts[0]} * (size_t)(n) + {counts[1]}{second})"
-        )
-        counts = [a + b for a, b in zip(counts, sizes, strict=True)]
-    return lines
-
-
-_PAIRS = " * (size_t)(n) * (n)"
-
-
-def _speed_offset_macros(layout: Mapping[str, tuple[int, ...]], total: str) -> list[str]:
-    """C macros of offsets by the speeds and coordinates of a hinge, and of the `total` length."""
-    lines, counts = [], [0] * 5
-
-    def macro(name: str) -> str:
-        terms = zip(counts, ("1", "(nu)", "(nu) * (nu)", "(nq) * (nq)", "(nq) * (nu)"), strict=True)
-        return (
-            f"#define {name}(nu, nq) "
-            f"({' + '.join(f'{n} * {factor}' for n, factor in terms if n) or 0})"
-        )
-
-    for slot, sizes in layout.items():
-        lines.append(macro(_macro_name(slot)))
-        counts = [a + b for a, b in zip(counts, sizes, strict=True)]
-    return [*lines, macro(total)]
+    return [
+        f"#define {_macro_name(slot)}_PER_MODE {offset['n']}"
+        for slot, offset in LAYOUTS[owner].offsets(owner).items()
+        if slot and offset.total() == offset["n"]
+    ]
 
 
 def reads_variable(text: str, word: str) -> bool:
@@ -436,46 +394,33 @@ def slot_size(slot: str) -> str:
 
 def layout_header() -> str:
     """`layout.h`: offsets of a body's numbers in the workspace."""
-    lines, offset = [], 0
+    block, offset = list[str](), 0
     for slot, name in BLOCK_SLOTS.items():
-        lines.append(f"#define MSTMM_BLOCK_{name} {offset}")
-        offset += int(SLOTS[slot].size)
-    lines.append(f"#define MSTMM_BLOCK_FIXED {offset}")
-    speed_offset, rows = 0, []
-    for name, count in SPEED_SLOTS.values():
-        rows.append(f"#define MSTMM_SPEED_{name} {speed_offset}")
-        speed_offset += count
-    rows.append(f"#define MSTMM_BLOCK_PER_SPEED {speed_offset}")
-    return (
-        "/* Generated by mstmm; do not edit.  Numbers of a body's block in the workspace; the\n"
-        " * ground's block comes first. */\n"
-        "#ifndef MSTMM_LAYOUT_H\n#define MSTMM_LAYOUT_H\n\n/* cdef begin */\n"
-        + "\n".join(lines)
-        + "\n/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */\n"
-        + "\n".join(rows)
-        + "\n/* Flexible bodies and sections: arrays after a number of values per mode. */\n"
-        + "\n".join([*_per_mode_constants(MODE_SLOTS), *_per_mode_constants(SECTION_SLOTS)])
-        + "\n/* A cut hinge; a coupling; a row. */\n"
-        + "\n".join(
-            [
-                *_offset_constants(CLOSURE_SLOTS, "MSTMM_CLOSURE"),
-                *_offset_constants(COUPLING_SLOTS, "MSTMM_COUPLING"),
-                *_offset_constants(ROW_SLOTS, "MSTMM_ROW"),
-            ]
-        )
-        + "\n/* A body in a plane, and the values of its record. */\n"
-        + "\n".join(planar_layout())
-        + "\n/* cdef end */\n\n"
-        + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
-        + "\n".join([*_offset_macros(MODE_SLOTS, _PAIRS), *_offset_macros(SECTION_SLOTS, "")])
-        + "\n/* Data of the tangent for a body, a flexible body, a section. */\n"
-        + "\n".join(
-            [
-                *_speed_offset_macros(TANGENT_SLOTS, "MSTMM_TANGENT_NUMBERS"),
-                *_speed_offset_macros(PLACE_SLOTS, "MSTMM_PLACE_NUMBERS"),
-                *_offset_macros(BEND_SLOTS, _PAIRS),
-                *_offset_macros(PORT_SLOTS, _PAIRS),
-            ]
-        )
-        + "\n\n#endif\n"
-    )
+        block.append(f"#define MSTMM_BLOCK_{name} {offset}")
+        offset += size_terms(slot).total()
+    block.append(f"#define MSTMM_BLOCK_FIXED {offset}")
+    speeds, offset = list[str](), 0
+    for slot, name in SPEED_SLOTS.items():
+        speeds.append(f"#define MSTMM_SPEED_{name} {offset}")
+        offset += size_terms(slot).total()
+    speeds.append(f"#define MSTMM_BLOCK_PER_SPEED {offset}")
+
+    def macros(*owners: str) -> list[str]:
+        return [line for owner in owners for line in _layout_macros(owner)]
+
+    return "\n".join([
+        "/* Generated by mstmm; do not edit.  Numbers of a body's block in the workspace; the",
+        " * ground's block comes first. */",
+        "#ifndef MSTMM_LAYOUT_H", "#define MSTMM_LAYOUT_H", "", "/* cdef begin */", *block,
+        "/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */",
+        *speeds,
+        "/* Flexible bodies and sections: arrays after a number of values per mode. */",
+        *_per_mode_constants("modes"), *_per_mode_constants("section"),
+        "/* A cut hinge; a coupling; a row. */", *macros("closure", "coupling", "row"),
+        "/* A body in a plane, and the values of its record. */", *planar_layout(),
+        "/* cdef end */", "",
+        "/* Arrays of a flexible body of n modes, and of one of its sections. */",
+        *macros("modes", "section"),
+        "/* Data of the tangent for a body, a flexible body, a section. */",
+        *macros("tangent", "place", "bend", "port"), "", "#endif", "",
+    ])  # fmt: skip

@@ -37,14 +37,7 @@ from .kernel_calls import (
     dispatch_tables,
 )
 from .pass_loops import loop_functions
-from .slot_storage import (
-    BEND_SLOTS,
-    BODY_OF_SUBJECT,
-    MODE_SLOTS,
-    PORT_SLOTS,
-    SECTION_SLOTS,
-    pass_variables,
-)
+from .slot_storage import BODY_OF_SUBJECT, pass_variables
 from .step_text import FUSED_ONLY_TRAITS, StepText, is_fused_only, local_name
 
 Kernels = dict[str, Callee]
@@ -135,20 +128,12 @@ def _planar_directions_text(specs: Specs) -> str:
 
 def _size_functions() -> str:
     """Sizes of the data of flexible bodies in the workspace."""
-
-    def total(layout: dict[str, tuple[int, int]], second: str) -> str:
-        per_mode, per_pair = (sum(sizes[k] for sizes in layout.values()) for k in (0, 1))
-        return f"(int64_t){per_mode} * n + {per_pair}{second}"
-
-    return (
-        f"int64_t mstmm_modal_numbers(int n) {{ return {total(MODE_SLOTS, ' * (int64_t)n * n')}; "
-        f"}}\n"
-        f"int64_t mstmm_section_numbers(int n) {{ return {total(SECTION_SLOTS, '')}; }}\n"
-        f"int64_t mstmm_bend_numbers(int n) {{ return {total(BEND_SLOTS, ' * (int64_t)n * n')}; "
-        f"}}\n"
-        f"int64_t mstmm_port_numbers(int n) {{ return {total(PORT_SLOTS, ' * (int64_t)n * n')}; "
-        f"}}\n"
-    )
+    return "".join(
+        f"int64_t mstmm_{name}_numbers(int n) {{ return MSTMM_{layout}_NUMBERS(n); }}\n"
+        for name, layout in (
+            ("modal", "MODES"), ("section", "SECTION"), ("bend", "BEND"), ("port", "PORT")
+        )
+    )  # fmt: skip
 
 
 def function_declaration(whole: Pass) -> str:

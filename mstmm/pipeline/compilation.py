@@ -106,7 +106,7 @@ def compile_level(
         raise SceneError(f'sweep "{sweep}" is not known; there are: {", ".join(SWEEPS)}')
     if not (isinstance(accuracy, Real) and accuracy > 0) or isinstance(accuracy, bool):
         raise SceneError(f"accuracy = {abbreviate(accuracy)}: expected a positive number")
-    from mstmm.runtime.packing.rigid_substitution import with_level
+    from mstmm.runtime.packing.expansion import with_level
     from mstmm.runtime.packing.simplification import parse_simplify
 
     from ..runtime.kernels import kernel_store

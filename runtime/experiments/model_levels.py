@@ -23,7 +23,7 @@ from mstmm.scene.tables.hinge import Initial
 from ..engine.quantity_registry import BodyReferences
 from ..flexible.beam.modal_beams import BeamBodies
 from ..flexible.elastic.modal_elastic import AUTO_MODES
-from ..packing.rigid_substitution import LEVELS
+from ..packing.expansion import LEVELS
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene

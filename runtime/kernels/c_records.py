@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
@@ -91,6 +92,8 @@ class Memory:
         self.keep_alive: list[Any] = []
         #: C type -> current block, and the length used.
         self._blocks: dict[str, tuple[Any, int]] = {}
+        #: C type and class of a source -> name, conversion and source of the fields.
+        self._fields: dict[tuple[Any, type], list[tuple[str, Callable[[Any], Any], bool]]] = {}
 
     def new(self, kind: str, given: Any = None) -> Any:
         """Allocate a record or an array of them."""
@@ -115,6 +118,46 @@ class Memory:
         self._blocks[kind] = block, used + count
         return block + used
 
+    def fill(self, record: Any, source: Any = None, /, **others: Any) -> None:
+        """Fill the fields of a C record that `others` name, or that the dataclass `source` has.
+
+        Behind pointers to numbers and tapes is a copy of the value in this memory; None is NULL.
+        """
+        kind = self.ffi.typeof(record)
+        key = kind, type(source)
+        if key not in self._fields:
+            in_source = set() if source is None else {field.name for field in fields(source)}
+            self._fields[key] = [
+                (name, self._conversion(field.type), name in in_source)
+                for name, field in (kind.item if kind.kind == "pointer" else kind).fields
+            ]
+        for name, convert, is_in_source in self._fields[key]:
+            if name in others:
+                setattr(record, name, convert(others[name]))
+            elif is_in_source:
+                setattr(record, name, convert(getattr(source, name)))
+
+    def _conversion(self, kind: Any) -> Callable[[Any], Any]:
+        """Function from a value to one of the C type of a field."""
+        if kind.kind not in ("pointer", "function"):
+            return lambda value: value
+        copies: dict[str, Callable[[Any], Any]] = {
+            "double": self._numbers, "int": self.ints, "mstmm_tape": self.expression,
+        }  # fmt: skip
+        to_pointer = copies.get(kind.item.cname if kind.kind == "pointer" else "")
+
+        def convert(value: Any) -> Any:
+            if value is None:
+                return self.ffi.NULL
+            if to_pointer is None or isinstance(value, self.ffi.CData):
+                return value
+            return to_pointer(value)
+
+        return convert
+
+    def _numbers(self, numbers: Sequence[float] | Array) -> Any:
+        return self.array(numbers) if isinstance(numbers, np.ndarray) else self.reals(numbers)
+
     def array(self, numbers: Array) -> Any:
         """Pointer `real *` to the entries of an array, row by row."""
         flat = np.ascontiguousarray(np.ravel(numbers) if np.size(numbers) else [0.0], dtype=float)
@@ -126,6 +169,6 @@ class Memory:
         self.slots = max(self.slots, tape.slots)
         return c_tape(self.ffi, tape, self.keep_alive)
 
-    def expression(self, kernel: KernelIR | None) -> Any:
-        """Tape of a kernel of expressions; NULL without one."""
-        return self.ffi.NULL if kernel is None else self.tape(compile_tape(kernel))
+    def expression(self, kernel: KernelIR | Tape) -> Any:
+        """Tape of a kernel of expressions."""
+        return self.tape(kernel if isinstance(kernel, Tape) else compile_tape(kernel))

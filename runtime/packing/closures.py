@@ -44,8 +44,6 @@ _IDENTITY = (*IDENTITY[0], *IDENTITY[1], *IDENTITY[2])
 
 def closure_numbers(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[ClosureNumbers]:
     """Closures of the cut hinges, then of the constraints."""
-    if not frames.expanded.cuts:
-        return
     first_bodies = {run.position: run.members[0] for run in runs}
     for cut in frames.expanded.cuts:
         place = frames.positions[cut.frame]

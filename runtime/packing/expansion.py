@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from mstmm.argument_validation import require_word
 from mstmm.errors import SceneError
 from mstmm.expression.derivatives import motion
 from mstmm.ir import KernelIR, Port
@@ -39,7 +40,7 @@ from ..flexible.modal_body import ModalBody
 from ..flexible.modal_parts import MassPoint, ModalPort, Station
 from ..kernels.prebuilt_kernels import Element
 from .coordinate_layout import OF_CONSTRAINT
-from .rigid_substitution import RigidSubstitution, scale_expression
+from .rigid_substitution import RigidSubstitution, scale_expression, substitute_rigid_bodies
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -226,6 +227,49 @@ class ExpandedScene:
     def is_node(self, name: str) -> bool:
         """Whether a body of the expanded scene belongs to a flexible body."""
         return name in self.bodies or name in self.passages or name.endswith(f"/{HELD}")
+
+
+#: Values of `compile(flexibility=)`, and the `model` that they give every flexible body.
+LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
+
+
+def with_level(scene: Scene, flexibility: str | None) -> Scene:
+    """Set the model level of all flexible bodies; None keeps the scene.
+
+    Raises SceneError for an unknown level.
+    """
+    if flexibility is None:
+        return scene
+    known = ", ".join(LEVELS)
+    if require_word("flexibility", flexibility, f"one of {known}, or None") not in LEVELS:
+        raise SceneError(f'flexibility: expected one of {known}, found "{flexibility}"')
+    level = {"model": LEVELS[flexibility]}
+    fields = {key: getattr(scene, key) for key in type(scene).model_fields}
+    fields["beam"] = tuple(beam.model_copy(update=level) for beam in scene.beam)
+    fields["elastic"] = tuple(body.model_copy(update=level) for body in scene.elastic)
+    return Scene.model_construct(**fields)
+
+
+def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> ExpandedScene:
+    """Expand a scene into nodes, after rigid substitution and cutting of loops.
+
+    `flexible` are all modal bodies if they are known already.
+    """
+    if not (scene.beam or scene.elastic):
+        nodes, cuts = cut_loops(scene)
+        return ExpandedScene(nodes, scene, {}, cuts=cuts)
+    from ..flexible.flexible_bodies import modal_bodies
+
+    substitution = substitute_rigid_bodies(scene, flexible or {})
+    nodes, cuts = cut_loops(substitution.scene)
+    if flexible is None:
+        bodies = modal_bodies(substitution.scene)
+    else:
+        bodies = {n: body for n, body in flexible.items() if n not in substitution.one_way}
+    expanded = expand(nodes, bodies, cuts)
+    expanded.user_scene, expanded.rigidified = scene, substitution
+    expanded.nodes |= substitution.nodes
+    return expanded
 
 
 def expand(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from typing import Any, Protocol
+from dataclasses import fields, replace
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,9 @@ from .system import ClosureNumbers, CouplingNumbers, System
 
 #: Constants in expressions that stay in the structure.
 _STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
+#: Fields of structures that are axes, whose +-1 are structural as well.
+_AXES = ("axes", "axes_own")
+T = TypeVar("T")
 
 
 def structure_of(
@@ -54,9 +57,12 @@ def structure_and_numbers(
     builder, elements = _StructureBuilder(system, bake), Elements(known)
     gravity = builder.entries(system.gravity)
     bodies = tuple(body for run in system.bodies for body in builder.bodies(run))
-    bodies, closures, rows, couplings = with_loops(bodies, system, builder.entries, floors)
+    loops: list[Any] = [(), (), ()]
+    if system.has_loops:
+        bodies, *loops = _with_loops(bodies, system, builder.entries, floors)
+    closures, rows, couplings = loops
     laws = tuple(law for run in system.laws for law in builder.laws(run))
-    loads = tuple(map(builder.load, system.loads))
+    loads = tuple(builder.structure(code.LoadStructure, load) for load in system.loads)
     forces = tuple(map(builder.force, system.forces))
     used = {key for body in bodies for key in (body.hinge, body.body)}
     used |= {force.element for force in forces}
@@ -136,25 +142,35 @@ class _StructureBuilder:
             self.numbers.append(self._inputs_at_zero[entry])
         return self.inputs[entry]
 
-    # --- bodies -------------------------------------------------------------------------------
+    # --- records --------------------------------------------------------------------------------
 
-    def bodies(self, run: given.BodyRun) -> Iterable[code.BodyStructure]:
+    def structure(self, kind: type[T], source: Any, **others: Any) -> T:
+        """Structure with `others` and, in the order of `kind`, the fields of `source`."""
+        for field in fields(kind):  # type: ignore[arg-type]
+            if field.name not in others and hasattr(source, field.name):
+                value = getattr(source, field.name)
+                if field.type == "Entries":
+                    value = self.entries(value, axes=field.name in _AXES)
+                others[field.name] = value
+        return kind(**others)
+
+    def bodies(self, run: given.BodyRun) -> Iterable[BodyStructure]:
         """Structures of all bodies of a run."""
         places = zip(run.slots.q_starts().tolist(), run.slots.u_starts().tolist(), strict=True)
         for k, (q, u) in enumerate(places):
             yield self._body(run.member(k), run.position + k - 1 if k else run.parent, q, u)
 
-    def _body(self, body: given.BodyNumbers, parent: int, q: int, u: int) -> code.BodyStructure:
+    def _body(self, body: given.BodyNumbers, parent: int, q: int, u: int) -> BodyStructure:
         link = self._link(body)
         connection = () if link else body.connection
-        return code.BodyStructure(
-            parent, body.hinge, body.body, q, u, body.nq, body.nu,
-            self.entries(connection[:9], axes=True), self.entries(connection[9:]),
-            self.entries(body.hinge_p),
-            (*self.entries(body.body_p), *self.entries(body.body_frame, axes=True)),
-            self.entries(body.rotor), link, body.imposed, self._modal(body.modal),
-            self._section(body.section), body.idle,
-        )  # fmt: skip
+        numbers = {
+            "rotation": self.entries(connection[:9], axes=True),
+            "position": self.entries(connection[9:]), "hinge_p": self.entries(body.hinge_p),
+            "body_p": (*self.entries(body.body_p), *self.entries(body.body_frame, axes=True)),
+            "rotor": self.entries(body.rotor), "modal": self._modal(body.modal),
+            "section": self._section(body.section),
+        }  # fmt: skip
+        return self.structure(BodyStructure, body, parent=parent, q=q, u=u, link=link, **numbers)
 
     def _link(self, body: given.BodyNumbers) -> Entries:
         """Screws about x and z of a connection between axial hinges; empty if there are none.
@@ -165,52 +181,39 @@ class _StructureBuilder:
             return ()
         return (*self.entries(body.link[:2], axes=True), *self.entries(body.link[2:]))
 
-    def _arrays(self, arrays: given.Arrays) -> tuple[tuple[str, Entries], ...]:
-        named = arrays.named.items()
-        return tuple((name, self.entries(array.ravel().tolist())) for name, array in named)
+    def _arrays(self, arrays: given.Arrays | None) -> tuple[tuple[str, Entries], ...]:
+        named = {} if arrays is None else arrays.named
+        return tuple((name, self.entries(array.ravel().tolist())) for name, array in named.items())
 
     def _modal(self, modal: given.ModalNumbers | None) -> code.ModalStructure | None:
         """Modes of a flexible body; None for other bodies."""
         if modal is None:
             return None
-        drag = () if modal.drag is None else self._arrays(modal.drag)
-        moments, matrices = self._arrays(modal.moments), dict(self._arrays(modal.matrices))
-        return code.ModalStructure(modal.n, modal.q, modal.u, moments, drag, **matrices)
+        drag, moments = self._arrays(modal.drag), self._arrays(modal.moments)
+        matrices = dict(self._arrays(modal.matrices))
+        return self.structure(code.ModalStructure, modal, moments=moments, drag=drag, **matrices)
 
     def _section(self, section: given.SectionNumbers | None) -> code.SectionStructure | None:
         """Section of a flexible body in a body's connection; None without one."""
         if section is None:
             return None
-        return code.SectionStructure(
-            section.frame, section.inward, self._arrays(section.inputs),
-            self.entries(section.end, axes=True),
-        )  # fmt: skip
-
-    # --- laws, loads, forces --------------------------------------------------------------------
+        inputs, end = self._arrays(section.inputs), self.entries(section.end, axes=True)
+        return self.structure(code.SectionStructure, section, numbers=inputs, end=end)
 
     def laws(self, run: given.LawRun) -> Iterable[code.LawStructure]:
         """Structures of all laws of a run."""
         for law, body, twist, effort in run.iterate_laws():
-            yield code.LawStructure(
-                body, law.kernel, law.coordinate, law.speed, law.n, twist, self.entries(law.p),
-                self.entries(law.axes, axes=True), effort,
-            )  # fmt: skip
-
-    def load(self, load: given.LoadNumbers) -> code.LoadStructure:
-        """Structure of a load."""
-        return code.LoadStructure(
-            load.body, load.axes, self.entries(load.axes_own, axes=True),
-            self.entries(load.offset), load.force, load.moment,
-        )  # fmt: skip
+            yield self.structure(code.LawStructure, law, body=body, twist=twist, effort=effort)
 
     def force(self, force: given.ForceNumbers) -> code.ForceStructure:
         """Structure of a force element."""
         (body_f, axes_f, offset_f), (body_t, axes_t, offset_t) = force.ends
-        return code.ForceStructure(
-            force.element, body_f, body_t, self.entries(axes_f, axes=True),
-            self.entries(axes_t, axes=True), self.entries(offset_f), self.entries(offset_t),
-            self.entries(force.p), self.expression(force.effort),
-        )  # fmt: skip
+        ends = {
+            "axes_f": self.entries(axes_f, axes=True), "axes_t": self.entries(axes_t, axes=True),
+            "offset_f": self.entries(offset_f), "offset_t": self.entries(offset_t),
+            "p": self.entries(force.p), "effort": self.expression(force.effort),
+        }  # fmt: skip
+        return self.structure(code.ForceStructure, force, body_f=body_f, body_t=body_t, **ends)
 
 
 # --- closed loops ---------------------------------------------------------------------------------
@@ -222,7 +225,7 @@ class EntrySorter(Protocol):
     def __call__(self, values: Iterable[float], axes: bool = False) -> Entries: ...
 
 
-def with_loops(
+def _with_loops(
     bodies: Sequence[BodyStructure], system: System, sort: EntrySorter, floors: Sequence[float]
 ) -> tuple[
     tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...],

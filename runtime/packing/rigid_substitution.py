@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from mstmm.argument_validation import require_word
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.expression.expression import Expression, parse
@@ -45,9 +44,6 @@ if TYPE_CHECKING:
 
 Joining = TypeVar("Joining", Spring, Bushing, Constraint)
 
-#: Values of `compile(flexibility=)`, and the `model` that they give every flexible body.
-LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
-
 
 @dataclass
 class RigidSubstitution:
@@ -70,23 +66,6 @@ class RigidSubstitution:
     inboard_hinges: dict[str, Hinge] = field(default_factory=dict)
     loop_hinges: frozenset[str] = frozenset()
     passed: frozenset[str] = frozenset()
-
-
-def with_level(scene: Scene, flexibility: str | None) -> Scene:
-    """Set the model level of all flexible bodies; None keeps the scene.
-
-    Raises SceneError for an unknown level.
-    """
-    if flexibility is None:
-        return scene
-    known = ", ".join(LEVELS)
-    if require_word("flexibility", flexibility, f"one of {known}, or None") not in LEVELS:
-        raise SceneError(f'flexibility: expected one of {known}, found "{flexibility}"')
-    level = {"model": LEVELS[flexibility]}
-    fields = {key: getattr(scene, key) for key in type(scene).model_fields}
-    fields["beam"] = tuple(beam.model_copy(update=level) for beam in scene.beam)
-    fields["elastic"] = tuple(body.model_copy(update=level) for body in scene.elastic)
-    return Scene.model_construct(**fields)
 
 
 def substitute_rigid_bodies(

@@ -23,7 +23,7 @@ from .applied_laws import force_element_numbers, law_runs
 from .bodies import LETS_GO, Bodies, kernel_type
 from .closures import closure_numbers, coupling_numbers
 from .coordinate_layout import Group, HingeSlots, Layout
-from .expansion import ExpandedScene, curve_elements, cut_loops, expand
+from .expansion import ExpandedScene, curve_elements, expansion_of
 from .expression_tapes import MOVING, Values, drive_kernel
 from .packed_scene import Frames, Lookup, releasable_hinges
 from .records.body_records import link_kernel
@@ -40,29 +40,6 @@ from .simplification import (
     with_right_angles,
 )
 from .system import BodyRun, HeldInputs, LoadNumbers, Numbers, System
-
-
-def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> ExpandedScene:
-    """Expand a scene into nodes, after rigid substitution and cutting of loops.
-
-    `flexible` are all modal bodies if they are known already.
-    """
-    if not (scene.beam or scene.elastic):
-        nodes, cuts = cut_loops(scene)
-        return ExpandedScene(nodes, scene, {}, cuts=cuts)
-    from ..flexible.flexible_bodies import modal_bodies
-    from .rigid_substitution import substitute_rigid_bodies
-
-    substitution = substitute_rigid_bodies(scene, flexible or {})
-    nodes, cuts = cut_loops(substitution.scene)
-    if flexible is None:
-        bodies = modal_bodies(substitution.scene)
-    else:
-        bodies = {n: body for n, body in flexible.items() if n not in substitution.one_way}
-    expanded = expand(nodes, bodies, cuts)
-    expanded.user_scene, expanded.rigidified = scene, substitution
-    expanded.nodes |= substitution.nodes
-    return expanded
 
 
 def system_of(
@@ -109,7 +86,9 @@ def system_of(
     laws = tuple(law_runs(nodes, tree, layout, values, n_memory))
     loads = tuple(_load_numbers(frames, load, values) for load in nodes.load)
     held = _held_inputs(scene, laws[-1].next_angle_index if laws else n_memory)
-    couplings, coupled = coupling_numbers(frames, runs)
+    loops: list[Any] = [(), (), None]
+    if expanded.cuts or scene.coupling:
+        loops = [tuple(closure_numbers(frames, runs)), *coupling_numbers(frames, runs)]
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), strained, nodes.gravity, runs,
         laws, loads, force_element_numbers(frames, nodes, ports),
@@ -117,7 +96,7 @@ def system_of(
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
         held, has_timed_loads(nodes, nodes.channels), moving or {},
-        tuple(closure_numbers(frames, runs)), couplings, coupled,
+        *loops,
     )  # fmt: skip
     return system, frames
 

@@ -14,9 +14,11 @@
 #include "tape.h"
 
 /* cdef begin */
-/* Moments of the fields of a flexible body under one density; see derive/flexible/modal_residual.py. */
+/* Moments of the fields of a flexible body under one density, by their names in
+ * derive/flexible/modal_residual.py. */
 typedef struct {
-    const real *rigid, *c, *p, *b, *z[6], *y[3], *g[3], *m;
+    const real *p, *C, *P, *B, *Z_xx, *Z_xy, *Z_xz, *Z_yy, *Z_yz, *Z_zz;
+    const real *Y_x, *Y_y, *Y_z, *G_x, *G_y, *G_z, *M;
 } mstmm_moments;
 
 /* A flexible body: internal coordinates of the body that is its floating frame. */
@@ -30,12 +32,13 @@ typedef struct {
 } mstmm_modal;
 
 /* A section of a flexible body, and the direction in which it is passed.  A segment of an exact
- * beam, which leads from one station to the next, has `rest` and `shapes` in place of fields. */
+ * beam, which leads from one station to the next, has `b` and `Bm` in place of fields. */
 typedef struct mstmm_section {
     mstmm_modal *modal;
     int inward; /* 1: from the inboard section to the floating frame; 0: outboard, to an end */
-    const real *point, *phi, *theta, *drawn[3], *turned[3], *end; /* g and h of second order */
-    const real *rest, *shapes; /* see derive/flexible/segment.py; NULL: no segment */
+    const real *r, *phi, *theta, *end;
+    const real *g_x, *g_y, *g_z, *h_x, *h_y, *h_z; /* of second order */
+    const real *b, *Bm; /* see derive/flexible/segment.py; NULL: no segment */
     const struct mstmm_section *before; /* that of the station before; NULL: the first segment */
     int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
     int64_t tangent; /* of its numbers in those of the tangent */

@@ -14,7 +14,7 @@ from mstmm.scene import Scene, split_reference
 from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes
 from mstmm.scene.tables.elastic import Elastic
 
-from ...packing.rigid_substitution import LEVELS
+from ...packing.expansion import LEVELS
 from ...result.checks.flexible import MAX_LOAD_RATIO
 from ...result.flexible.model_range import ModelRange
 from ...result.one_way.response import rigidified_bodies

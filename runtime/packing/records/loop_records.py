@@ -108,13 +108,11 @@ class LoopRecords:
 
 def attach_loops(
     model: Any, system: System, memory: Memory, lib: Any, place: int
-) -> tuple[int, LoopRecords | None]:
+) -> tuple[int, LoopRecords]:
     """Write the constraint rows to the model, and reserve workspace at offset `place`.
 
     Returns the offset behind them, and the records.
     """
-    if not system.has_loops:
-        return place, None
     return _LoopWriter(model, system, memory, lib).write(place)
 
 
@@ -193,10 +191,10 @@ class _LoopWriter:
         records = memory.new("mstmm_loop_row[]", max(1, len(self.plan.rows)))
         model.first_ground_row = len(self.plan.rows)
         for number, row in enumerate(self.plan.rows):
-            records[number].body = row.body
-            records[number].release = records[number].rest = -1
-            records[number].n_others = len(row.others)
-            records[number].others = self._coupled_records(row.body, row.others, number)
+            others = self._coupled_records(row.body, row.others, number)
+            memory.fill(
+                records[number], row, release=-1, rest=-1, n_others=len(row.others), others=others
+            )
             if row.body == GROUND:
                 model.first_ground_row = min(model.first_ground_row, number)
             else:
@@ -214,12 +212,13 @@ class _LoopWriter:
             for group, closure in enumerate(self.system.closures)
         )
         attach_couplings(model, self.system, memory, couplings, records, looped, self._side_column)
-        model.looped, model.rows, model.n_rows = looped, records, len(self.plan.rows)
-        model.closures = self.pools["mstmm_closure"].records
-        model.n_closures = len(self.system.closures)
-        model.loops, model.loops_summed = place, self.sums_offset
-        model.answer = place + self._reserve(self.system.nu)
-        model.loops_apart = LOCKING_GAP_FRACTION * characteristic_length(self.system)
+        memory.fill(
+            model, looped=looped, rows=records, n_rows=len(self.plan.rows),
+            closures=self.pools["mstmm_closure"].records, n_closures=len(self.system.closures),
+            loops=place, loops_summed=self.sums_offset,
+            answer=place + self._reserve(self.system.nu),
+            loops_apart=LOCKING_GAP_FRACTION * characteristic_length(self.system),
+        )  # fmt: skip
         closures = tuple(written[group] for group in sorted(written))
         with_rows = tuple(coupling for coupling in couplings if coupling.row >= 0)
         loops = LoopRecords(place, self.plan, records, closures, with_rows, records_of_bodies)
@@ -259,24 +258,22 @@ class _LoopWriter:
         numbers = self.system.body(body)
         speeds, flexible_body = numbers.nu, numbers.section.frame if numbers.section else -1
         for k, row in enumerate(rows):
-            records[k].row = row
-            records[k].column = self.columns[body, row]
-            records[k].onward = self._column(self.parents[body], row)
-            records[k].modes = self.modes.get((flexible_body, row), 0)
-            records[k].y = self._reserve(speeds)
-            records[k].tau = self.coupled.get((body, row), -1)
-            records[k].pairs = self._entries(row, rows[: k + 1])
+            self.memory.fill(
+                records[k], row=row, column=self.columns[body, row],
+                onward=self._column(self.parents[body], row), y=self._reserve(speeds),
+                modes=self.modes.get((flexible_body, row), 0),
+                tau=self.coupled.get((body, row), -1), pairs=self._entries(row, rows[: k + 1]),
+            )  # fmt: skip
         return records
 
     def _modal_records(self, body: int, rows: list[int]) -> Any:
         """Records of the rows that pass the modes of a flexible body."""
         records = self.pools["mstmm_pending"].next_records(len(rows))
         for k, row in enumerate(rows):
-            records[k].row = row
-            records[k].column = self._column(body, row)
-            records[k].modes = self.modes[body, row]
-            records[k].y = self._reserve(self._mode_count(body))
-            records[k].pairs = self._entries(row, rows[: k + 1])
+            self.memory.fill(
+                records[k], row=row, column=self._column(body, row), modes=self.modes[body, row],
+                y=self._reserve(self._mode_count(body)), pairs=self._entries(row, rows[: k + 1]),
+            )  # fmt: skip
         return records
 
     def _mode_count(self, body: int) -> int:
@@ -287,23 +284,21 @@ class _LoopWriter:
         """Records of the open rows that row `number`, which closes on `body`, is coupled with."""
         records = self.pools["mstmm_other"].next_records(len(others))
         for k, other in enumerate(others):
-            records[k].row = other
-            records[k].column = self._column(body, other)
-            records[k].pair = self._entry(number, other)
-            records[k].pairs = self._entries(other, others[: k + 1])
+            self.memory.fill(
+                records[k], row=other, column=self._column(body, other),
+                pair=self._entry(number, other), pairs=self._entries(other, others[: k + 1]),
+            )  # fmt: skip
         return records
 
     def _write_closure(
         self, group: int, closure: ClosureNumbers, rows: Any
     ) -> tuple[Any, WrittenClosure]:
         record = self.pools["mstmm_closure"].next_records(1)
-        record.frame, record.outboard = closure.frame, closure.outboard
-        record.turn, record.end = list(closure.turn), list(closure.end)
-        record.kind = getattr(self.lib, f"MSTMM_{closure.kind.upper()}")
-        for k, number in enumerate(closure.p):
-            record.p[k] = number
-        record.numbers = self._reserve(int(self.lib.MSTMM_CLOSURE))
-        record.rows = [-1 if k < closure.asked else -2 for k in range(6)]
+        self.memory.fill(
+            record, closure, kind=getattr(self.lib, f"MSTMM_{closure.kind.upper()}"),
+            numbers=self._reserve(int(self.lib.MSTMM_CLOSURE)),
+            rows=[-1 if k < closure.asked else -2 for k in range(6)],
+        )  # fmt: skip
         frame, row_by_direction = self.system.body(closure.frame), dict[int, int]()
         inboard = self.parents[closure.frame]
         for k, direction in enumerate(closure.directions):
@@ -404,9 +399,9 @@ def attach_couplings(
     frames = {closure.frame for closure in system.closures}
     for record, written in zip(records, couplings, strict=False):
         row, kept = written.row, written.coupling.constant
-        record.row, record.numbers = row, written.numbers
-        record.kept = 0.0 if kept is None else kept
-        record.of_speeds = int(written.coupling.of_speeds or kept is None)
+        memory.fill(
+            record, written, kept=kept or 0.0, of_speeds=written.coupling.of_speeds or kept is None
+        )
         if row >= 0:
             rows[row].of_speeds = record.of_speeds
         for hinge in written.coupling.hinges:
@@ -417,5 +412,6 @@ def attach_couplings(
                 )
     for frame, entries in own.items():
         looped[frame].n_own, looped[frame].own = len(entries), memory.new("mstmm_own[]", entries)
-    model.couplings, model.n_couplings = records, len(couplings)
-    model.coupling_tape = memory.expression(system.coupling_kernel)
+    memory.fill(
+        model, couplings=records, n_couplings=len(couplings), coupling_tape=system.coupling_kernel
+    )

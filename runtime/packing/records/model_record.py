@@ -20,7 +20,7 @@ from ...kernels import prebuilt_kernels
 from ...kernels.c_records import CRecords, Memory, c_tape
 from ...kernels.prebuilt_kernels import Elements
 from ..load_coupling import LoadDependence, load_coupling
-from ..system import ForceNumbers, LawNumbers, LawRun, LoadNumbers, System
+from ..system import LawNumbers, LawRun, System
 from .body_records import BodyRecords, attach_runs
 from .loop_records import LoopRecords, attach_loops
 from .planar_records import attach_planar_bodies, motion_plane
@@ -56,58 +56,53 @@ def write_model(system: System, elements: Elements) -> Written:
     ffi, lib = prebuilt_kernels.module()
     memory = Memory(ffi)
     model = memory.new("mstmm_model *")
-    model.nq, model.nu, model.n_memory = system.nq, system.nu, system.n_memory
-    model.strained = system.strain_index
-    model.gravity = list(system.gravity)
-    bodies = BodyRecords(system, elements, memory, lib)
-    model.bodies, model.n_bodies = bodies.records.array, system.count
-    model.n_flexible = len(bodies.modal.modal)
-    model.n_imposed = int(system.rows(lambda body: any(body.imposed)).sum())
-    drives = memory.new("mstmm_drive[]", max(1, len(system.driven)))
-    for record, (body, k) in zip(drives, system.driven, strict=False):
-        record.body, record.coordinate, record.speed = body, k, k
-    model.drives, model.n_drives = drives, len(system.driven)
-    model.drive_tape = memory.expression(system.drives)
-    laws = _LawRecords(system, memory)
-    model.laws, model.n_laws = laws.records.array, laws.records.count
+    bodies, laws = BodyRecords(system, elements, memory, lib), _LawRecords(system, memory)
+    drives = [{"body": body, "coordinate": k, "speed": k} for body, k in system.driven]
     reach = load_coupling(system)
     for place in reach.own_load_bodies:
         bodies.records.array[place].placed = 1
     loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
     for record, load, is_own in zip(loads, system.loads, reach.loads, strict=False):
-        _fill_load(record, load)
-        record.own = int(is_own)
-    model.loads, model.n_loads = loads, len(system.loads)
+        memory.fill(record, load, own=is_own)
     forces = memory.new("mstmm_force[]", max(1, len(system.forces)))
     for record, force, is_own in zip(forces, system.forces, reach.forces, strict=False):
-        _fill_force(record, force, elements, memory)
-        record.own = int(is_own)
-    model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(
-        bool(system.forces or system.loads or system.bodies_with_drag or system.has_loops)
-    )
-    model.inputs = write_inputs(system.inputs, system.held_inputs.memory_indices, memory)
-    model.n_inputs = len(system.inputs)
-    model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
-    offset, loops = attach_loops(model, system, memory, lib, bodies.end)
-    axes = motion_plane(system, elements)
-    if loops is not None and axes is not None:
-        offset = attach_planar_bodies(
-            model, system, elements, memory, lib, loops.body_records, axes, offset
-        )
+        functions = elements[force.element].functions
+        ends = {
+            f"{name}_{letter}": value
+            for letter, end in zip("ft", force.ends, strict=True)
+            for name, value in zip(("body", "axes", "offset"), end, strict=True)
+        }
+        memory.fill(
+            record, force, own=is_own, wrench=functions["wrench"],
+            wrench_slope=functions.get("wrench_slope"), **ends,
+        )  # fmt: skip
+    memory.fill(
+        model, system, strained=system.strain_index, n_bodies=system.count,
+        bodies=bodies.records.array, n_flexible=len(bodies.modal.modal),
+        n_imposed=int(system.rows(lambda body: any(body.imposed)).sum()),
+        drives=memory.new("mstmm_drive[]", drives or 1), n_drives=len(drives),
+        drive_tape=system.drives, laws=laws.records.array, n_laws=laws.records.count,
+        loads=loads, n_loads=len(system.loads), forces=forces, n_forces=len(system.forces),
+        needs_pose=bool(
+            system.forces or system.loads or system.bodies_with_drag or system.has_loops
+        ),
+        inputs=write_inputs(system.inputs, system.held_inputs.memory_indices, memory),
+        n_inputs=len(system.inputs), n_values=system.n_values, value_tape=system.values,
+        closures=None, couplings=None,
+    )  # fmt: skip
+    offset, loops = bodies.end, None
+    if system.has_loops:
+        offset, loops = attach_loops(model, system, memory, lib, offset)
+        axes = motion_plane(system, elements)
+        if axes is not None:
+            offset = attach_planar_bodies(
+                model, system, elements, memory, lib, loops.body_records, axes, offset
+            )
     scratch = attach_runs(model, system, memory, lib, offset)
-    modal = bodies.modal
     return Written(
-        model,
-        memory.keep_alive,
-        bodies.blocks,
-        modal.modal,
-        modal.sections,
-        scratch,
-        memory.slots,
-        reach,
-        loops,
-    )
+        model, memory.keep_alive, bodies.blocks, bodies.modal.modal, bodies.modal.sections,
+        scratch, memory.slots, reach, loops,
+    )  # fmt: skip
 
 
 def write_inputs(inputs: Sequence[PiecewisePolynomial], held: Sequence[int], memory: Memory) -> Any:
@@ -116,30 +111,11 @@ def write_inputs(inputs: Sequence[PiecewisePolynomial], held: Sequence[int], mem
     written: dict[int, tuple[Any, Any]] = {}  # many trajectories may share a long signal
     for record, channel, index in zip(records, inputs, held, strict=False):
         if id(channel) not in written:
-            numbers = [x for piece in channel.pieces for x in piece]
-            written[id(channel)] = memory.reals(channel.knots), memory.reals(numbers)
-        record.n_knots = len(channel.knots)
-        record.knots, record.numbers = written[id(channel)]
-        record.held = index
+            pieces = [x for piece in channel.pieces for x in piece]
+            written[id(channel)] = memory.reals(channel.knots), memory.reals(pieces)
+        knots, numbers = written[id(channel)]
+        memory.fill(record, n_knots=len(channel.knots), knots=knots, numbers=numbers, held=index)
     return records
-
-
-def _fill_load(record: Any, load: LoadNumbers) -> None:
-    record.body, record.offset = load.body, list(load.offset)
-    record.axes, record.axes_own = load.axes, list(load.axes_own)
-    record.force, record.moment = list(load.force), list(load.moment)
-
-
-def _fill_force(record: Any, force: ForceNumbers, elements: Elements, memory: Memory) -> None:
-    for letter, (body, axes, offset) in zip("ft", force.ends, strict=True):
-        setattr(record, f"body_{letter}", body)
-        setattr(record, f"axes_{letter}", list(axes))
-        setattr(record, f"offset_{letter}", list(offset))
-    functions = elements[force.element].functions
-    record.wrench = functions["wrench"]
-    record.wrench_slope = functions.get("wrench_slope", memory.ffi.NULL)
-    record.p = memory.reals(force.p)
-    record.effort = memory.expression(force.effort)
 
 
 # --- hinge laws -----------------------------------------------------------------------------------
@@ -188,12 +164,11 @@ class _LawRecords:
 
     def _fill(self, record: Any, law: LawNumbers) -> None:
         """Fill the fields that all repeats of a law share."""
-        record.kind, record.evaluate = int(law.turn >= 0), self.functions[law.kernel]
-        record.evaluate_slope = self.functions[f"{law.kernel}_slope"]
-        record.coordinate, record.speed, record.n = law.coordinate, law.speed, law.n
-        record.p, record.axes = self.memory.reals(law.p), self.memory.ffi.NULL
-        if law.axes:
-            record.axes = self.memory.reals(law.axes)
+        self.memory.fill(
+            record, law, kind=law.turn >= 0, axes=law.axes or None,
+            evaluate=self.functions[law.kernel],
+            evaluate_slope=self.functions[f"{law.kernel}_slope"],
+        )  # fmt: skip
 
 
 # --- derivatives of expressions -------------------------------------------------------------------

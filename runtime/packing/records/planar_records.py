@@ -52,8 +52,8 @@ def attach_planar_bodies(
         records.column(name)[:] = looped.column(name)
     records.column("omitted")[[closure.frame for closure in system.closures]] = 1
     memory.keep_alive.append(records)
-    model.flat, model.flat_numbers = records.array, place
-    model.flat_gravity = (axes.T @ system.gravity)[:2].tolist()
+    gravity = (axes.T @ system.gravity)[:2].tolist()
+    memory.fill(model, flat=records.array, flat_numbers=place, flat_gravity=gravity)
     return place + int(lib.MSTMM_FLAT) * (1 + system.count)
 
 

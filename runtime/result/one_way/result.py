@@ -23,8 +23,9 @@ from mstmm.risk import Risk
 from mstmm.scene import split_reference
 
 from ...engine.compiled_scene import CompiledScene
+from ...packing.expansion import with_level
 from ...packing.packed_scene import releasable_hinges
-from ...packing.rigid_substitution import constrained_rotations, with_level
+from ...packing.rigid_substitution import constrained_rotations
 from ...run.start_state import initial_state
 from ..checks.conservation import has_impacts
 from ..flexible.modal_participation import participation_by_body

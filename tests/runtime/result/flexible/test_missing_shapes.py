@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.packing.system_builder import expansion_of
+from mstmm.runtime.packing.expansion import expansion_of
 from mstmm.runtime.result.flexible.missing_shapes import lateral_load_ratio, quadrature_rule
 from mstmm.runtime.result.flexible.model_range import model_ranges
 
