@@ -1,8 +1,8 @@
 """A cable falls from a horizontal line about the support of one end.
 
-Statements: (1) for 1.5 s, through the whip below the support and back up, the tip agrees within 1 mm
-with a second program below, whose unknown is the angle of the axis along the cable, a polynomial;
-it has neither strain modes nor segments.  (2) The energy is constant within 1e-6 of what is
+Statements: (1) for 1.5 s, through the whip below the support and back up, the tip agrees within
+1 mm with a second program below: the angle of the axis along the cable is a polynomial, so that
+there are neither strain modes nor segments.  (2) The energy is constant within 1e-6 of what is
 exchanged.
 """
 
