@@ -30,8 +30,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 #: Files whose lines are counted.
 TRACED_FILES = (
-    "simulate/command.py", "simulate/resumable_run.py", "checkpoint.py", "run_execution.py",
-    "safe_files.py", "file_lock.py", "xarray_dataset.py",
+    "cli/simulate.py", "checkpoint.py", "run_execution.py", "safe_files.py", "file_lock.py",
+    "xarray_dataset.py",
 )  # fmt: skip
 
 

@@ -7,7 +7,9 @@ import signal
 import numpy as np
 import pytest
 
+from tests.support.interrupts.fork_server import TRACED_FILES
 from tests.support.interrupts.interrupted_commands import CHECKPOINT, RESULT, Laboratory
+from tests.support.paths import ROOT
 
 #: Lines are many: a prime number between two that are tried.
 STRIDE = {signal.SIGINT: 29, signal.SIGTERM: 31}
@@ -17,6 +19,11 @@ def time_of(laboratory: Laboratory) -> float:
     """How far the checkpoint reaches; it is whole."""
     with np.load(laboratory.folder / CHECKPOINT) as file:
         return float(file["t"][-1])
+
+
+def test_traced_files_exist() -> None:
+    paths = [str(path) for folder in ("mstmm", "runtime") for path in (ROOT / folder).rglob("*.py")]
+    assert not [name for name in TRACED_FILES if not any(path.endswith(name) for path in paths)]
 
 
 @pytest.mark.parametrize("begun", [False, True], ids=["from the start", "from a checkpoint"])
