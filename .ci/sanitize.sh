@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The C of all rooms under strict warnings, then under the address and undefined-behaviour sanitizers:
+# The C of all packages under strict warnings, then under the address and undefined-behaviour sanitizers:
 # every kernel by a small driver, and the engine by the tests that exercise it from Python.
 source "$(dirname "${BASH_SOURCE[0]}")/lib.sh"
 

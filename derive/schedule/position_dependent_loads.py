@@ -1,4 +1,4 @@
-"""Position-dependent loads in the tangent (derive/equations/tangent_position_loads).
+"""Position-dependent loads in the tangent (derive/equations/tangent_position_loads.py).
 
 These steps extend those of the tangent sweep, for every body inboard of such a load: a load in
 inertial axes, a force element to the ground, drag.  The initial rows come from the differentiated

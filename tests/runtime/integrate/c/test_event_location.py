@@ -1,7 +1,7 @@
 """Events: located to rounding, fired in order, never missed silently between step ends.
 
 Whole scenes are in `tests/system/events`, SciPy and SUNDIALS in
-`tests/runtime/run/external_integrators`.
+`tests/runtime/run/test_external_integrators.py`.
 """
 
 from __future__ import annotations
