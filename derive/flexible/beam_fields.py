@@ -1,13 +1,15 @@
-"""Euler-Bernoulli beam: integrands per length from displacement field and energies.
+"""Beam: integrands per length from displacement field and energies.
 
 A point at (y, z) of the section at x has the displacement
 
-    u = (s, v, w) + theta x (0, y, z),    theta = (psi, -w', v')
+    u = (s, v, w) + theta x (0, y, z),    theta = (psi, -psi_w, psi_v)
 
-with displacements s, v, w of the axis and twist psi.  The rotation of the section enters the
-inertia as `turn`: theta itself with rotary inertia; without it only the twist, and the rotation of
-the section with the floating frame.  Strain is that of the axis, s' - y v'' - z w'', and the rate
-of twist psi'.  Second-order displacements and rotations are in `beam_foreshortening`.
+with displacements s, v, w of the axis, twist psi, and rotations psi_v, psi_w of the section in the
+planes of v and w: v' and w' without shear (Euler-Bernoulli), own fields with it (Timoshenko).  The
+rotation of the section enters the inertia as `turn`: theta itself with rotary inertia; without it
+only the twist, and the rotation of the section with the floating frame.  Strains are the axial one,
+s' - y psi_v' - z psi_w', shear v' - psi_v and w' - psi_w, and the rate of twist psi'.  Second-order
+displacements and rotations are in `beam_foreshortening`.
 
 The field is linear in the modal coordinates, so that every integral of the mass matrix is bilinear
 in two shapes k and l (Shabana, Dynamics of Multibody Systems, ch. 5).  The integrals over the
@@ -30,7 +32,9 @@ INERTIA = Quantity(
     vector("inertia", 3), "", "mass per length (kg/m), int rho y^2 dA, int rho z^2 dA (kg m)"
 )
 STIFFNESS = Quantity(
-    vector("stiffness", 4), "", "EA (N), GI_t, EI_y, EI_z (N m^2); EI_y bends along z"
+    vector("stiffness", 6),
+    "",
+    "EA (N), GI_t, EI_y, EI_z (N m^2), k GA_y, k GA_z (N); EI_y bends along z, GA_y shears along y",
 )
 SOURCES = ("Shabana, Dynamics of Multibody Systems, ch. 5",)
 
@@ -40,7 +44,7 @@ def _shape_quantities(k: str) -> tuple[Quantity, ...]:
     return (
         Quantity(vector(f"axis_{k}", 3), "", f"displacement s, v, w of the axis by shape {k}"),
         Quantity(vector(f"turn_{k}", 3), "", "rotation of the section that carries inertia"),
-        Quantity(vector(f"strain_{k}", 4), "", "s', psi', w'', v''"),
+        Quantity(vector(f"strain_{k}", 6), "", "s', psi', psi_w', psi_v', v' - psi_v, w' - psi_w"),
     )
 
 
@@ -79,23 +83,22 @@ def _shape_displacement(shape: tuple[Quantity, ...]) -> Matrix:
 
 
 def _axial_strain() -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-    """(axial strain at (y, z), its derivatives s', w'', v''), from the displacement."""
-    s, v, w, psi = (sp.Function(name)(_X) for name in ("s", "v", "w", "psi"))
-    displacement_field = section_displacement(
-        Matrix([s, v, w]), Matrix([psi, -w.diff(_X), v.diff(_X)])
-    )
-    return displacement_field[0].diff(_X), (s.diff(_X), w.diff(_X, 2), v.diff(_X, 2))
+    """(axial strain at (y, z), its derivatives s', psi_w', psi_v'), from the displacement."""
+    names = ("s", "v", "w", "psi", "psi_v", "psi_w")
+    s, v, w, psi, psi_v, psi_w = (sp.Function(name)(_X) for name in names)
+    displacement_field = section_displacement(Matrix([s, v, w]), Matrix([psi, -psi_w, psi_v]))
+    return displacement_field[0].diff(_X), (s.diff(_X), psi_w.diff(_X), psi_v.diff(_X))
 
 
 def strain_energy(strains: Matrix) -> sp.Expr:
-    """Strain energy per length (J/m) of s', psi', w'', v''."""
+    """Strain energy per length (J/m) of s', psi', psi_w', psi_v' and of shear along y and z."""
     axial, derivatives = _axial_strain()
-    stretch, twist, curved_z, curved_y = strains
+    stretch, twist, curved_z, curved_y, sheared_y, sheared_z = strains
     axial = axial.subs(dict(zip(derivatives, (stretch, curved_z, curved_y), strict=True)))
-    ea, git, eiy, eiz = column_entries(STIFFNESS)
+    ea, git, eiy, eiz, gay, gaz = column_entries(STIFFNESS)
     # E y^2 over the section is EI about z.
     normal = _integrate_section(sp.expand(axial**2), {(0, 0): ea, (2, 0): eiz, (0, 2): eiy})
-    return (normal + git * twist**2) / 2
+    return (normal + git * twist**2 + gay * sheared_y**2 + gaz * sheared_z**2) / 2
 
 
 def _stiffness_integrand() -> sp.Expr:
@@ -155,8 +158,8 @@ def moment_integrands() -> Derivation:
         ),
         sources=SOURCES,
         notes=(
-            "displacement u = (s, v, w) + theta x (0, y, z), theta = (psi, -w', v')",
-            "axial strain s' - y v'' - z w'', shear by the rate of twist psi' alone",
+            "displacement u = (s, v, w) + theta x (0, y, z), theta = (psi, -psi_w, psi_v)",
+            "axial strain s' - y psi_v' - z psi_w'; shear by psi', and v' - psi_v, w' - psi_w",
         ),
     )
 
@@ -164,7 +167,7 @@ def moment_integrands() -> Derivation:
 def section_rotation() -> Derivation:
     """Displacement and rotation of a section from the values of the shapes at it."""
     values = Quantity(vector("values", 4), "", "s, v, w, psi")
-    slopes = Quantity(vector("slopes", 2), "", "v', w'")
+    slopes = Quantity(vector("slopes", 2), "", "psi_v, psi_w: v', w' without shear")
     phi, theta = vector("phi", 3), vector("theta", 3)
     s, v, w, psi = column_entries(values)
     return Derivation(

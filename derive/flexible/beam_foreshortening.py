@@ -1,13 +1,14 @@
-"""Euler-Bernoulli beam: second-order displacements and rotations of its fields.
+"""Beam: second-order displacements and rotations of its fields.
 
-Modal coordinates measure strain: s', psi', w'' and v'' are those of the bent and twisted rod, not
-only of its linear part, so that the strain energy is 1/2 eta^T K eta to third order and the whole
-geometric stiffness is in the kinematics.  A section at r is rotated by exp(Psi~),
+Modal coordinates measure strain: theta' and eps are those of the bent and twisted rod, not only of
+its linear part, so that the strain energy is 1/2 eta^T K eta to third order and the whole geometric
+stiffness is in the kinematics.  A section at r is rotated by exp(Psi~),
 
-    T(Psi) Psi' = theta',    r' = (1 + s') exp(Psi~) e_x,    theta = (psi, -w', v')
+    T(Psi) Psi' = theta',    r' = exp(Psi~) (e_x + eps)
+    theta = (psi, -psi_w, psi_v),    eps = (s', v' - psi_v, w' - psi_w)
 
-(curvature and twist in the section's axes; the axis stays normal to its sections and is stretched
-only by s').  To second order Psi = theta + Psi2, r = r0 + (s, v, w) + u2.  Psi2 results from the
+(strains in the section's axes; without shear psi_v = v', psi_w = w', and the axis stays normal to
+its sections).  To second order Psi = theta + Psi2, r = r0 + (s, v, w) + u2.  Psi2 results from the
 non-commutativity of finite rotations: bending in two planes causes twist, bending and twist
 together cause bending.  u2 contains the foreshortening of the bent axis, and the deflection of a
 bent beam whose sections are twisted: the work of a load on it is that of its bending moments on
@@ -34,6 +35,7 @@ from .beam_fields import (
 
 SOURCES = (
     "Kirchhoff's rod: Love, A Treatise on the Mathematical Theory of Elasticity, ch. 18",
+    "rod with shear: Simo, A finite strain beam formulation, CMAME 49 (1985)",
     "Schwertassek, Wallrapp, Dynamik flexibler Mehrkoerpersysteme (second-order displacements)",
 )
 
@@ -48,9 +50,9 @@ def _quantity_pair(name: str, rows: int, meaning: str) -> tuple[Quantity, Quanti
     return quantity_k, quantity_l
 
 
-SECTION_ROTATION = _quantity_pair("theta", 3, "rotation vector psi, -w', v' of the section")
-CURVATURE = _quantity_pair("kappa", 3, "twist and curvature psi', -w'', v''")
-STRETCH = _quantity_pair("stretch", 1, "axial strain s'")
+SECTION_ROTATION = _quantity_pair("theta", 3, "rotation vector psi, -psi_w, psi_v of the section")
+CURVATURE = _quantity_pair("kappa", 3, "twist and curvature psi', -psi_w', psi_v'")
+STRAIN = _quantity_pair("eps", 3, "strain of the axis s', v' - psi_v, w' - psi_w")
 INERTIA_ROTATION = _quantity_pair("turn", 3, "rotation of the section that carries inertia")
 SECOND_ROTATION = Quantity(
     vector("h", 3), "", "rotation of second order, -d^2 Psi2 / d eta_k d eta_l"
@@ -93,10 +95,10 @@ def second_rotation_rate() -> Matrix:
 
 
 def second_displacement_rate(turned: Matrix) -> Matrix:
-    """u2' from r' = (1 + s') exp(Psi~) e_x, with Psi2 given."""
+    """u2' from r' = exp(Psi~) (e_x + eps), with Psi2 given."""
     psi = _SIZE * _weighted_sum(SECTION_ROTATION) + _SIZE**2 * turned
-    stretch = 1 + _SIZE * _weighted_sum(STRETCH)[0]
-    return _second_order_part(Matrix(stretch * _rotate_vector(psi, Matrix([1, 0, 0]))))
+    tangent = Matrix([1, 0, 0]) + _SIZE * _weighted_sum(STRAIN)
+    return _second_order_part(_rotate_vector(psi, Matrix(tangent)))
 
 
 def rotation_integrands() -> Derivation:
@@ -119,7 +121,7 @@ def displacement_integrands() -> Derivation:
     return Derivation(
         "beam",
         "rate along the beam of the displacement of second order by two shapes",
-        (*SECTION_ROTATION, *STRETCH, SECOND_ROTATION),
+        (*SECTION_ROTATION, *STRAIN, SECOND_ROTATION),
         (Quantity(rate, "", "dg / dx"),),
         (
             Equation(
@@ -131,7 +133,7 @@ def displacement_integrands() -> Derivation:
             ),
         ),
         sources=SOURCES,
-        notes=("u2' = s' theta x e_x + Psi2 x e_x + theta x (theta x e_x) / 2",),
+        notes=("u2' = theta x eps + Psi2 x e_x + theta x (theta x e_x) / 2",),
     )
 
 

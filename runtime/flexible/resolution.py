@@ -11,6 +11,7 @@ from mstmm.array_validation import Array
 from .beam.boundary_conditions import BoundaryConditions
 from .beam.section_ports import BeamShapes
 from .beam.shape_fields import ROW
+from .beam.shear_elements import condensed
 from .beam.static_shapes import bending_matrices, element_nodes, nearest_node, rod_matrices
 
 #: Largest relative error (too high) of a natural frequency whose mode counts as resolved.
@@ -73,7 +74,7 @@ def _resolution(shapes: BeamShapes, conditions: BoundaryConditions, direction: s
     )
     bends = direction in ("y", "z")
     if bends:
-        k, m = bending_matrices(shapes.data, direction, nodes)
+        k, m = condensed(*bending_matrices(shapes.data, direction, nodes), 2 * len(nodes))
     else:
         nodes, k, m = rod_matrices(shapes.data, direction, nodes)
     columns = _nodal_columns(shapes, indices, direction, nodes)
@@ -93,7 +94,7 @@ def _nodal_columns(shapes: BeamShapes, indices: list[int], direction: str, nodes
         return np.column_stack([shape_values, np.ones(len(nodes))])
     columns = np.zeros((2 * len(nodes), len(indices) + 2))
     columns[0::2, :-2] = shape_values
-    columns[1::2, :-2] = shapes.rows(nodes, 1)[ROW[direction], indices].T
+    columns[1::2, :-2] = shapes.bending_rotations(nodes, 0)[ROW[direction] - 1, indices].T
     columns[0::2, -2], columns[0::2, -1], columns[1::2, -1] = 1.0, nodes, 1.0
     return columns
 

@@ -180,7 +180,8 @@ def short_beam_warnings(scene: SceneTables) -> Iterator[Risk]:
     lines = beam_lines(scene)
     beams_by_line: dict[str, list[Beam]] = {}
     for beam in scene.beam:
-        if beam.model != "rigid":
+        has_shear = all(piece.shear_stiffness is not None for piece in beam.sections)
+        if beam.model != "rigid" and not has_shear:
             beams_by_line.setdefault(lines[beam.name].first, []).append(beam)
     for beams in beams_by_line.values():
         name, length = beams[0].name, lines[beams[0].name].length
@@ -196,8 +197,8 @@ def short_beam_warnings(scene: SceneTables) -> Iterator[Risk]:
             f'beam "{name}": {length_text} {length / height:.2g} times the height of the '
             f"section along {direction} ({height:.3g} m from {source}), less than "
             f"{MIN_SLENDERNESS:g}: shear deformation, which Euler-Bernoulli beams neglect, is not "
-            "small", "use an elastic body from a mesh", length / height, MIN_SLENDERNESS,
-            seen_before_run=True,
+            "small", "give shear_stiffness and rotary_inertia, or use an elastic body from a mesh",
+            length / height, MIN_SLENDERNESS, seen_before_run=True,
         )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Table [[beam]]: Euler-Bernoulli beam along its x axis, with ends "root" (x = 0) and "tip"."""
+"""Table [[beam]]: beam along its x axis, with ends "root" (x = 0) and "tip"."""
 
 from __future__ import annotations
 
@@ -134,9 +134,9 @@ class Shapes(Table):
 # --- sections -------------------------------------------------------------------------------------
 
 
-def _pair_rule(of: str) -> rules.Rule:
+def _pair_rule(of: str, axes: str = "about y, about z") -> rules.Rule:
     """Rule for one number for both bending planes, or one for each."""
-    expected = f"a number, or two, [about y, about z], in {of}"
+    expected = f"a number, or two, [{axes}], in {of}"
     inner = rules.numbers_rule(expected, of=of)
 
     def check(value: Any) -> tuple[float, float]:
@@ -158,7 +158,8 @@ class SectionTable(Table):
     """Properties of a section, or of the whole beam (None: not given).
 
     `bending_stiffness` is (EI_y, EI_z): about y, for deflection along z, and about z, for
-    deflection along y; `rotary_inertia` (rho I_y, rho I_z) likewise.
+    deflection along y; `rotary_inertia` (rho I_y, rho I_z) likewise.  `shear_stiffness` is k G A
+    along y and along z.
     """
 
     mass_per_length: Annotated[float | None, rules.number_rule("kg/m", above=0)] = None
@@ -167,6 +168,9 @@ class SectionTable(Table):
     torsional_stiffness: Annotated[float | None, rules.number_rule("N m^2", above=0)] = None
     polar_inertia_per_length: Annotated[float | None, rules.number_rule("kg m", above=0)] = None
     rotary_inertia: Annotated[tuple[float, float] | None, _pair_rule("kg m")] = None
+    shear_stiffness: Annotated[tuple[float, float] | None, _pair_rule("N", "along y, along z")] = (
+        None
+    )
 
 
 class Section(SectionTable):
@@ -184,6 +188,7 @@ _KEY_DESCRIPTIONS = {
     "torsional_stiffness": "G I_t in N m^2, more than 0",
     "polar_inertia_per_length": "rho I_p in kg m, more than 0",
     "rotary_inertia": "[rho I_y, rho I_z] in kg m, more than 0",
+    "shear_stiffness": "k G A in N, more than 0: a number, or [along y, along z]",
 }
 
 
@@ -215,7 +220,7 @@ _ENDS = texts.ends_rule(
 
 
 class Beam(FlexibleTable, SectionTable):
-    """Euler-Bernoulli beam, to second order in its slopes or with exact kinematics.
+    """Straight beam: Euler-Bernoulli or Timoshenko to second order, or with exact kinematics.
 
     `modes` and `quadrature` are None for "auto".  `ends` also contains "root" and "tip".  Keys that
     are left out in an entry of `section` have the value of the beam; `sections` are the completed
@@ -406,6 +411,8 @@ def _required_keys(beam: Beam) -> dict[str, str]:
         required["polar_inertia_per_length"] = "twist shapes need it: "
     if modes is not None and modes.axial:
         required["axial_stiffness"] = "axial shapes need it: "
+    if any(piece.shear_stiffness is not None for piece in beam.sections):
+        required["rotary_inertia"] = "shear_stiffness needs it: "
     return required
 
 
@@ -474,6 +481,10 @@ _KEYS_OF_SECOND_ORDER: dict[str, tuple[object, str]] = {
     "stiffening": (True, "its kinematics includes every order"),
     "viscous_drag": (0.0, "drag acts only on second-order beams"),
 }
+_NO_SHEAR = (
+    "an exact beam has no shear_stiffness: only second-order beams have shear; leave it or "
+    "kinematics out"
+)
 
 
 def _kinematics_problems(beam: Beam) -> Iterator[Problem]:
@@ -489,6 +500,10 @@ def _kinematics_problems(beam: Beam) -> Iterator[Problem]:
     for key, (allowed, reason) in _KEYS_OF_SECOND_ORDER.items():
         if getattr(beam, key) != allowed:
             yield (key,), f"an exact beam has no {key}: {reason}; leave it out"
+    for i, piece in enumerate(beam.sections):
+        if piece.shear_stiffness is not None:
+            yield _location_of(beam, i, "shear_stiffness"), _NO_SHEAR
+            break
     if beam.basis in SHAPE_BASES:
         yield (
             ("basis",),
@@ -511,6 +526,12 @@ def _shape_problems(beam: Beam) -> Iterator[Problem]:
         yield (
             ("basis",),
             f'expected "given" with shapes, found "{beam.basis}"; leave out basis or shapes',
+        )
+    if (shapes.y or shapes.z) and any(p.shear_stiffness is not None for p in beam.sections):
+        yield (
+            ("shapes",),
+            "expected no bending shapes with shear_stiffness, as sections then rotate apart from "
+            "the slope; leave out shapes or shear_stiffness",
         )
     if beam.modes is not None and beam.modes != shapes.modes:
         pairs = zip(DIRECTIONS, shapes.modes.counts, strict=True)

@@ -126,8 +126,9 @@ _CHAIN_KEY_REMEDIES = {
 _KEY_SYNONYMS = {
     "EI": "bending_stiffness", "EA": "axial_stiffness", "GJ": "torsional_stiffness",
     "GIt": "torsional_stiffness", "rhoA": "mass_per_length", "mu": "mass_per_length",
-    "rhoI": "rotary_inertia", "mass": "mass_per_length", "L": "length", "E": "young",
-    "nu": "poisson", "rho": "density", "parent": "inboard", "child": "outboard",
+    "rhoI": "rotary_inertia", "kGA": "shear_stiffness", "GA": "shear_stiffness",
+    "mass": "mass_per_length", "L": "length", "E": "young", "nu": "poisson", "rho": "density",
+    "parent": "inboard", "child": "outboard",
 }  # fmt: skip
 
 

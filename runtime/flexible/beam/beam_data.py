@@ -33,7 +33,8 @@ class BeamData:
     """A straight beam along x with constant sections between `breaks` (m).
 
     `inertia` (3, pieces): mass per length, int rho y^2 dA, int rho z^2 dA; `stiffness`
-    (4, pieces): EA, GI_t, EI_y, EI_z.  `rotary`: whether bending turns the sections' inertia.
+    (6, pieces): EA, GI_t, EI_y, EI_z, k GA along y and z (0 without shear).  `rotary`: whether
+    bending turns the sections' inertia.
     """
 
     name: str
@@ -54,6 +55,11 @@ class BeamData:
         return len(self.breaks) == 2
 
     @property
+    def sheared(self) -> bool:
+        """Whether the sections shear."""
+        return bool(self.stiffness[4:].any())
+
+    @property
     def mass(self) -> float:
         """Mass, kg."""
         return float(self.inertia[0] @ np.diff(self.breaks))
@@ -67,10 +73,14 @@ class BeamData:
         """Section data at every x (m)."""
         pieces = self.piece(x)
         m, yy, zz = self.inertia[:, pieces]
-        ea, git, eiy, eiz = self.stiffness[:, pieces]
+        ea, git, eiy, eiz = self.stiffness[:4, pieces]
         return BeamSections(
             m, ea, git, eiy, eiz, np.array([yy + zz, zz, yy]), np.full(m.shape, self.drag)
         )
+
+
+#: Stiffness of a beam that has none in both planes.
+_NONE = (0.0, 0.0)
 
 
 def beam_data(beam: Beam) -> BeamData:
@@ -81,9 +91,9 @@ def beam_data(beam: Beam) -> BeamData:
         polar = section.polar_inertia_per_length or 0.0
         about_y, about_z = section.rotary_inertia or (polar / 2, polar / 2)
         inertia.append((section.mass_per_length or 0.0, about_z, about_y))
-        bending = section.bending_stiffness or (0.0, 0.0)
+        bending, shear = section.bending_stiffness or _NONE, section.shear_stiffness or _NONE
         stiffness.append(
-            (section.axial_stiffness or 0.0, section.torsional_stiffness or 0.0, *bending)
+            (section.axial_stiffness or 0.0, section.torsional_stiffness or 0.0, *bending, *shear)
         )
     breaks = (*(float(section.from_) for section in pieces), float(beam.length))
     ends = {

@@ -62,13 +62,12 @@ def _integrals(
     """Integrals of the named outputs of the kernel "moments" over the beam.
 
     They are (..., n, n) for outputs of two shapes and (..., n, 1) for outputs of one.  `data`
-    (7, m) are inertia and stiffness of the sections at the quadrature points.
+    (9, m) are inertia and stiffness of the sections at the quadrature points.
     """
-    values, slopes, curvatures = (shapes.rows(x, d) for d in range(3))
-    strain = np.stack([slopes[0], slopes[3], curvatures[2], curvatures[1]])
-    rows = shape_rows(
-        np.concatenate([values[:3], shapes.inertia_rotation(slopes, values[3]), strain])
-    )
+    values, slopes = shapes.rows(x, 0), shapes.rows(x, 1)
+    rotations, (curved_y, curved_z) = (shapes.bending_rotations(x, d) for d in range(2))
+    strain = np.stack([slopes[0], slopes[3], curved_z, curved_y, *(slopes[1:3] - rotations)])
+    rows = shape_rows(np.concatenate([values[:3], shapes.inertia_rotation(x), strain]))
     all_shapes: Row = (np.zeros(1, dtype=np.intp), np.ones((1, len(x))))
     integrals = []
     for output in (kernel_terms("moments", *_PAIR_GROUPS)[name] for name in names):
@@ -94,7 +93,7 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     mass = float(rigid["mass"][0] @ w)
     first = rigid["first"] @ w
     second = _from_upper_triangle(rigid["second"] @ w)
-    data = np.concatenate([density, np.zeros((4, len(x)))])
+    data = np.concatenate([density, np.zeros((len(shapes.data.stiffness), len(x)))])
     c, e, f = _integrals(shapes, data, x, w, ("C", "E", "F"))
     modal = np.sqrt(np.abs(np.einsum("aakk->k", f)))
     lever = np.sqrt(np.abs(np.diag(second)))
@@ -119,7 +118,7 @@ def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tu
     `density` (3, m) is given at the points `x` and weights `w` of a quadrature.
     """
     outputs = kernel_terms("second_moments", *_SECOND_ORDER_GROUPS)
-    rotations = shape_rows(shapes.inertia_rotation(shapes.rows(x, 1), shapes.rows(x, 0)[3]))
+    rotations = shape_rows(shapes.inertia_rotation(x))
     g, x_moment = _zero_moments(shapes.n)
     field_terms: dict[tuple[int | None, ...], list[tuple[Array, Term]]] = {}
     for integral, output in ((g, outputs["G"]), (x_moment, outputs["X"])):

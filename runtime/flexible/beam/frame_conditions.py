@@ -18,7 +18,7 @@ from mstmm.errors import SceneError
 from .beam_data import BeamData, Frame
 from .gauss_quadrature import gauss_points, shape_density
 from .shape_fields import Mode
-from .shape_functions import Shape, ShiftedShape
+from .shape_functions import Shape, ShiftedShape, section_rotation
 
 #: Smallest norm of a shape without its rigid part, or without the shapes before it, relative to the
 #: shape; less is rounding.
@@ -42,8 +42,8 @@ def modes_in_frame(
     for k, shape in enumerate(shapes, 1):
         name = f"{direction}{k}"
         a, b = _rigid_part(data, direction, shape, frame, x, weight, inertia)
-        values = np.sqrt(weight) * (shape(x) - a - b * x)
-        scale = np.linalg.norm(np.sqrt(weight) * shape(x))
+        values = _weighted_field(data, shape, x, weight, inertia, a, b)
+        scale = np.linalg.norm(_weighted_field(data, shape, x, weight, inertia))
         residual = values / scale
         if np.linalg.norm(residual) < MIN_REMAINDER:
             notes.append(f"shape {name} is a rigid motion; left out")
@@ -65,6 +65,20 @@ def modes_in_frame(
         )
     _check_condition(data, direction, deformations)
     return [_with_rotation_sign(mode, direction) for mode in modes], notes
+
+
+def _weighted_field(
+    data: BeamData, shape: Shape, x: Array, mass: Array, inertia: Array, a: float = 0.0,
+    b: float = 0.0,
+) -> Array:  # fmt: skip
+    """Shape less a + b x at quadrature points, whose products are those of the mass matrix.
+
+    With shear also the rotation of the sections: fast shapes of two kinds differ in it alone.
+    """
+    values = np.sqrt(mass) * (shape(x) - a - b * x)
+    if not (data.sheared and inertia.any()):
+        return np.asarray(values)
+    return np.append(values, np.sqrt(inertia) * (section_rotation(shape, x) - b))
 
 
 def _with_rotation_sign(mode: Mode, direction: str) -> Mode:
@@ -111,7 +125,8 @@ def _rigid_part(
     origin = frame.x if frame.kind == "tangent" else 0.0
     if frame.kind == "tangent" or (frame.kind == "chord" and not bends):
         place = np.array([origin])
-        value, slope = float(shape(place)[0]), float(shape(place, 1)[0]) if bends else 0.0
+        value = float(shape(place)[0])
+        slope = float(section_rotation(shape, place)[0]) if bends else 0.0
         return _without_rounding(shape, data, value - slope * origin, slope)
     if frame.kind == "chord":
         root_value, tip_value = shape(np.array([0.0, data.length]))
@@ -120,7 +135,7 @@ def _rigid_part(
     values = shape(x)
     if not bends:
         return _without_rounding(shape, data, float(mass @ values) / float(mass.sum()), 0.0)
-    slopes = shape(x, 1) if data.rotary else np.zeros_like(x)
+    slopes = section_rotation(shape, x) if data.rotary else np.zeros_like(x)
     matrix = np.array([[mass.sum(), mass @ x], [mass @ x, mass @ x**2 + inertia.sum()]])
     right = np.array([mass @ values, mass @ (x * values) + inertia @ slopes])
     a, b = np.linalg.solve(matrix, right)

@@ -41,15 +41,18 @@ class Rates:
     def __init__(self, shapes: ShapeFields) -> None:
         self._count, self._length = shapes.n, shapes.length
         self._integrals = Antiderivatives(shapes.pieces, shapes.density)
-        values, slopes, curvatures = (shapes.rows(self.points, d) for d in range(3))
-        theta = beam_kernels.evaluate("section", {"values": values, "slopes": slopes[1:3]})["theta"]
-        rates = {"values": slopes, "slopes": curvatures[1:3]}
+        values, slopes = (shapes.rows(self.points, d) for d in range(2))
+        rotations, curvatures = (shapes.bending_rotations(self.points, d) for d in range(2))
+        section = {"values": values, "slopes": rotations}
+        theta = beam_kernels.evaluate("section", section)["theta"]
+        rates = {"values": slopes, "slopes": curvatures}
         kappa = beam_kernels.evaluate("section", rates)["theta"]
+        strain = np.concatenate([slopes[:1], slopes[1:3] - rotations])
         self._rotation_fields = shape_rows(np.concatenate([theta, kappa]))
-        self._displacement_fields = shape_rows(np.concatenate([theta, slopes[:1]]))
+        self._displacement_fields = shape_rows(np.concatenate([theta, strain]))
         groups = ("theta_k", "kappa_k"), ("theta_l", "kappa_l")
         self._rotation_terms = kernel_terms("turning", *groups)["dh"]
-        groups = ("theta_k", "stretch_k"), ("theta_l", "stretch_l")
+        groups = ("theta_k", "eps_k"), ("theta_l", "eps_l")
         self._displacement_terms = kernel_terms("drawing", *groups, ("h",))["dg"]
         self._rotation_factors = _last_group_factors(self._displacement_terms)
 

@@ -11,7 +11,7 @@ from mstmm.array_validation import Array
 from . import beam_kernels
 from .beam_data import BeamData, BeamSections
 from .gauss_quadrature import gauss_points, shape_density
-from .shape_functions import Shape
+from .shape_functions import Shape, section_rotation
 
 #: Directions in the order of the modal coordinates.
 DIRECTIONS = ("y", "z", "twist", "axial")
@@ -39,7 +39,7 @@ class ShapeValues:
 
     phi: Array  #: (m, 3, n) displacement of the axis
     theta: Array  #: (m, 3, n) rotation vector of the section
-    curvature: Array  #: (m, 3, n) d theta / dx: rate of twist, -w'', v''
+    curvature: Array  #: (m, 3, n) d theta / dx: rate of twist, -psi_w', psi_v'
     axial_strain: Array  #: (m, n) s'
 
 
@@ -91,12 +91,21 @@ class ShapeFields:
             values[ROW[mode.direction], k] = mode.shape(x, d)
         return values
 
-    def inertia_rotation(self, slopes: Array, twist: Array) -> Array:
-        """Rotation (3, n, m) of the inertia of sections per mode, from d(s, v, w, psi)/dx."""
-        rotation = np.zeros((3, *twist.shape))
-        rotation[0] = twist
+    def bending_rotations(self, x: Array, d: int) -> Array:
+        """Derivatives (2, n, m) of order d of psi_v, psi_w per mode: v', w' without shear."""
+        rotations = np.zeros((2, self.n, len(x)))
+        for k, mode in enumerate(self.modes):
+            if mode.direction in ("y", "z"):
+                rotations[ROW[mode.direction] - 1, k] = section_rotation(mode.shape, x, d)
+        return rotations
+
+    def inertia_rotation(self, x: Array) -> Array:
+        """Rotation (3, n, m) of the inertia of sections per mode."""
+        rotation = np.zeros((3, self.n, len(x)))
+        rotation[0] = self.rows(x, 0)[3]
         if self.data.rotary:
-            rotation[1], rotation[2] = -slopes[2], slopes[1]
+            psi_v, psi_w = self.bending_rotations(x, 0)
+            rotation[1], rotation[2] = -psi_w, psi_v
             return rotation
         for k, mode in enumerate(self.modes):
             if mode.direction in ("y", "z"):
@@ -106,9 +115,13 @@ class ShapeFields:
     def values_at(self, x: Array) -> ShapeValues:
         """Displacements and rotations per mode at sections x (m,)."""
         x = np.atleast_1d(np.asarray(x, dtype=float))
-        values, slopes, curvatures = (self.rows(x, d) for d in range(3))
-        fields = beam_kernels.evaluate("section", {"values": values, "slopes": slopes[1:3]})
-        rates = beam_kernels.evaluate("section", {"values": slopes, "slopes": curvatures[1:3]})
+        slopes = self.rows(x, 1)
+        fields, rates = (
+            beam_kernels.evaluate(
+                "section", {"values": self.rows(x, d), "slopes": self.bending_rotations(x, d)}
+            )
+            for d in range(2)
+        )
         return ShapeValues(
             np.moveaxis(fields["phi"], 2, 0),
             np.moveaxis(fields["theta"], 2, 0),

@@ -204,6 +204,14 @@ class Piecewise:
         return value
 
 
+class ShearedShape(Piecewise):
+    """Deflection v of a beam with shear; `rotation` is that of its sections, psi."""
+
+    def __init__(self, nodes: Array, deflection: Array, rotation: Array) -> None:
+        super().__init__(nodes, deflection)
+        self.rotation = Piecewise(nodes, rotation)
+
+
 class ShiftedShape:
     """Shape less a rigid part, shape(x) - a - b x, for another floating frame."""
 
@@ -223,6 +231,15 @@ class ShiftedShape:
         if d == 0:
             return value - self.a - self.b * x
         return value - self.b if d == 1 else value
+
+
+def section_rotation(shape: Shape, x: Array, d: int = 0) -> Array:
+    """Derivative of order d of the rotation of sections by a bending shape: of psi, else of v'."""
+    if isinstance(shape, ShearedShape):
+        return shape.rotation(x, d)
+    if isinstance(shape, ShiftedShape):
+        return section_rotation(shape.shape, x, d) - (shape.b if d == 0 else 0.0)
+    return shape(x, d + 1)
 
 
 # --- expressions of x -----------------------------------------------------------------------------

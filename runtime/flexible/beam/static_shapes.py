@@ -16,9 +16,12 @@ from mstmm.array_validation import Array
 
 from .beam_data import BeamData
 from .shape_functions import Piecewise
+from .shear_elements import sheared_shape, timoshenko_matrices
 
 #: Row of `BeamData.stiffness` per direction.
 _STIFFNESS = {"axial": 0, "twist": 1, "z": 2, "y": 3}
+#: Rows of shear in `BeamData.stiffness` and of rotary inertia in `BeamData.inertia`.
+_SHEAR, _ROTARY = {"y": 4, "z": 5}, {"y": 1, "z": 2}
 #: Elements per half-wave of the highest shape of a stepped beam.
 _ELEMENTS_PER_HALF_WAVE = 8
 
@@ -43,7 +46,7 @@ def bending_static_shapes(
     fixed = [dof for i in interface_nodes for dof in (2 * i, 2 * i + 1)]
     k, _ = bending_matrices(data, direction, nodes)
     return [
-        _cubic(nodes, _static_displacement(k, fixed, dof, size))
+        _bent_shape(nodes, _static_displacement(k, fixed, dof, size))
         for i in interface_nodes[1:]
         for dof, size in ((2 * i, 1.0), (2 * i + 1, 1.0 / data.length))
     ]
@@ -54,8 +57,8 @@ def end_slope_shape(data: BeamData, direction: str, x: float) -> Piecewise:
     nodes = np.array(data.breaks)
     slope_dof = 2 * nearest_node(nodes, x) + 1
     k, _ = bending_matrices(data, direction, nodes)
-    fixed = [0, len(k) - 2, slope_dof]
-    return _cubic(nodes, _static_displacement(k, fixed, slope_dof, 1.0 / data.length))
+    fixed = [0, 2 * len(nodes) - 2, slope_dof]
+    return _bent_shape(nodes, _static_displacement(k, fixed, slope_dof, 1.0 / data.length))
 
 
 def _static_displacement(k: Array, fixed: list[int], dof: int, size: float) -> Array:
@@ -82,16 +85,22 @@ def bending_eigenfunctions(
     fixed = [2 * nearest_node(nodes, x) for x in (*clamped, *supported)]
     fixed += [2 * nearest_node(nodes, x) + 1 for x in clamped]
     vectors = _eigenvectors(k, m, fixed, skip + count)[:, skip:]
-    return [_cubic(nodes, _normalise(nodes, u)) for u in vectors.T]
+    return [_bent_shape(nodes, _normalise(nodes, u)) for u in vectors.T]
 
 
 def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Array, Array]:
-    """Stiffness and mass matrix of cubic elements; coordinates v, v' per node."""
+    """Stiffness and mass matrix of cubic elements; coordinates v, v' per node.
+
+    With shear those of `timoshenko_matrices`: v, psi per node and three per element.
+    """
     size = 2 * len(nodes)
     k, m = np.zeros((size, size)), np.zeros((size, size))
     middle = (nodes[1:] + nodes[:-1]) / 2
     pieces = data.piece(middle)
     bending, mass = direction_stiffness(data, direction)[pieces], data.inertia[0][pieces]
+    if data.sheared:
+        shear, inertia = data.stiffness[_SHEAR[direction]], data.inertia[_ROTARY[direction]]
+        return timoshenko_matrices(nodes, bending, shear[pieces], mass, inertia[pieces])
     for i, h in enumerate(np.diff(nodes)):
         dofs = slice(2 * i, 2 * i + 4)
         k[dofs, dofs] += bending[i] / h**3 * np.array(
@@ -103,6 +112,11 @@ def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Arra
              [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h * h, -22 * h, 4 * h * h]]
         )  # fmt: skip
     return k, m
+
+
+def _bent_shape(nodes: Array, u: Array) -> Piecewise:
+    """Shape of the coordinates of `bending_matrices`."""
+    return _cubic(nodes, u) if len(u) == 2 * len(nodes) else sheared_shape(nodes, u)
 
 
 def _cubic(nodes: Array, u: Array) -> Piecewise:
@@ -212,7 +226,7 @@ def _eigenvectors(k: Array, m: Array, fixed: Iterable[int], count: int) -> Array
 
 def _normalise(nodes: Array, u: Array) -> Array:
     """Nodal values scaled to a mean square of about one, positive where first nonzero."""
-    values = u[::2]
+    values = u[: 2 * len(nodes) : 2]
     scale = np.sqrt(np.trapezoid(values**2, nodes) / (nodes[-1] - nodes[0]))
     nonzero = np.flatnonzero(np.abs(values) > 1e-3 * np.abs(values).max())
     return u * (np.sign(values[nonzero[0]]) / scale)

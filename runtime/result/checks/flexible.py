@@ -259,7 +259,7 @@ class ShearCheck(_BodyCheck):
             "shear", f'"{body.name}"',
             f'bending shapes of "{body.name}" are too short for a beam without shear: weighted '
             f"error of their frequencies about {min(body.shear, 1.0):.0%}",
-            "use an elastic body", body.shear, MAX_SHEAR_ERROR,
+            "give shear_stiffness, or use an elastic body", body.shear, MAX_SHEAR_ERROR,
         )  # fmt: skip
 
 

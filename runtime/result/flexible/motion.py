@@ -177,7 +177,7 @@ def deflection(motion: Motion, positions: Array) -> Array:
 def rotation_vectors(motion: Motion, positions: Array) -> Array:
     """Rotation vectors (n, m, 3) in rad of the sections in the frame, second order included.
 
-    To first order twist, -w', v'.
+    To first order twist, -psi_w, psi_v.
     """
     first = first_order_field(values_at(motion.shapes, positions).theta, motion.eta)
     return first - 0.5 * second_order_motion(motion, positions, "eta", "eta")[..., 3:]
@@ -211,7 +211,7 @@ def second_order_motion(
 
 
 def slope(motion: Motion, positions: Array) -> Array:
-    """Slopes (n, m, 2) of the axis, v' and w', relative to the frame's x axis.
+    """Rotations (n, m, 2) of sections, psi_v and psi_w, in the frame; v' and w' without shear.
 
     Of an exact beam they are the components of the section's normal along y and z: sines.
     """

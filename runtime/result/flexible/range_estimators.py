@@ -216,8 +216,8 @@ def _max_line_stretch(motion: Motion) -> float | None:
 def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
     """Relative frequency error (n,) of each bending shape function of a beam without shear.
 
-    Also without rotary inertia where the model has none; 0 for other shape functions; None where
-    the section's radius of gyration is unknown.
+    Also without rotary inertia where the model has none; 0 for other shape functions and with
+    shear; None where the section's radius of gyration is unknown.
 
     1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the shape
     function in 1/m, r the radius of gyration in m; the 1 is rotary inertia. `line` (m) is the
@@ -227,6 +227,8 @@ def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
     shapes = body.shapes
     if shapes is None:
         return None
+    if shapes.data.sheared:
+        return np.zeros(body.n)
     x, weights = shapes.rule()
     errors, is_known = np.zeros(body.n), False
     for plane, axis in (("y", 2), ("z", 1)):

@@ -249,8 +249,7 @@ def _rotary_inertia_moment(
     if not per_length.any():
         return np.zeros((len(motion.t), len(per_length), 3))
     if not motion.body.points:
-        rows = motion.shapes.rows
-        theta = np.moveaxis(motion.shapes.inertia_rotation(rows(x, 1), rows(x, 0)[3]), 2, 0)
+        theta = np.moveaxis(motion.shapes.inertia_rotation(x), 2, 0)
     rotation, rate, growth = _section_rotation(motion, theta, turned)
     w = tilde(motion.frame_angular_velocity)[:, None]
     acceleration = (

@@ -31,7 +31,7 @@ def outputs(name: str, inputs: dict[str, list[sp.Rational]]) -> dict[str, list[A
 
 def draw(seed: int) -> dict[str, list[sp.Rational]]:
     numbers = random.Random(seed)
-    sizes = {"axis": 3, "turn": 3, "strain": 4}
+    sizes = {"axis": 3, "turn": 3, "strain": 6}
     return {
         f"{name}_{k}": [sp.Rational(numbers.randint(-99, 99), 64) for _ in range(size)]
         for k in "kl"
@@ -46,7 +46,8 @@ def section() -> dict[str, list[sp.Expr]]:
     normal = [over_rectangle(one * p, young)[0] for p in (1, Z**2, Y**2)]
     # Saint-Venant torsion without warping: G I_p, the constant of a section that keeps plane.
     twist = over_rectangle(one * (Y**2 + Z**2), shear)[0]
-    return {"inertia": inertia, "stiffness": [normal[0], twist, normal[1], normal[2]]}
+    shears = [sp.Rational(7, 3), sp.Rational(5, 3)]  # k G A along y and z
+    return {"inertia": inertia, "stiffness": [normal[0], twist, normal[1], normal[2], *shears]}
 
 
 def points(axis: list[sp.Expr], turn: list[sp.Expr]) -> sp.Matrix:
@@ -68,12 +69,14 @@ def test_integrands_are_those_of_a_rectangular_section(seed: int) -> None:
         )
     strains = []
     for k in "kl":
-        stretch, twist, curved_z, curved_y = drawn[f"strain_{k}"]
+        stretch, twist, curved_z, curved_y = drawn[f"strain_{k}"][:4]
         normal = stretch - Z * curved_z - Y * curved_y
         strains.append((normal, -Z * twist, Y * twist))
     energy = sp.Rational(21, 2) * strains[0][0] * strains[1][0]
     energy += 4 * (strains[0][1] * strains[1][1] + strains[0][2] * strains[1][2])
     exact = over_rectangle(sp.Matrix([[energy]]), sp.Integer(1))[0]
+    for axis, stiffness in enumerate(section()["stiffness"][4:], 4):
+        exact += stiffness * drawn["strain_k"][axis] * drawn["strain_l"][axis]
     assert float(found["K"][0]) == pytest.approx(float(exact), rel=1e-14)
 
 
@@ -86,7 +89,7 @@ def test_rigid_integrands_are_those_of_a_rectangular_section() -> None:
     assert float(found["mass"][0]) == pytest.approx(float(DENSITY * WIDTH * HEIGHT))
 
 
-def test_a_section_turns_with_the_slopes_of_the_axis() -> None:
+def test_a_section_turns_with_the_rotations_of_both_planes() -> None:
     found = outputs("section", {"values": [sp.Integer(v) for v in (1, 2, 3, 4)],
                                 "slopes": [sp.Integer(5), sp.Integer(6)]})  # fmt: skip
     assert [float(v) for v in found["phi"]] == [1, 2, 3]

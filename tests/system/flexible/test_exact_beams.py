@@ -263,6 +263,7 @@ def test_section_loads_balance_the_hinge() -> None:
         ({"frame": "chord"}, "frame: an exact beam has no frame"),
         ({"quadrature": True}, "quadrature: an exact beam has no quadrature"),
         ({"viscous_drag": 0.1}, "drag acts only on second-order beams"),
+        ({"shear_stiffness": 1.0, "rotary_inertia": 0.1}, "only second-order beams have shear"),
         ({"basis": "free-free"}, 'expected "auto", "modes" or "legendre"'),
         ({"model": "one-way"}, "the one-way response is linear"),
         ({"kinematics": "second-order", "basis": "legendre"}, 'write kinematics = "exact"'),

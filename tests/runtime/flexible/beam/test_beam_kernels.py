@@ -30,7 +30,7 @@ GROUPS = {
     ),
     "second_moments": (("x",), ("inertia",), ("turn_k",), ("turn_l",), ("g", "h_turn")),
     "turning": (("theta_k", "kappa_k"), ("theta_l", "kappa_l")),
-    "drawing": (("theta_k", "stretch_k"), ("theta_l", "stretch_l"), ("h",)),
+    "drawing": (("theta_k", "eps_k"), ("theta_l", "eps_l"), ("h",)),
 }  # fmt: skip
 
 
