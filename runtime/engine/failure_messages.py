@@ -64,6 +64,12 @@ class _Failure:
         return self.hinge.replace("/", ".")
 
     @property
+    def is_segment(self) -> bool:
+        """Whether the element is reached by a segment of an exact beam."""
+        section = self.engine.packed.system.body(self.element).section
+        return section is not None and section.is_segment
+
+    @property
     def curve(self) -> str:
         return self.hinge.removesuffix(OF_CONSTRAINT)
 
@@ -142,9 +148,13 @@ _TEXTS: dict[int, str | Callable[[_Failure], str]] = {
         "the product of transfer matrices {0.at}: its deviation from the Riccati sweep exceeds the "
         'requested accuracy (errors grow geometrically along the chain); use sweep = "riccati"'
     ),
-    FailureCode.SECTION: (
-        '"{0.section}" {0.at}: a section rotates by more than 1.5 rad relative to its floating '
-        "frame, the limit of small deflections; split the body into several welded bodies"
+    FailureCode.SECTION: lambda failure: (
+        '"{0.section}" {0.at}: the segment to it turns by more than 1.5 rad; use more modes, which '
+        "shortens the segments, or split the beam"
+        if failure.is_segment
+        else '"{0.section}" {0.at}: a section rotates by more than 1.5 rad relative to its '
+        'floating frame, the limit of small deflections; use kinematics = "exact" for a beam, or '
+        "split the body into several welded bodies"
     ),
     FailureCode.MODES: (
         'flexible body "{0.node}" {0.at}: its modal mass matrix is not positive definite; use '

@@ -23,7 +23,8 @@ from .certificate_data import (
     SpringDeflection,
     StepControl,
 )
-from .flexible import model_range
+from .flexible import exact_range, model_range
+from .flexible.exact_range import ExactRange
 from .flexible.model_range import ModelRange
 
 
@@ -80,7 +81,8 @@ class Certificate(NotebookDisplay):
         pivots_not_checked: whether the scene has too many bodies for a check of the pivots.
         sample_count: number of samples; balances need two.
         message: the run's own message.
-        flexible_bodies: validity range of the model of each flexible body.
+        flexible_bodies: validity range of the model of each flexible body but exact beams.
+        exact_beams: resolution and range of each exact beam.
         spring_deflection: deflection of the stiffest spring, which the estimated error does not
             include; None without a spring.
         failures: reasons why the run, or some of its samples, cannot be used at all.
@@ -106,6 +108,7 @@ class Certificate(NotebookDisplay):
     pivots_not_checked: bool = field(default=False, metadata=stored_as("too_large"))
     sample_count: int = field(default=2, metadata=stored_as("samples"))
     flexible_bodies: tuple[ModelRange, ...] = field(default=(), metadata=stored_as("flexible"))
+    exact_beams: tuple[ExactRange, ...] = field(default=(), metadata=stored_as("exact"))
     spring_deflection: SpringDeflection | None = field(default=None, metadata=stored_as("give"))
     failures: tuple[str, ...] = ()
     achieved_error: AchievedError | None = field(default=None, metadata=stored_as("reached"))
@@ -170,6 +173,8 @@ class Certificate(NotebookDisplay):
         parts = ["integration in time only, not the assumptions of the scene"]
         if self.flexible_bodies:
             parts.append("not the shape functions and frames of flexible bodies (see their rows)")
+        if self.exact_beams:
+            parts.append("not the strain shapes of exact beams (see their rows)")
         if self.spring_deflection is not None:
             stiffest = self.spring_deflection
             parts.append(
@@ -219,7 +224,7 @@ class Certificate(NotebookDisplay):
             rows.append(("h |lambda| at the start", f"{self.step_stability.product:.3g}"))
         if self.sum_of_local_errors is not None:
             rows.append(("sum of local errors", f"{self.sum_of_local_errors:.1e} (not the error)"))
-        rows += model_range.rows(self.flexible_bodies)
+        rows += model_range.rows(self.flexible_bodies) + exact_range.rows(self.exact_beams)
         rows += _error_rows(self)
         rows += [("warning", text) for text in self.warnings] if warnings else []
         return rows

@@ -9,7 +9,7 @@ increase it by more.  For a clamped beam in the plane of its spin the relative r
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,10 @@ if TYPE_CHECKING:
 _MAX_FREQUENCY_RATIO = 1.5
 
 
+#: Remedy where one floating frame is not enough.
+_BENDS_FAR = 'use kinematics = "exact" for a beam, or split the body into welded parts'
+
+
 class ModelRangeCheck(MeasuringCheck[tuple[ModelRange, ...]]):
     """Known limitations of the models of flexible bodies; measures the range of all checks here."""
 
@@ -59,6 +63,14 @@ class ModelRangeCheck(MeasuringCheck[tuple[ModelRange, ...]]):
 MODEL_RANGE = ModelRangeCheck()
 
 
+def worst_of(risks: Iterable[Risk | None]) -> Iterator[Risk]:
+    """First risk of those of several bodies, with the number of others; nothing without any."""
+    found = [risk for risk in risks if risk is not None]
+    if found:
+        more = f" (and {len(found) - 1} more bodies)" if len(found) > 1 else ""
+        yield replace(found[0], description=found[0].description + more)
+
+
 class _BodyCheck(Check):
     """Check of each flexible body, with one risk for the worst one."""
 
@@ -72,10 +84,7 @@ class _BodyCheck(Check):
             MODEL_RANGE.measured(result),
             key=lambda body: -max(body.slope, body.spin_ratio, body.load_ratio),
         )
-        risks = [risk for risk in map(self._risk, worst_first) if risk is not None]
-        if risks:
-            more = f" (and {len(risks) - 1} more bodies)" if len(risks) > 1 else ""
-            yield replace(risks[0], description=risks[0].description + more)
+        yield from worst_of(map(self._risk, worst_first))
 
 
 class StiffeningCheck(_BodyCheck):
@@ -135,7 +144,7 @@ class SlopeCheck(_BodyCheck):
             f'"{body.name}" bends to a slope of {body.slope:.2g} relative to its floating frame; '
             f"above {MAX_SLOPE:g} one frame is not accurate (error up to {body.frame_error:.0%} of "
             f"the deflection, {min(body.shortening_error, 9.99):.0%} of the foreshortening)",
-            "split the body into welded parts", body.slope, MAX_SLOPE,
+            _BENDS_FAR, body.slope, MAX_SLOPE,
         )  # fmt: skip
 
 
@@ -149,7 +158,7 @@ class RotationCheck(_BodyCheck):
             "turn", f'"{body.name}"',
             f'a section of "{body.name}" rotates by {body.turn:.2g} rad relative to its floating '
             "frame; the model is not valid above 1.5 rad",
-            "split the body into welded parts", body.turn, MAX_ROTATION, "rad",
+            _BENDS_FAR, body.turn, MAX_ROTATION, "rad",
         )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from ..element_checks import stiffest_spring_deflection
 from .check import Check, MeasuringCheck, RunStart, risks_of
 from .conditioning import PIVOT_LOSS, SINGULARITY
 from .conservation import BALANCE, step_control
+from .exact_beams import EXACT_BEAM_CHECKS, EXACT_RANGE, StretchCheck
 from .flexible import FLEXIBILITY_CHECKS, MODEL_RANGE, ShapeCheck, StiffeningCheck
 from .loops import CLOSURE, PullingContactCheck, SingularStartCheck
 from .narrow_features import NarrowFeatureCheck
@@ -144,7 +145,8 @@ FINITENESS, STEP_STABILITY = FinitenessCheck(), StepStabilityCheck()
 
 #: Checks before a run.
 START_CHECKS: tuple[Check, ...] = (
-    TimeMapCheck(), PIVOT_LOSS, SINGULARITY, StiffeningCheck(), ShapeCheck(), STIFFNESS,
+    TimeMapCheck(), PIVOT_LOSS, SINGULARITY, StiffeningCheck(), ShapeCheck(), StretchCheck(),
+    STIFFNESS,
     SingularStartCheck(), CLOSURE,
 )  # fmt: skip
 
@@ -152,7 +154,7 @@ START_CHECKS: tuple[Check, ...] = (
 RESULT_CHECKS: tuple[Check, ...] = (
     FINITENESS, TargetErrorCheck(), TrajectoryCheck(), NarrowFeatureCheck(), PullingContactCheck(),
     OutputCheck(), CLOSURE, BALANCE, QuaternionCheck(), PIVOT_LOSS, SINGULARITY, STEP_STABILITY,
-    *FLEXIBILITY_CHECKS, ModelCheck(),
+    *FLEXIBILITY_CHECKS, *EXACT_BEAM_CHECKS, ModelCheck(),
 )  # fmt: skip
 
 
@@ -213,6 +215,7 @@ def build_certificate(result: Record, error: ErrorEstimate | None) -> Certificat
         pivots_not_checked=len(result.model.scene.bodies) > MAX_CHECKED_BODIES,
         sample_count=len(result.t),
         flexible_bodies=MODEL_RANGE.measured(result),
+        exact_beams=EXACT_RANGE.measured(result),
         spring_deflection=stiffest_spring_deflection(result),
         failures=() if result.success else (result.message,),
         achieved_error=run.achieved_error,

@@ -20,6 +20,7 @@ from .momentum import modal_energy
 from .motion import Motion, rotation_vectors, tilde, values_at
 
 if TYPE_CHECKING:
+    from ...flexible.beam.exact_sections import ExactSections
     from ...flexible.beam.section_ports import BeamShapes
     from ...flexible.modal_body import ModalBody
 
@@ -164,7 +165,7 @@ def has_bending_shapes(body: ModalBody, plane: str) -> bool:
     return any(name.startswith(plane) for name in body.modes)
 
 
-def gyration_radii(shapes: BeamShapes, x: Array) -> Array:
+def gyration_radii(shapes: BeamShapes | ExactSections, x: Array) -> Array:
     """Radii of gyration (3, m) in m of the sections at x, about y and z in rows 1 and 2.
 
     Zero where unknown. From rotary inertia, else from E I / E A, else from half the polar inertia.
@@ -225,6 +226,8 @@ def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
     assessed on that whole length.
     """
     shapes = body.shapes
+    if body.exact is not None:
+        return _shear_errors_of_strains(body, body.exact)
     if shapes is None:
         return None
     if shapes.data.sheared:
@@ -248,6 +251,22 @@ def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
         )
         is_known = True
     return errors if is_known else None
+
+
+def _shear_errors_of_strains(body: ModalBody, exact: ExactSections) -> Array | None:
+    """The same for strain shapes; K / M = EI / rho A beta^4 of each shape alone."""
+    x = np.linspace(0.0, exact.length, SECTION_COUNT)
+    sections, radii, errors = exact.sections(x), gyration_radii(exact, x), np.zeros(body.n)
+    for plane, row, bending in (("y", 2, sections.EI_z), ("z", 1, sections.EI_y)):
+        indices = [k for k, name in enumerate(body.modes) if name.startswith(plane)]
+        gyration = float(radii[row].max())
+        if not indices or not gyration > 0:
+            continue
+        ratio = np.mean(sections.mass_per_length) / np.mean(bending)
+        squares = np.sqrt(ratio * np.diag(body.K)[indices] / np.diag(body.Mff)[indices])
+        rotary = float(not exact.data.rotary)
+        errors[indices] = 0.5 * squares * gyration**2 * (_SHEAR_RATIO + rotary)
+    return errors if errors.any() else None
 
 
 def weighted_shear_error(motion: Motion, line: float | None = None) -> float | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,10 +21,13 @@ if TYPE_CHECKING:
     from .section_loads import FlexibleBodies
 
 
-def station_loads(flexible: FlexibleBodies, motion: Motion, x: Array) -> tuple[Array, Array]:
+def station_loads(
+    flexible: FlexibleBodies, motion: Motion, x: Array, samples: Any = slice(None)
+) -> tuple[Array, Array]:
     """Section force (n, m, 3) in N and moment (n, m, 3) in N*m at x (m,), section axes.
 
-    Of the part beyond x on the part before it, with the signs of `section_loads`.
+    Of the part beyond x on the part before it, with the signs of `section_loads`; `motion` is that
+    at these samples of the run.
     """
     exact = motion.body.exact
     assert exact is not None
@@ -32,7 +35,7 @@ def station_loads(flexible: FlexibleBodies, motion: Motion, x: Array) -> tuple[A
     outer = x >= start if start < exact.length else x > start
     rotations, positions = exact.poses(motion.eta, x)
     force, moment = np.zeros((2, len(motion.t), len(x), 3))
-    for load in _own_loads(flexible, motion):
+    for load in _own_loads(flexible, motion, samples):
         begin, end = load.part
         length, is_outer = end - begin, (begin + end) / 2 >= start
         cut = np.clip(x, begin, end)
@@ -64,14 +67,14 @@ class _OwnLoad:
     moment: Array
 
 
-def _own_loads(flexible: FlexibleBodies, motion: Motion) -> Iterator[_OwnLoad]:
+def _own_loads(flexible: FlexibleBodies, motion: Motion, samples: Any) -> Iterator[_OwnLoad]:
     """Loads of the stations and ends: that across each segment less those of the next ones."""
     body = motion.body
     assert body.exact is not None
     across: list[tuple[Array, Array] | None] = []
     for k, station in enumerate(body.stations):
         load = flexible.load_at_end(body.name, station.end or f"station {k + 1}")
-        across.append(load and (motion.inward(load[0]), motion.inward(load[1])))
+        across.append(load and (motion.inward(load[0][samples]), motion.inward(load[1][samples])))
     sections = np.array([station.x for station in body.stations])
     rotations, points = body.exact.poses(motion.eta, sections)
     parts = _parts(body)
