@@ -58,6 +58,8 @@ def _rotation_vectors(motion: Motion) -> list[Array]:
 
 def has_second_order_terms(body: ModalBody) -> bool:
     """Whether the kinematics of a body include second-order displacements."""
+    if body.exact is not None:
+        return True
     return bool(np.any(body.G)) if body.shapes is None else bool(body.shapes.stiffening)
 
 

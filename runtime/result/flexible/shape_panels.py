@@ -246,7 +246,7 @@ def panel_names(result: Record) -> Iterator[str]:
         yield "shape"
     for name, body in bodies.items():
         yield f"{name}.shape"
-        if body.shapes is not None:
+        if body.has_axis:
             yield f"{name}.deflection"
         yield f"{name}.modal_energy"
 

@@ -12,6 +12,7 @@ import numpy as np
 from mstmm.array_validation import Array
 
 from ...engine.quantity_registry import EULER_KIND
+from ..flexible.motion import axis_of
 from ..quantity_names import Quantity, column_labels
 
 if TYPE_CHECKING:
@@ -162,12 +163,11 @@ def _deflection_names(result: Record) -> Iterator[str]:
     The modal coordinate is used for a body whose frame follows its tip or that is not a beam.
     """
     for name, body in islice(result.model.flexible_bodies.items(), _MAX_BEAMS):
-        if body.shapes is None:
+        if not body.has_axis:
             yield f"{name}.{body.modes[0]}"
             continue
-        deflection = np.abs(
-            np.nan_to_num(result.deflection(name, np.array([0.5, 1.0]) * body.shapes.length))
-        )
+        x = np.array([0.5, 1.0]) * axis_of(body, "deflection").length
+        deflection = np.abs(np.nan_to_num(result.deflection(name, x)))
         middle, tip = np.max(deflection[:, :, 1:], axis=0, initial=0.0)
         if tip.max() <= _ZERO_TIP_RATIO * middle.max():
             yield f"{name}.{body.modes[0]}"

@@ -129,7 +129,7 @@ class _SceneBuilder:
     def _rigid_bodies(self) -> Iterator[Solid]:
         flexible_bodies = self.run.model.flexible_bodies
         names_with_geometry = {
-            name for name, body in flexible_bodies.items() if body.shapes or body.skin
+            name for name, body in flexible_bodies.items() if body.has_axis or body.skin
         }
         names_with_geometry |= {shape.owner for shape in self.scene.shape}
         hinged_references = {hinge.inboard for hinge in self.scene.hinges}

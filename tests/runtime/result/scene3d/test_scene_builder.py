@@ -40,6 +40,20 @@ def test_a_tube_ends_where_the_beam_does() -> None:
     assert np.ptp(fine.position("blade.tip"), axis=0).max() > 0.3
 
 
+def test_an_exact_beam_is_its_bent_tube_alone() -> None:
+    rod = {"name": "rod", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0}
+    rod |= {"kinematics": "exact", "modes": {"y": 3}}
+    pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
+    run = mstmm.compile(mstmm.Scene(gravity=[0, -9.81, 0], beam=[rod], hinge=[pin])).simulate(0.5)
+    stage = build_scene_graph(run, "exact", most=6)
+    [tube] = stage.deforming_surfaces
+    around = 8
+    tip = tube.vertices[:, -around:].mean(axis=1)
+    fine = mstmm.compile(run.model.scene).simulate(0.5, output_times=stage.times)
+    assert tip == pytest.approx(fine.position("rod.tip"), abs=1e-3)
+    assert not [solid for solid in stage.solids if solid.owner.startswith("bodies/rod")]
+
+
 def test_springs_and_trails_meet_their_ends() -> None:
     run = scenes.run()
     stage = build_scene_graph(run, "lines", trails=("rod.tip",), most=11)
