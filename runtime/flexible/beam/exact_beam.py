@@ -104,19 +104,17 @@ def _notes(setting: ExactBeamSetting) -> tuple[str, ...]:
 
 
 def _shapes(setting: ExactBeamSetting) -> StrainShapes:
-    length = setting.data.length
     counts = {direction: count for direction, count in setting.counts.items() if count}
     if setting.basis == LEGENDRE:
-        return legendre_shapes(length, counts)
-    return StrainShapes(
-        length, {direction: _strain_modes(setting, direction, n) for direction, n in counts.items()}
-    )
+        return legendre_shapes(setting.data, counts)
+    modes = {direction: _strain_modes(setting, direction, n) for direction, n in counts.items()}
+    return StrainShapes(setting.data, modes)
 
 
 def _strain_modes(setting: ExactBeamSetting, direction: str, count: int) -> Array:
     """Coefficients (polynomials, count) of the strains of the lowest vibrations in a direction."""
     degree = max(count + _MORE_POLYNOMIALS, _LEAST_POLYNOMIALS)
-    shapes = legendre_shapes(setting.data.length, {direction: degree})
+    shapes = legendre_shapes(setting.data, {direction: degree})
     chain, lengths = _chain(setting, shapes, degree + _MORE_STATIONS, {})
     stations = _stations(setting, chain, lengths)
     rotations, positions, twists = chain.at_rest
@@ -161,11 +159,13 @@ def _chain(
 ) -> tuple[Chain, dict[float, float]]:
     """Chain of stations and ends; station (m) -> length that its slice stands for, m.
 
-    Loads on a part of the beam act on further stations, without mass.
+    Further stations, without mass, are where the section changes, so that strains are smooth along
+    each segment, and where loads act on a part of the beam.
     """
     data = setting.data
     x, weights = gauss_sections(data.breaks, count)
-    lengths = dict(zip(x.tolist(), weights.tolist(), strict=True))
+    lengths = {section: 0.0 for section in data.breaks[1:-1] if section != setting.start}
+    lengths |= dict(zip(x.tolist(), weights.tolist(), strict=True))
     for begin, end in spans.values():
         if (begin, end) != (0.0, data.length):
             sections = gauss_sections((begin, end), count)[0].tolist()

@@ -2,7 +2,9 @@
 
 The strains of a section are xi = xi_0 + B(x) eta, rows stretch, shear y, shear z, twist rate,
 curvature y, curvature z in the axes of the section; see derive/flexible/segment.py.  Each column of
-B is a combination of Legendre polynomials of x over the beam's length, in one row.
+B is in one row: a combination of Legendre polynomials of x over the beam's length, divided by the
+stiffness relative to its harmonic mean.  The polynomials so are moments and forces, which are
+continuous where the section changes.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from mstmm.array_validation import Array
 from mstmm.ir.element_spec import builtin_kernel
 
 from ...kernels.numpy_kernels import evaluate
+from .beam_data import BeamData
 from .gauss_quadrature import gauss_rule
+from .static_shapes import direction_stiffness
 
 #: Direction of a beam's shapes -> row of its strain and its sign: bending along y turns sections
 #: about z, bending along z about -y.
@@ -34,11 +38,11 @@ _GAUSS = 0.5 + np.sqrt(15.0) / 10.0 * np.array([-1.0, 0.0, 1.0])
 class StrainShapes:
     """Strain shapes by direction: columns of coefficients of P_0, P_1, ... over a beam.
 
-    A coefficient of 1 is the strain P_j(2 x / L - 1) / L, so that coordinates of curvature and
-    twist are angles (rad), of stretch lengths (m).
+    A coefficient of 1 is the strain P_j(2 x / L - 1) / L times the relative flexibility, whose mean
+    is 1, so that coordinates of curvature and twist are angles (rad), of stretch lengths (m).
     """
 
-    length: float
+    data: BeamData
     coefficients: dict[str, Array]
 
     @property
@@ -61,16 +65,23 @@ class StrainShapes:
         first = 0
         for direction, columns in self.coefficients.items():
             row, sign = STRAIN_ROWS[direction]
-            values = legendre.legval(2 * x / self.length - 1, columns).T / self.length
-            strains[:, row, first : first + columns.shape[1]] = sign * values
+            values = legendre.legval(2 * x / self.data.length - 1, columns) / self.data.length
+            values *= self._flexibility(direction, x)
+            strains[:, row, first : first + columns.shape[1]] = sign * values.T
             first += columns.shape[1]
         return strains
 
+    def _flexibility(self, direction: str, x: Array) -> Array:
+        """Flexibility (m,) at the sections x (m,), relative to its mean over the beam."""
+        pieces = 1.0 / direction_stiffness(self.data, direction)
+        mean = pieces @ np.diff(self.data.breaks) / self.data.length
+        return np.asarray((pieces / mean)[self.data.piece(x)])
 
-def legendre_shapes(length: float, counts: dict[str, int]) -> StrainShapes:
+
+def legendre_shapes(data: BeamData, counts: dict[str, int]) -> StrainShapes:
     """Legendre polynomials up to degree count - 1 in each direction with shapes."""
     return StrainShapes(
-        length, {direction: np.eye(count) for direction, count in counts.items() if count}
+        data, {direction: np.eye(count) for direction, count in counts.items() if count}
     )
 
 
