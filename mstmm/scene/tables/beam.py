@@ -25,7 +25,7 @@ from ..validators.scalars_and_vectors import (
 )
 from ..validators.validation_messages import did_you_mean
 from .body import End
-from .flexible_keys import AUTO, FlexibleTable, frame_field, or_auto
+from .flexible_keys import AUTO, NO_STRAINS, FlexibleTable, frame_field, or_auto
 from .shape_functions import shape_problem
 
 GIVEN = "given"
@@ -496,6 +496,8 @@ def _kinematics_problems(beam: Beam) -> Iterator[Problem]:
                 f'"{beam.basis}" is a basis of strains; write kinematics = "exact", or choose '
                 f"another basis: {', '.join(SHAPE_BASES)}",
             )
+        if any(beam.damping.strain):
+            yield ("damping", "strain"), NO_STRAINS
         return
     for key, (allowed, reason) in _KEYS_OF_SECOND_ORDER.items():
         if getattr(beam, key) != allowed:

@@ -23,7 +23,7 @@ from ..validators.scalars_and_vectors import (
     to_python,
     unexpected,
 )
-from .flexible_keys import AUTO, FlexibleTable, frame_field, or_auto
+from .flexible_keys import AUTO, NO_STRAINS, FlexibleTable, frame_field, or_auto
 
 SOURCES = ("matrices", "arrays", "mesh", "box")
 REGIONS = ("nodes", "box", "plane", "sphere", "set")
@@ -239,6 +239,8 @@ class Elastic(FlexibleTable):
             return
         yield from self._material_problems()
         yield from self._end_problems()
+        if any(self.damping.strain):
+            yield ("damping", "strain"), NO_STRAINS
         start = self.initial
         if start.eta is not None and start.etad is not None and len(start.eta) != len(start.etad):
             yield (

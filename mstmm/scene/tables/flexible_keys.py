@@ -14,6 +14,7 @@ from ..validators.scalars_and_vectors import (
     Shorthand,
     Table,
     ValidationProblems,
+    count_text,
     problem,
     to_python,
     unexpected,
@@ -25,6 +26,8 @@ from ..validators.scalars_and_vectors import (
 MODELS = ("flexible", "rigid", "one-way")
 
 AUTO = "auto"
+#: Why `damping.strain` is refused.
+NO_STRAINS = "only exact beams have strains; give damping = { stiffness = ... }"
 _TANGENT = re.compile(rf"tangent(@{NAME_PATTERN.pattern})?")
 
 
@@ -32,21 +35,29 @@ class Damping(Table):
     """Damping of the shapes: D = 2 ratio omega m for each shape, plus `stiffness` times K.
 
     `ratio` is one modal damping ratio for all, or one per shape; `stiffness` is a time in s.
+    `strain` is the same time for each strain of an exact beam: stretch, shear y, shear z, twist,
+    bending about y, bending about z; s.
     """
 
     ratio: Annotated[
         Numbers, rules.numbers_rule("a modal damping ratio, or a list, one per shape", minimum=0)
     ] = (0.0,)
     stiffness: Annotated[float, rules.number_rule("s", minimum=0)] = 0.0
+    strain: Annotated[
+        Numbers, rules.numbers_rule("a time in s, or six, one per strain", minimum=0, of="s")
+    ] = (0.0,)
 
     def _check(self) -> None:
+        if len(self.strain) not in (1, 6):
+            found = count_text(len(self.strain))
+            raise problem(f"expected a time in s, or six, one per strain, found {found}", "strain")
         if not self.ratio:
             raise problem("expected a modal damping ratio or more, found an empty list", "ratio")
 
     @property
     def acts(self) -> bool:
         """Whether there is any damping."""
-        return self.stiffness > 0 or any(self.ratio)
+        return self.stiffness > 0 or any(self.ratio) or any(self.strain)
 
 
 def _widen_damping(value: Any) -> Any:
@@ -55,7 +66,7 @@ def _widen_damping(value: Any) -> Any:
 
 
 DAMPING = Shorthand(
-    "a modal damping ratio, a list of them, one per shape, or a table { ratio, stiffness }",
+    "a modal damping ratio, a list of them, one per shape, or a table { ratio, stiffness, strain }",
     _widen_damping,
     {"anyOf": [rules.NUMBER_SCHEMA, {"type": "array", "items": rules.NUMBER_SCHEMA}]},
 )

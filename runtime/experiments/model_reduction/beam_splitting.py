@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from mstmm.errors import MstmmError
-from mstmm.scene import Damping, Hinge, Load, Scene, split_reference
+from mstmm.scene import Hinge, Load, Scene, split_reference
 from mstmm.scene.tables.beam import GIVEN, ROOT, TIP, Beam, Modes
 from mstmm.scene.tables.flexible_keys import AUTO
 
@@ -62,7 +62,10 @@ def make_splittable(beam: Beam, frequency: float) -> tuple[Beam, str]:
     changes = []
     if any(beam.damping.ratio):
         time = 2 * beam.damping.ratio[0] / frequency
-        update["damping"] = Damping(stiffness=beam.damping.stiffness + time)
+        stiffness = beam.damping.stiffness + time
+        update["damping"] = beam.damping.model_copy(
+            update={"ratio": (0.0,), "stiffness": stiffness}
+        )
         changes.append(f"stiffness-proportional damping ({time:.3g} s) instead of modal damping")
     if beam.basis == GIVEN:
         update |= {"basis": AUTO, "shapes": None}

@@ -75,16 +75,23 @@ class ExactBeamSetting:
 
 
 def exact_beam_body(beam: Beam, setting: ExactBeamSetting) -> ModalBody:
-    """Modal body of an exact beam, without initial values and messages."""
+    """Modal body of an exact beam, damped by strain rates, without initial values and messages.
+
+    Kelvin-Voigt: a strain xi with stiffness C has the load C (xi + tau xi'), so that
+    D = int B^T diag(tau) C B.
+    """
     shapes = _shapes(setting)
     most = max(setting.counts.values())
     chain, lengths = _chain(setting, shapes, most + _MORE_STATIONS, setting.spans)
     stations = _stations(setting, chain, lengths)
     moments = _moments(stations, chain)
-    stiffness = _stiffness(setting.data, shapes, most + _MORE_STATIONS)
+    stiffness, viscosity = (
+        _stiffness(setting.data, shapes, most + _MORE_STATIONS, np.array(factors))
+        for factors in ((1.0,), beam.damping.strain)
+    )
     return ModalBody(
-        **vars(moments), name=beam.name, modes=shapes.names, K=stiffness,
-        D=np.zeros_like(stiffness), ports=_ports(setting, chain), stations=stations,
+        **vars(moments), name=beam.name, modes=shapes.names, K=stiffness, D=viscosity,
+        ports=_ports(setting, chain), stations=stations,
         exact=ExactSections(setting.data, chain),
         line_loads=_line_loads(setting, stations, lengths), frame="tangent",
         notes=_notes(setting),
@@ -129,7 +136,7 @@ def _strain_modes(setting: ExactBeamSetting, direction: str, count: int) -> Arra
         )
         motion = np.hstack([carried, twist])
         mass += motion.T @ _spatial_inertia(setting, station) @ motion
-    stiffness = _stiffness(setting.data, shapes, degree + _MORE_STATIONS)
+    stiffness = _stiffness(setting.data, shapes, degree + _MORE_STATIONS, np.ones(1))
     rigid = mass[:m, :m]
     free = np.linalg.pinv(rigid, rcond=_NO_INERTIA, hermitian=True) @ mass[:m, m:]
     condensed = mass[m:, m:] - mass[m:, :m] @ free
@@ -212,8 +219,11 @@ def slice_inertia(station: Station) -> Array:
     return inertia
 
 
-def _stiffness(data: BeamData, shapes: StrainShapes, count: int) -> Array:
-    """K = int B^T C B, exact for polynomials and constant pieces."""
+def _stiffness(data: BeamData, shapes: StrainShapes, count: int, factors: Array) -> Array:
+    """Integral of B^T diag(factors) C B, exact for polynomials and constant pieces.
+
+    `factors` are one, or six by strain.
+    """
     x, weights = gauss_sections(data.breaks, max(count, 2) * (len(data.breaks) - 1))
     section = data.sections(x)
     stiffness = np.zeros((len(x), 6))
@@ -221,6 +231,7 @@ def _stiffness(data: BeamData, shapes: StrainShapes, count: int) -> Array:
                     "axial": section.EA}  # fmt: skip
     for direction, values in by_direction.items():
         stiffness[:, STRAIN_ROWS[direction][0]] = values
+    stiffness *= factors
     strains = shapes.at(x)
     return np.asarray(np.einsum("m,mi,mik,mil->kl", weights, stiffness, strains, strains))
 

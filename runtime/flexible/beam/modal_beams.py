@@ -97,7 +97,7 @@ class BeamBodies:
         blocks = _name_blocks(body.modes)
         eta, etad = _initial_modal_state(beam, body.modes)
         d = damping(body.Mff, body.K, beam.damping.ratio, beam.damping.stiffness, blocks, beam.name)
-        return replace(body, D=d, eta=eta, etad=etad)
+        return replace(body, D=body.D + d, eta=eta, etad=etad)
 
     def _exact_basis(self, beam: Beam) -> str:
         """Basis of an exact beam; "auto" is Legendre where an end carries a load of its own."""

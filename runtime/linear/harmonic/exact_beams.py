@@ -162,6 +162,8 @@ def _check_beam(beam: Beam, data: BeamData, positions: Sequence[float]) -> None:
             "has modal damping ratios, but no shape functions if exact; give "
             f'damping = {{ stiffness = ... }}, or structural = {{"{beam.name}": ...}}'
         )
+    elif any(beam.damping.strain):
+        problem = "has damping by strain; give damping = { stiffness = ... }"
     if problem:
         raise SceneError(f'exact: beam "{beam.name}" {problem}, or do not make it exact')
 
@@ -194,7 +196,7 @@ def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> Linea
 
 def _reshape(beam: dict[str, Any], modes: Sequence[str]) -> None:
     directions = dict.fromkeys(name.rstrip("0123456789") for name in modes)
-    for key in ("shapes", "initial"):
+    for key in ("shapes", "initial", "kinematics"):
         beam.pop(key, None)
     beam |= {
         "basis": "static+fixed-interface", "frame": "tangent", "quadrature": False,

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from mstmm.errors import SceneError
+from mstmm.runtime.flexible.modal_body import ModalBody
 from tests.support.flexible.vibrations import Array, frequencies, ground_hinge_equations
 from tests.support.scenes.single_beam import FREE, HELD, PIN, body_of
 
@@ -19,7 +21,7 @@ ROD: dict[str, Any] = {
 }  # fmt: skip
 
 
-def grounded(body: Any, free: Any = (), count: int = 3, end: str = "root") -> Array:
+def grounded(body: ModalBody, free: Any = (), count: int = 3, end: str = "root") -> Array:
     port = (0, body.ports[end], np.eye(3))
     return frequencies([body], [np.eye(3)], ground_hinge_equations(port, free), count)
 
@@ -84,3 +86,27 @@ def test_a_stepped_beam_has_the_frequencies_of_the_second_order_beam() -> None:
     for basis, count in (("legendre", 8), ("modes", 3)):
         exact = body_of(HELD, modes={"y": count, "z": count}, basis=basis, **beam, **EXACT)
         assert grounded(exact) == pytest.approx(grounded(second_order), rel=5e-5)
+
+
+def test_damping_by_strain_dissipates_by_its_own_strain() -> None:
+    """D = tau K for each direction; one time is stiffness-proportional damping."""
+    beam: dict[str, Any] = {"modes": {"y": 2, "z": 2, "twist": 1, "axial": 1}, **ROD, **EXACT}
+    times = {"strain": [1e-3, 0.0, 0.0, 2e-3, 3e-3, 4e-3]}
+    six = body_of(HELD, damping=times, **beam)
+    by_mode = np.array([4e-3, 4e-3, 3e-3, 3e-3, 2e-3, 1e-3])
+    assert pytest.approx(six.K * by_mode, rel=1e-12, abs=1e-15) == six.D
+    one = body_of(HELD, damping={"strain": 5e-3}, **beam)
+    proportional = body_of(HELD, damping={"stiffness": 5e-3}, **beam)
+    assert pytest.approx(proportional.D, rel=1e-12, abs=1e-15) == one.D
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [({"damping": {"strain": 1e-3}}, "only exact beams have strains"),
+     ({"damping": {"strain": [1e-3, 0.0]}, **EXACT}, "or six, one per strain, found 2 entries"),
+     ({"frame": "chord", **EXACT}, "an exact beam has no frame"),
+     ({"basis": "modes"}, "is a basis of strains")],
+)  # fmt: skip
+def test_keys_of_the_other_kinematics_are_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        body_of(HELD, **change)
