@@ -88,6 +88,26 @@ def test_a_moment_bends_a_beam_to_a_circle() -> None:
     assert np.abs(middle - [0.0, 1 / np.pi, 0.0]).max() < 1e-6  # of the pose, order 6
 
 
+def test_a_moment_bends_each_piece_of_a_stepped_beam_to_an_arc() -> None:
+    """One coordinate is exact: the moment is constant, the curvature jumps with the section."""
+    pieces = [
+        {"from": 0.0, "to": 0.35, "bending_stiffness": 4.0},
+        {"from": 0.35, "to": 1.0, "bending_stiffness": 0.5},
+    ]
+    moment = {"on": "rod.tip", "moment": [0.0, 0.0, 1.0]}
+    rod = exact("rod", section=pieces, modes={"y": 1})
+    data = scene(rod, hinge("clamp", "fixed", "ground", "rod"), load=[moment])
+    model = compile_scene(data, "looped")
+    tip = model.positions(model.equilibrium(), "rod.tip")
+    place, angle = np.zeros(2), 0.0
+    for length, curvature in ((0.35, 0.25), (0.65, 2.0)):
+        turned = angle + curvature * length
+        chord = np.array([np.sin(turned) - np.sin(angle), np.cos(angle) - np.cos(turned)])
+        place += chord / curvature
+        angle = turned
+    assert tip[:2] == pytest.approx(place, abs=1e-9)
+
+
 # --- motions --------------------------------------------------------------------------------------
 
 

@@ -67,7 +67,7 @@ def test_strain_modes_include_a_mass_on_the_tip(ratio: float) -> None:
 
 
 def test_frequencies_do_not_depend_on_the_supported_section() -> None:
-    beam = {"modes": {"y": 10}, "basis": "legendre", "ends": {"mid": 0.37}, **EXACT}
+    beam: dict[str, Any] = {"modes": {"y": 10}, "basis": "legendre", "ends": {"mid": 0.37}, **EXACT}
     found = [
         grounded(body_of(FREE, at=f"b.{end}", **beam), range(6), end=end)
         for end in ("root", "mid", "tip")
@@ -81,7 +81,7 @@ def test_a_stepped_beam_has_the_frequencies_of_the_second_order_beam() -> None:
         {"from": 0.0, "to": 0.4, "mass_per_length": 2.0, "bending_stiffness": [3.0, 5.0]},
         {"from": 0.4, "to": 1.0, "mass_per_length": 0.7, "bending_stiffness": [1.0, 0.8]},
     ]
-    beam = {"section": pieces, "mass_per_length": None, "bending_stiffness": None}
+    beam: dict[str, Any] = {"section": pieces, "mass_per_length": None, "bending_stiffness": None}
     second_order = body_of(HELD, modes={"y": 8, "z": 8}, **beam)
     for basis, count in (("legendre", 8), ("modes", 3)):
         exact = body_of(HELD, modes={"y": count, "z": count}, basis=basis, **beam, **EXACT)
