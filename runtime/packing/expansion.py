@@ -30,6 +30,7 @@ from mstmm.ir.tape import compile_tape
 from mstmm.numerics.rotations import IDENTITY, to_matrix, to_quaternion
 from mstmm.scene import Body, Constraint, End, Hinge, Scene, split_reference
 from mstmm.scene.checks.topology import build_topology, may_have_loops
+from mstmm.scene.tables.beam import EXACT
 from mstmm.scene.tables.closures import CURVE
 from mstmm.scene.tables.hinge import Initial
 from mstmm.scene.tables.hinge_frames import axes_about
@@ -236,7 +237,7 @@ LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
 def with_level(scene: Scene, flexibility: str | None) -> Scene:
     """Set the model level of all flexible bodies; None keeps the scene.
 
-    Raises SceneError for an unknown level.
+    Raises SceneError for an unknown level, and for the one-way response of an exact beam.
     """
     if flexibility is None:
         return scene
@@ -244,6 +245,13 @@ def with_level(scene: Scene, flexibility: str | None) -> Scene:
     if require_word("flexibility", flexibility, f"one of {known}, or None") not in LEVELS:
         raise SceneError(f'flexibility: expected one of {known}, found "{flexibility}"')
     level = {"model": LEVELS[flexibility]}
+    if level["model"] == "one-way":
+        for beam in scene.beam:
+            if beam.kinematics == EXACT:
+                raise SceneError(
+                    f'beam "{beam.name}": the one-way response is linear and does not exist for '
+                    'kinematics = "exact"; leave kinematics out, or use flexibility = "coupled"'
+                )
     fields = {key: getattr(scene, key) for key in type(scene).model_fields}
     fields["beam"] = tuple(beam.model_copy(update=level) for beam in scene.beam)
     fields["elastic"] = tuple(body.model_copy(update=level) for body in scene.elastic)

@@ -284,6 +284,12 @@ def test_a_run_ends_where_a_segment_turns_too_far() -> None:
     assert "the segment to it turns by more than 1.5 rad" in result.message
 
 
+def test_no_one_way_response() -> None:
+    data = scene(exact("rod", modes={"y": 2}), hinge("pin", "pin", "ground", "rod"))
+    with pytest.raises(SceneError, match="one-way response is linear"):
+        compile_scene(data, flexibility="one-way")
+
+
 # --- refused --------------------------------------------------------------------------------------
 
 
