@@ -756,7 +756,7 @@ int mstmm_sweep_modal_end_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psi
 int mstmm_sweep_modal_frame_motion(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
     in_t Psidd, out_t R, out_t d, out_t H6, out_t v, out_t w, out_t c);
 int mstmm_sweep_modal_segment(int n, in_t b, in_t Bm, in_t eta, in_t etad, out_t dC1, out_t dC2,
-    out_t Phi, out_t Om, out_t Omd, out_t Omdd);
+    out_t dX, out_t Phi, out_t Om, out_t Omd, out_t Omdd);
 int mstmm_sweep_modal_segment_motion(in_t R_end, in_t Om, in_t Omd, in_t Omdd, out_t R, out_t d,
     out_t H6, out_t v, out_t w, out_t c);
 int mstmm_sweep_modal_subspace(int n, in_t H6, in_t Phi, out_t H);
@@ -800,9 +800,9 @@ int mstmm_sweep_modal_end_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, in
 int mstmm_sweep_modal_frame_motion_slope(in_t R_end, in_t x, in_t Psi, in_t xd, in_t Psid, in_t xdd,
     in_t Psidd, in_t d_x, in_t d_Psi, in_t d_xd, in_t d_Psid, in_t d_xdd, in_t d_Psidd, out_t d_R,
     out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c);
-int mstmm_sweep_modal_segment_slope(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1, in_t dC2,
-    in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_Phi, out_t d_Om, out_t d_Omd,
-    out_t d_Omdd);
+int mstmm_sweep_modal_segment_slope(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1, in_t dX,
+    in_t dC2, in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_dX, out_t d_Phi,
+    out_t d_Om, out_t d_Omd, out_t d_Omdd);
 int mstmm_sweep_modal_segment_motion_slope(in_t R_end, in_t Om, in_t Omd, in_t Omdd, in_t d_Om,
     in_t d_Omd, in_t d_Omdd, out_t d_R, out_t d_d, out_t d_H6, out_t d_v, out_t d_w, out_t d_c);
 int mstmm_sweep_modal_subspace_slope(int n, in_t H6, in_t Phi, in_t d_H6, in_t d_Phi, out_t d_H);

@@ -503,12 +503,12 @@ static inline int mstmm_modal_frame_motion_by(struct mstmm_modal_frame_motion to
 struct mstmm_modal_segment {
     int n;
     const real *b, *Bm, *eta, *etad;
-    real *dC1, *dC2, *Phi, *Om, *Omd, *Omdd;
+    real *dC1, *dC2, *dX, *Phi, *Om, *Omd, *Omdd;
 };
 static inline int mstmm_modal_segment_by(struct mstmm_modal_segment to)
 {
-    return mstmm_sweep_modal_segment(to.n, to.b, to.Bm, to.eta, to.etad, to.dC1, to.dC2, to.Phi,
-      to.Om, to.Omd, to.Omdd);
+    return mstmm_sweep_modal_segment(to.n, to.b, to.Bm, to.eta, to.etad, to.dC1, to.dC2, to.dX,
+      to.Phi, to.Om, to.Omd, to.Omdd);
 }
 #define mstmm_modal_segment(...) MSTMM_NAMED(mstmm_modal_segment, __VA_ARGS__)
 
@@ -807,13 +807,14 @@ static inline int mstmm_modal_frame_motion_slope_by(struct mstmm_modal_frame_mot
 
 struct mstmm_modal_segment_slope {
     int n;
-    const real *b, *Bm, *eta, *etad, *dC1, *dC2, *d_eta, *d_etad;
-    real *d_dC1, *d_dC2, *d_Phi, *d_Om, *d_Omd, *d_Omdd;
+    const real *b, *Bm, *eta, *etad, *dC1, *dX, *dC2, *d_eta, *d_etad;
+    real *d_dC1, *d_dC2, *d_dX, *d_Phi, *d_Om, *d_Omd, *d_Omdd;
 };
 static inline int mstmm_modal_segment_slope_by(struct mstmm_modal_segment_slope to)
 {
-    return mstmm_sweep_modal_segment_slope(to.n, to.b, to.Bm, to.eta, to.etad, to.dC1, to.dC2,
-      to.d_eta, to.d_etad, to.d_dC1, to.d_dC2, to.d_Phi, to.d_Om, to.d_Omd, to.d_Omdd);
+    return mstmm_sweep_modal_segment_slope(to.n, to.b, to.Bm, to.eta, to.etad, to.dC1, to.dX,
+      to.dC2, to.d_eta, to.d_etad, to.d_dC1, to.d_dC2, to.d_dX, to.d_Phi, to.d_Om, to.d_Omd,
+      to.d_Omdd);
 }
 #define mstmm_modal_segment_slope(...) MSTMM_NAMED(mstmm_modal_segment_slope, __VA_ARGS__)
 

@@ -110,8 +110,9 @@
 #define MSTMM_SECTION_PSIDD(n) (18 * (size_t)(n) + 51)
 #define MSTMM_SECTION_DC1(n) (18 * (size_t)(n) + 54)
 #define MSTMM_SECTION_DC2(n) (24 * (size_t)(n) + 54)
-#define MSTMM_SECTION_S_RF(n) (30 * (size_t)(n) + 54)
-#define MSTMM_SECTION_NUMBERS(n) (36 * (size_t)(n) + 54)
+#define MSTMM_SECTION_DX(n) (30 * (size_t)(n) + 54)
+#define MSTMM_SECTION_S_RF(n) (36 * (size_t)(n) + 54)
+#define MSTMM_SECTION_NUMBERS(n) (42 * (size_t)(n) + 54)
 /* Data of the tangent for a body, a flexible body, a section. */
 #define MSTMM_TANGENT_S(nu, nq) (0)
 #define MSTMM_TANGENT_B(nu, nq) (54)

@@ -1453,6 +1453,7 @@ MSTMM_CALL(mstmm_sweep_modal_frame_motion, (in[0], in[1], in[2], in[3], in[4], i
  * in  etad[n] modal speeds
  * out dC1[6][n] derivatives of C1
  * out dC2[6][n] derivatives of C2
+ * out dX[6][n] derivatives of X
  * out Phi[6][n] rates of point and rotation vector per modal speed
  * out Om[6] Omega: displacement, then rotation vector
  * out Omd[6] rate of Omega
@@ -1460,7 +1461,7 @@ MSTMM_CALL(mstmm_sweep_modal_frame_motion, (in[0], in[1], in[2], in[3], in[4], i
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_segment_sized(int n, in_t b, in_t Bm, in_t eta, in_t etad, out_t dC1,
-    out_t dC2, out_t Phi, out_t Om, out_t Omd, out_t Omdd)
+    out_t dC2, out_t dX, out_t Phi, out_t Om, out_t Omd, out_t Omdd)
 {
   real t1 = 0;
   for (int k = 0; k < n; ++k) {
@@ -1621,298 +1622,307 @@ int mstmm_sweep_modal_segment_sized(int n, in_t b, in_t Bm, in_t eta, in_t etad,
       (Bm[15 * n + k] * 2.0 + dC1[3 * n + k])) - ((real)1 / (real)60) * (Bm[4 * n + k] * t206 - Bm[3
       * n + k] * t152);
   }
-  real t285 = t2 + ((real)1 / (real)60) * (t34 * t195 + (t25 * t206 - t55 * t161 - t61 * t142));
-  real t298 = t6 + ((real)1 / (real)60) * (t61 * t129 + (t55 * t152 - t21 * t206) - t30 * t195);
-  real t308 = t11 + ((real)1 / (real)60) * (t34 * t206 - t61 * t161);
-  real t317 = t15 + ((real)1 / (real)60) * (t61 * t152 - t30 * t206);
-  real t326 = t140 + t25 * 20.0;
-  real t327 = t326 - t137;
-  real t331 = t127 + t21 * 20.0;
-  real t332 = t124 - t331;
-  real t337 = t159 + t34 * 20.0;
-  real t338 = t337 - t156;
-  real t342 = t150 + t30 * 20.0;
-  real t343 = t147 - t342;
   for (int k = 0; k < n; ++k) {
-    Phi[k] = Bm[k] + (Bm[12 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240) * (t285 *
-      (dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0)) - t298 * (dC1[4 * n + k] - (Bm[16 *
-      n + k] + Bm[4 * n + k] * 20.0)) + (t308 * (dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] *
-      20.0)) - t317 * (dC1[n + k] - (Bm[13 * n + k] + Bm[n + k] * 20.0)))) - (t327 * (Bm[10 * n + k]
-      + dC2[4 * n + k]) + t332 * (Bm[11 * n + k] + dC2[5 * n + k]) + (t338 * (Bm[7 * n + k] + dC2[n
-      + k]) + t343 * (Bm[8 * n + k] + dC2[2 * n + k]))) * ((real)1 / (real)240)));
+    dX[k] = dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0);
   }
-  real t365 = t42 + ((real)1 / (real)60) * (t30 * t142 + (t21 * t161 - t25 * t152) - t34 * t129);
-  real t379 = t48 + ((real)1 / (real)60) * (t30 * t161 - t34 * t152);
-  real t387 = t137 - t326;
-  real t391 = t193 + t55 * 20.0;
-  real t392 = t391 - t190;
-  real t396 = t156 - t337;
-  real t400 = t204 + t61 * 20.0;
-  real t401 = t400 - t201;
   for (int k = 0; k < n; ++k) {
-    Phi[n + k] = Bm[n + k] + (Bm[13 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240) * (t298
-      * (dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) - t365 * (dC1[5 * n + k] - (Bm[17
-      * n + k] + Bm[5 * n + k] * 20.0)) + (t317 * (dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)) - t379
-      * (dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] * 20.0)))) - ((real)1 / (real)240) * (t387
-      * (Bm[9 * n + k] + dC2[3 * n + k]) + t392 * (Bm[11 * n + k] + dC2[5 * n + k]) + (t396 * (Bm[6
-      * n + k] + dC2[k]) + t401 * (Bm[8 * n + k] + dC2[2 * n + k])))));
+    dX[n + k] = dC1[n + k] - (Bm[13 * n + k] + Bm[n + k] * 20.0);
   }
-  real t431 = t331 - t124;
-  real t434 = t190 - t391;
-  real t438 = t342 - t147;
-  real t441 = t201 - t400;
+  for (int k = 0; k < n; ++k) {
+    dX[2 * n + k] = dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] * 20.0);
+  }
+  for (int k = 0; k < n; ++k) {
+    dX[3 * n + k] = dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0);
+  }
+  for (int k = 0; k < n; ++k) {
+    dX[4 * n + k] = dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0);
+  }
+  for (int k = 0; k < n; ++k) {
+    dX[5 * n + k] = dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0);
+  }
+  real t303 = t2 + ((real)1 / (real)60) * (t34 * t195 + (t25 * t206 - t55 * t161 - t61 * t142));
+  real t313 = t6 + ((real)1 / (real)60) * (t61 * t129 + (t55 * t152 - t21 * t206) - t30 * t195);
+  real t320 = t11 + ((real)1 / (real)60) * (t34 * t206 - t61 * t161);
+  real t326 = t15 + ((real)1 / (real)60) * (t61 * t152 - t30 * t206);
+  real t332 = t140 + t25 * 20.0;
+  real t333 = t332 - t137;
+  real t337 = t127 + t21 * 20.0;
+  real t338 = t124 - t337;
+  real t343 = t159 + t34 * 20.0;
+  real t344 = t343 - t156;
+  real t348 = t150 + t30 * 20.0;
+  real t349 = t147 - t348;
+  for (int k = 0; k < n; ++k) {
+    Phi[k] = Bm[k] + (Bm[12 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240) * (t303 * dX[5
+      * n + k] - t313 * dX[4 * n + k] + (t320 * dX[2 * n + k] - t326 * dX[n + k])) - (t333 * (Bm[10
+      * n + k] + dC2[4 * n + k]) + t338 * (Bm[11 * n + k] + dC2[5 * n + k]) + (t344 * (Bm[7 * n + k]
+      + dC2[n + k]) + t349 * (Bm[8 * n + k] + dC2[2 * n + k]))) * ((real)1 / (real)240)));
+  }
+  real t368 = t42 + ((real)1 / (real)60) * (t30 * t142 + (t21 * t161 - t25 * t152) - t34 * t129);
+  real t376 = t48 + ((real)1 / (real)60) * (t30 * t161 - t34 * t152);
+  real t381 = t137 - t332;
+  real t385 = t193 + t55 * 20.0;
+  real t386 = t385 - t190;
+  real t390 = t156 - t343;
+  real t394 = t204 + t61 * 20.0;
+  real t395 = t394 - t201;
+  for (int k = 0; k < n; ++k) {
+    Phi[n + k] = Bm[n + k] + (Bm[13 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240) * (t313
+      * dX[3 * n + k] - t368 * dX[5 * n + k] + (t326 * dX[k] - t376 * dX[2 * n + k])) - ((real)1 /
+      (real)240) * (t381 * (Bm[9 * n + k] + dC2[3 * n + k]) + t386 * (Bm[11 * n + k] + dC2[5 * n +
+      k]) + (t390 * (Bm[6 * n + k] + dC2[k]) + t395 * (Bm[8 * n + k] + dC2[2 * n + k])))));
+  }
+  real t413 = t337 - t124;
+  real t416 = t190 - t385;
+  real t420 = t348 - t147;
+  real t423 = t201 - t394;
   for (int k = 0; k < n; ++k) {
     Phi[2 * n + k] = Bm[2 * n + k] + (Bm[14 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
-      * (t365 * (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0)) - t285 * (dC1[3 * n + k]
-      - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) + (t379 * (dC1[n + k] - (Bm[13 * n + k] + Bm[n + k]
-      * 20.0)) - t308 * (dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)))) - ((real)1 / (real)240) * (t431
-      * (Bm[9 * n + k] + dC2[3 * n + k]) + t434 * (Bm[10 * n + k] + dC2[4 * n + k]) + (t438 * (Bm[6
-      * n + k] + dC2[k]) + t441 * (Bm[7 * n + k] + dC2[n + k])))));
+      * (t368 * dX[4 * n + k] - t303 * dX[3 * n + k] + (t376 * dX[n + k] - t320 * dX[k])) - ((real)1
+      / (real)240) * (t413 * (Bm[9 * n + k] + dC2[3 * n + k]) + t416 * (Bm[10 * n + k] + dC2[4 * n +
+      k]) + (t420 * (Bm[6 * n + k] + dC2[k]) + t423 * (Bm[7 * n + k] + dC2[n + k])))));
   }
   for (int k = 0; k < n; ++k) {
     Phi[3 * n + k] = Bm[3 * n + k] + (Bm[15 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
-      * (t308 * (dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0)) - t317 * (dC1[4 * n + k]
-      - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0))) - ((real)1 / (real)240) * ((Bm[10 * n + k] + dC2[4
-      * n + k]) * t338 + t343 * (Bm[11 * n + k] + dC2[5 * n + k]))));
+      * (t320 * dX[5 * n + k] - t326 * dX[4 * n + k]) - ((real)1 / (real)240) * ((Bm[10 * n + k] +
+      dC2[4 * n + k]) * t344 + t349 * (Bm[11 * n + k] + dC2[5 * n + k]))));
   }
   for (int k = 0; k < n; ++k) {
     Phi[4 * n + k] = Bm[4 * n + k] + (Bm[16 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
-      * (t317 * (dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) - t379 * (dC1[5 * n + k]
-      - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0))) - ((real)1 / (real)240) * (t396 * (Bm[9 * n + k] +
-      dC2[3 * n + k]) + (Bm[11 * n + k] + dC2[5 * n + k]) * t401)));
+      * (t326 * dX[3 * n + k] - t376 * dX[5 * n + k]) - ((real)1 / (real)240) * (t390 * (Bm[9 * n +
+      k] + dC2[3 * n + k]) + (Bm[11 * n + k] + dC2[5 * n + k]) * t395)));
   }
   for (int k = 0; k < n; ++k) {
     Phi[5 * n + k] = Bm[5 * n + k] + (Bm[17 * n + k] * ((real)1 / (real)12) + (((real)1 / (real)240)
-      * (t379 * (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0)) - t308 * (dC1[3 * n + k]
-      - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0))) - ((real)1 / (real)240) * ((Bm[9 * n + k] + dC2[3
-      * n + k]) * t438 + t441 * (Bm[10 * n + k] + dC2[4 * n + k]))));
+      * (t376 * dX[4 * n + k] - t320 * dX[3 * n + k]) - ((real)1 / (real)240) * ((Bm[9 * n + k] +
+      dC2[3 * n + k]) * t420 + t423 * (Bm[10 * n + k] + dC2[4 * n + k]))));
   }
-  Om[0] = t193 * ((real)1 / (real)12) + (t55 + (((real)1 / (real)240) * (t396 * t285) + (((real)1 /
-    (real)240) * (t387 * t308) - ((real)1 / (real)240) * (t332 * t317) - ((real)1 / (real)240) *
-    (t343 * t298))));
-  Om[1] = t127 * ((real)1 / (real)12) + (t21 + (((real)1 / (real)240) * (t441 * t298) + (((real)1 /
-    (real)240) * (t434 * t317) - ((real)1 / (real)240) * (t387 * t379)) - ((real)1 / (real)240) *
-    (t396 * t365)));
-  Om[2] = t140 * ((real)1 / (real)12) + (t25 + (((real)1 / (real)240) * (t343 * t365) + (((real)1 /
-    (real)240) * (t332 * t379) - ((real)1 / (real)240) * (t434 * t308) - ((real)1 / (real)240) *
-    (t441 * t285))));
-  Om[3] = t204 * ((real)1 / (real)12) + (t61 + (((real)1 / (real)240) * (t396 * t308) - ((real)1 /
-    (real)240) * (t343 * t317)));
-  Om[4] = t150 * ((real)1 / (real)12) + (t30 + (((real)1 / (real)240) * (t441 * t317) - ((real)1 /
-    (real)240) * (t396 * t379)));
-  Om[5] = t159 * ((real)1 / (real)12) + (t34 + (((real)1 / (real)240) * (t343 * t379) - ((real)1 /
-    (real)240) * (t441 * t308)));
-  real t577 = 0;
+  Om[0] = t193 * ((real)1 / (real)12) + (t55 + (((real)1 / (real)240) * (t390 * t303) + (((real)1 /
+    (real)240) * (t381 * t320) - ((real)1 / (real)240) * (t338 * t326) - ((real)1 / (real)240) *
+    (t349 * t313))));
+  Om[1] = t127 * ((real)1 / (real)12) + (t21 + (((real)1 / (real)240) * (t423 * t313) + (((real)1 /
+    (real)240) * (t416 * t326) - ((real)1 / (real)240) * (t381 * t376)) - ((real)1 / (real)240) *
+    (t390 * t368)));
+  Om[2] = t140 * ((real)1 / (real)12) + (t25 + (((real)1 / (real)240) * (t349 * t368) + (((real)1 /
+    (real)240) * (t338 * t376) - ((real)1 / (real)240) * (t416 * t320) - ((real)1 / (real)240) *
+    (t423 * t303))));
+  Om[3] = t204 * ((real)1 / (real)12) + (t61 + (((real)1 / (real)240) * (t390 * t320) - ((real)1 /
+    (real)240) * (t349 * t326)));
+  Om[4] = t150 * ((real)1 / (real)12) + (t30 + (((real)1 / (real)240) * (t423 * t326) - ((real)1 /
+    (real)240) * (t390 * t376)));
+  Om[5] = t159 * ((real)1 / (real)12) + (t34 + (((real)1 / (real)240) * (t349 * t376) - ((real)1 /
+    (real)240) * (t423 * t320)));
+  real t541 = 0;
   for (int k = 0; k < n; ++k) {
-    t577 += Bm[12 * n + k] * etad[k];
+    t541 += Bm[12 * n + k] * etad[k];
   }
-  real t578 = t577 * ((real)1 / (real)12);
+  real t542 = t541 * ((real)1 / (real)12);
+  real t544 = 0;
+  for (int k = 0; k < n; ++k) {
+    t544 += Bm[k] * etad[k];
+  }
+  real t546 = 0;
+  for (int k = 0; k < n; ++k) {
+    t546 += Bm[4 * n + k] * etad[k];
+  }
+  real t547 = t48 * t546;
+  real t549 = 0;
+  for (int k = 0; k < n; ++k) {
+    t549 += Bm[9 * n + k] * etad[k];
+  }
+  real t550 = t30 * t549;
+  real t552 = 0;
+  for (int k = 0; k < n; ++k) {
+    t552 += Bm[10 * n + k] * etad[k];
+  }
+  real t555 = t547 + (t550 - t61 * t552);
+  real t557 = 0;
+  for (int k = 0; k < n; ++k) {
+    t557 += Bm[3 * n + k] * etad[k];
+  }
+  real t559 = t555 - t11 * t557;
+  real t561 = 0;
+  for (int k = 0; k < n; ++k) {
+    t561 += Bm[17 * n + k] * etad[k];
+  }
+  real t563 = 0;
+  for (int k = 0; k < n; ++k) {
+    t563 += Bm[5 * n + k] * etad[k];
+  }
+  real t566 = t559 - (t561 + t563 * 20.0);
+  real t568 = ((real)1 / (real)240) * (t566 * t303);
+  real t570 = 0;
+  for (int k = 0; k < n; ++k) {
+    t570 += Bm[n + k] * etad[k];
+  }
+  real t571 = t48 * t570;
+  real t572 = t42 * t546;
+  real t574 = 0;
+  for (int k = 0; k < n; ++k) {
+    t574 += Bm[6 * n + k] * etad[k];
+  }
+  real t575 = t30 * t574;
+  real t578 = t21 * t549 - t55 * t552;
   real t580 = 0;
   for (int k = 0; k < n; ++k) {
-    t580 += Bm[k] * etad[k];
+    t580 += Bm[7 * n + k] * etad[k];
   }
-  real t582 = 0;
+  real t589 = t571 + (t572 + (t575 + (t578 - t61 * t580)) - t2 * t557) - t11 * t544;
+  real t591 = 0;
   for (int k = 0; k < n; ++k) {
-    t582 += Bm[4 * n + k] * etad[k];
+    t591 += Bm[14 * n + k] * etad[k];
   }
-  real t583 = t48 * t582;
-  real t585 = 0;
-  for (int k = 0; k < n; ++k) {
-    t585 += Bm[9 * n + k] * etad[k];
-  }
-  real t586 = t30 * t585;
-  real t588 = 0;
-  for (int k = 0; k < n; ++k) {
-    t588 += Bm[10 * n + k] * etad[k];
-  }
-  real t591 = t583 + (t586 - t61 * t588);
   real t593 = 0;
   for (int k = 0; k < n; ++k) {
-    t593 += Bm[3 * n + k] * etad[k];
+    t593 += Bm[2 * n + k] * etad[k];
   }
-  real t595 = t591 - t11 * t593;
-  real t597 = 0;
-  for (int k = 0; k < n; ++k) {
-    t597 += Bm[17 * n + k] * etad[k];
-  }
-  real t599 = 0;
-  for (int k = 0; k < n; ++k) {
-    t599 += Bm[5 * n + k] * etad[k];
-  }
-  real t602 = t595 - (t597 + t599 * 20.0);
-  real t604 = ((real)1 / (real)240) * (t602 * t285);
+  real t596 = t589 - (t591 + t593 * 20.0);
+  real t598 = ((real)1 / (real)240) * (t596 * t320);
+  real t599 = t563 * t195;
+  real t600 = t593 * t206;
+  real t601 = t11 * t593;
+  real t602 = t2 * t563;
+  real t603 = t34 * t580;
+  real t604 = t25 * t552;
   real t606 = 0;
   for (int k = 0; k < n; ++k) {
-    t606 += Bm[n + k] * etad[k];
+    t606 += Bm[11 * n + k] * etad[k];
   }
-  real t607 = t48 * t606;
-  real t608 = t42 * t582;
+  real t608 = t604 - t21 * t606;
   real t610 = 0;
   for (int k = 0; k < n; ++k) {
-    t610 += Bm[6 * n + k] * etad[k];
+    t610 += Bm[8 * n + k] * etad[k];
   }
-  real t611 = t30 * t610;
-  real t614 = t21 * t585 - t55 * t588;
-  real t616 = 0;
+  real t619 = t601 + (t602 + (t603 + (t608 - t30 * t610)) - t6 * t546) - t15 * t570;
+  real t621 = t619 + t541 * 2.0;
+  real t622 = t34 * t621;
+  real t629 = t11 * t563 + (t34 * t552 - t30 * t606) - t15 * t546;
+  real t631 = 0;
   for (int k = 0; k < n; ++k) {
-    t616 += Bm[7 * n + k] * etad[k];
+    t631 += Bm[15 * n + k] * etad[k];
   }
-  real t625 = t607 + (t608 + (t611 + (t614 - t61 * t616)) - t2 * t593) - t11 * t580;
-  real t627 = 0;
+  real t633 = t629 + t631 * 2.0;
+  real t636 = t559 + t561 * 2.0;
+  real t640 = t589 + t591 * 2.0;
+  real t651 = t580 + ((real)1 / (real)60) * (t599 + (t600 + (t622 + (t25 * t633 - t55 * t636 - t61 *
+    t640) - t544 * t161) - t557 * t142));
+  real t653 = ((real)1 / (real)240) * (t390 * t651);
+  real t662 = t552 + ((real)1 / (real)60) * (t563 * t206 + (t34 * t633 - t61 * t636 - t557 * t161));
+  real t664 = ((real)1 / (real)240) * (t381 * t662);
+  real t665 = t557 * t152;
+  real t672 = t15 * t557 + (t61 * t606 - t34 * t549 - t48 * t563);
+  real t674 = 0;
   for (int k = 0; k < n; ++k) {
-    t627 += Bm[14 * n + k] * etad[k];
+    t674 += Bm[16 * n + k] * etad[k];
   }
-  real t629 = 0;
+  real t676 = t672 + t674 * 2.0;
+  real t684 = t606 + ((real)1 / (real)60) * (t665 + (t61 * t676 - t30 * t633) - t546 * t206);
+  real t687 = t664 - ((real)1 / (real)240) * (t338 * t684);
+  real t688 = t557 * t129;
+  real t689 = t544 * t152;
+  real t704 = t15 * t544 + (t6 * t557 + (t61 * t610 + (t55 * t606 - t25 * t549) - t34 * t574 - t42 *
+    t563) - t48 * t593);
+  real t706 = 0;
   for (int k = 0; k < n; ++k) {
-    t629 += Bm[2 * n + k] * etad[k];
+    t706 += Bm[13 * n + k] * etad[k];
   }
-  real t632 = t625 - (t627 + t629 * 20.0);
-  real t634 = ((real)1 / (real)240) * (t632 * t308);
-  real t635 = t599 * t195;
-  real t636 = t629 * t206;
-  real t637 = t11 * t629;
-  real t638 = t2 * t599;
-  real t639 = t34 * t616;
-  real t640 = t25 * t588;
-  real t642 = 0;
-  for (int k = 0; k < n; ++k) {
-    t642 += Bm[11 * n + k] * etad[k];
-  }
-  real t644 = t640 - t21 * t642;
-  real t646 = 0;
-  for (int k = 0; k < n; ++k) {
-    t646 += Bm[8 * n + k] * etad[k];
-  }
-  real t655 = t637 + (t638 + (t639 + (t644 - t30 * t646)) - t6 * t582) - t15 * t606;
-  real t657 = t655 + t577 * 2.0;
-  real t658 = t34 * t657;
-  real t665 = t11 * t599 + (t34 * t588 - t30 * t642) - t15 * t582;
-  real t667 = 0;
-  for (int k = 0; k < n; ++k) {
-    t667 += Bm[15 * n + k] * etad[k];
-  }
-  real t669 = t665 + t667 * 2.0;
-  real t672 = t595 + t597 * 2.0;
-  real t676 = t625 + t627 * 2.0;
-  real t687 = t616 + ((real)1 / (real)60) * (t635 + (t636 + (t658 + (t25 * t669 - t55 * t672 - t61 *
-    t676) - t580 * t161) - t593 * t142));
-  real t689 = ((real)1 / (real)240) * (t396 * t687);
-  real t698 = t588 + ((real)1 / (real)60) * (t599 * t206 + (t34 * t669 - t61 * t672 - t593 * t161));
-  real t700 = ((real)1 / (real)240) * (t387 * t698);
-  real t701 = t593 * t152;
-  real t708 = t15 * t593 + (t61 * t642 - t34 * t585 - t48 * t599);
-  real t710 = 0;
-  for (int k = 0; k < n; ++k) {
-    t710 += Bm[16 * n + k] * etad[k];
-  }
-  real t712 = t708 + t710 * 2.0;
-  real t720 = t642 + ((real)1 / (real)60) * (t701 + (t61 * t712 - t30 * t669) - t582 * t206);
-  real t723 = t700 - ((real)1 / (real)240) * (t332 * t720);
-  real t724 = t593 * t129;
-  real t725 = t580 * t152;
-  real t740 = t15 * t580 + (t6 * t593 + (t61 * t646 + (t55 * t642 - t25 * t585) - t34 * t610 - t42 *
-    t599) - t48 * t629);
-  real t742 = 0;
-  for (int k = 0; k < n; ++k) {
-    t742 += Bm[13 * n + k] * etad[k];
-  }
-  real t744 = t740 + t742 * 2.0;
-  real t759 = t646 + ((real)1 / (real)60) * (t724 + (t725 + (t61 * t744 + (t55 * t712 - t21 * t669)
-    - t30 * t657) - t606 * t206) - t582 * t195);
-  real t766 = t740 - (t742 + t606 * 20.0);
-  real t773 = t708 - (t710 + t582 * 20.0);
-  Omd[0] = t578 + (t580 + (t604 + (t634 + (t689 + (t723 - ((real)1 / (real)240) * (t343 * t759)) -
-    ((real)1 / (real)240) * (t766 * t317)) - ((real)1 / (real)240) * (t773 * t298))));
-  real t783 = t665 - (t667 + t593 * 20.0);
-  real t788 = t655 - (t577 + t580 * 20.0);
-  real t803 = t585 + ((real)1 / (real)60) * (t582 * t161 + (t30 * t672 - t34 * t712) - t599 * t152);
-  real t824 = t610 + ((real)1 / (real)60) * (t582 * t142 + (t606 * t161 + (t30 * t676 + (t21 * t672
-    - t25 * t712) - t34 * t744) - t629 * t152) - t599 * t129);
-  Omd[1] = t742 * ((real)1 / (real)12) + (t606 + (((real)1 / (real)240) * (t783 * t298) + (((real)1
-    / (real)240) * (t788 * t317) + (((real)1 / (real)240) * (t441 * t759) + (((real)1 / (real)240) *
-    (t434 * t720) - ((real)1 / (real)240) * (t387 * t803)) - ((real)1 / (real)240) * (t396 * t824))
-    - ((real)1 / (real)240) * (t632 * t379)) - ((real)1 / (real)240) * (t602 * t365)));
-  Omd[2] = t627 * ((real)1 / (real)12) + (t629 + (((real)1 / (real)240) * (t773 * t365) + (((real)1
-    / (real)240) * (t766 * t379) + (((real)1 / (real)240) * (t343 * t824) + (((real)1 / (real)240) *
-    (t332 * t803) - ((real)1 / (real)240) * (t434 * t698) - ((real)1 / (real)240) * (t441 * t687)) -
-    ((real)1 / (real)240) * (t788 * t308)) - ((real)1 / (real)240) * (t783 * t285))));
-  Omd[3] = t667 * ((real)1 / (real)12) + (t593 + (((real)1 / (real)240) * (t602 * t308) + (((real)1
-    / (real)240) * (t396 * t698) - ((real)1 / (real)240) * (t343 * t720) - ((real)1 / (real)240) *
-    (t773 * t317))));
-  Omd[4] = t710 * ((real)1 / (real)12) + (t582 + (((real)1 / (real)240) * (t783 * t317) + (((real)1
-    / (real)240) * (t441 * t720) - ((real)1 / (real)240) * (t396 * t803)) - ((real)1 / (real)240) *
-    (t602 * t379)));
-  Omd[5] = t597 * ((real)1 / (real)12) + (t599 + (((real)1 / (real)240) * (t773 * t379) + (((real)1
-    / (real)240) * (t343 * t803) - ((real)1 / (real)240) * (t441 * t698) - ((real)1 / (real)240) *
-    (t783 * t308))));
-  real t915 = 2.0 * (t599 * t588 - t582 * t642);
-  real t921 = 2.0 * (t582 * t585 - t593 * t588);
-  real t928 = ((real)1 / (real)30) * (t599 * t669) + (((real)1 / (real)60) * (t34 * t915) - ((real)1
-    / (real)60) * (t61 * t921) - ((real)1 / (real)30) * (t593 * t672));
-  real t942 = 2.0 * (t599 * t616 + (t629 * t588 - t606 * t642 - t582 * t646));
-  real t957 = 2.0 * (t582 * t610 + (t606 * t585 - t580 * t588 - t593 * t616));
-  real t969 = ((real)1 / (real)30) * (t599 * t657) + (((real)1 / (real)30) * (t629 * t669) +
-    (((real)1 / (real)60) * (t34 * t942) + (((real)1 / (real)60) * (t25 * t915) - ((real)1 /
-    (real)60) * (t55 * t921) - ((real)1 / (real)60) * (t61 * t957)) - ((real)1 / (real)30) * (t580 *
-    t672)) - ((real)1 / (real)30) * (t593 * t676));
-  real t983 = 2.0 * (t593 * t646 + (t580 * t642 - t629 * t585) - t599 * t610);
-  real t990 = 2.0 * (t593 * t642 - t599 * t585);
-  real t1018 = ((real)1 / (real)30) * (t593 * t744) + (((real)1 / (real)30) * (t580 * t712) +
-    (((real)1 / (real)60) * (t61 * t983) + (((real)1 / (real)60) * (t55 * t990) - ((real)1 /
-    (real)60) * (t21 * t915)) - ((real)1 / (real)60) * (t30 * t942)) - ((real)1 / (real)30) * (t606
-    * t669)) - ((real)1 / (real)30) * (t582 * t657);
-  real t1033 = ((real)1 / (real)30) * (t593 * t712) + (((real)1 / (real)60) * (t61 * t990) -
-    ((real)1 / (real)60) * (t30 * t915)) - ((real)1 / (real)30) * (t582 * t669);
-  Omdd[0] = ((real)1 / (real)120) * (t602 * t687) + (((real)1 / (real)120) * (t632 * t698) +
-    (((real)1 / (real)240) * (t928 * t387) + (((real)1 / (real)240) * (t969 * t396) + (((real)1 /
-    (real)240) * (t921 * t285) + (((real)1 / (real)240) * (t957 * t308) - ((real)1 / (real)240) *
-    (t983 * t317) - ((real)1 / (real)240) * (t990 * t298))) - ((real)1 / (real)240) * (t1018 *
-    t343)) - ((real)1 / (real)240) * (t1033 * t332) - t766 * t720 * ((real)1 / (real)120)) -
-    ((real)1 / (real)120) * (t773 * t759));
-  real t1086 = ((real)1 / (real)30) * (t582 * t676) + (t606 * t672 * ((real)1 / (real)30) +
-    (((real)1 / (real)60) * (t30 * t957) + (((real)1 / (real)60) * (t21 * t921) - ((real)1 /
-    (real)60) * (t25 * t990)) - ((real)1 / (real)60) * (t34 * t983)) - ((real)1 / (real)30) * (t629
-    * t712)) - ((real)1 / (real)30) * (t599 * t744);
-  real t1101 = ((real)1 / (real)30) * (t582 * t672) + (((real)1 / (real)60) * (t30 * t921) -
-    ((real)1 / (real)60) * (t34 * t990)) - ((real)1 / (real)30) * (t599 * t712);
-  Omdd[1] = ((real)1 / (real)120) * (t783 * t759) + (((real)1 / (real)120) * (t788 * t720) +
-    (((real)1 / (real)240) * (t1033 * t434) + (((real)1 / (real)240) * (t1018 * t441) + (((real)1 /
-    (real)240) * (t915 * t298) + (((real)1 / (real)240) * (t942 * t317) - ((real)1 / (real)240) *
-    (t957 * t379)) - ((real)1 / (real)240) * (t921 * t365) - ((real)1 / (real)240) * (t1086 * t396))
-    - ((real)1 / (real)240) * (t1101 * t387))) - ((real)1 / (real)120) * (t632 * t803)) - ((real)1 /
-    (real)120) * (t602 * t824);
-  Omdd[2] = ((real)1 / (real)120) * (t773 * t824) + (((real)1 / (real)120) * (t766 * t803) +
-    (((real)1 / (real)240) * (t1101 * t332) + (((real)1 / (real)240) * (t1086 * t343) + (((real)1 /
-    (real)240) * (t990 * t365) + (((real)1 / (real)240) * (t983 * t379) - ((real)1 / (real)240) *
-    (t942 * t308) - ((real)1 / (real)240) * (t915 * t285))) - ((real)1 / (real)240) * (t969 * t441))
-    - ((real)1 / (real)240) * (t928 * t434) - ((real)1 / (real)120) * (t788 * t698)) - ((real)1 /
-    (real)120) * (t783 * t687));
-  Omdd[3] = ((real)1 / (real)120) * (t602 * t698) + (((real)1 / (real)240) * (t928 * t396) +
-    (((real)1 / (real)240) * (t921 * t308) - ((real)1 / (real)240) * (t990 * t317)) - ((real)1 /
-    (real)240) * (t1033 * t343) - ((real)1 / (real)120) * (t773 * t720));
-  Omdd[4] = ((real)1 / (real)120) * (t783 * t720) + (((real)1 / (real)240) * (t1033 * t441) +
-    (((real)1 / (real)240) * (t915 * t317) - ((real)1 / (real)240) * (t921 * t379) - ((real)1 /
-    (real)240) * (t1101 * t396))) - ((real)1 / (real)120) * (t602 * t803);
-  Omdd[5] = ((real)1 / (real)120) * (t773 * t803) + (((real)1 / (real)240) * (t1101 * t343) +
-    (((real)1 / (real)240) * (t990 * t379) - ((real)1 / (real)240) * (t915 * t308)) - ((real)1 /
-    (real)240) * (t928 * t441) - ((real)1 / (real)120) * (t783 * t698));
+  real t708 = t704 + t706 * 2.0;
+  real t723 = t610 + ((real)1 / (real)60) * (t688 + (t689 + (t61 * t708 + (t55 * t676 - t21 * t633)
+    - t30 * t621) - t570 * t206) - t546 * t195);
+  real t730 = t704 - (t706 + t570 * 20.0);
+  real t737 = t672 - (t674 + t546 * 20.0);
+  Omd[0] = t542 + (t544 + (t568 + (t598 + (t653 + (t687 - ((real)1 / (real)240) * (t349 * t723)) -
+    ((real)1 / (real)240) * (t730 * t326)) - ((real)1 / (real)240) * (t737 * t313))));
+  real t747 = t629 - (t631 + t557 * 20.0);
+  real t752 = t619 - (t541 + t544 * 20.0);
+  real t767 = t549 + ((real)1 / (real)60) * (t546 * t161 + (t30 * t636 - t34 * t676) - t563 * t152);
+  real t788 = t574 + ((real)1 / (real)60) * (t546 * t142 + (t570 * t161 + (t30 * t640 + (t21 * t636
+    - t25 * t676) - t34 * t708) - t593 * t152) - t563 * t129);
+  Omd[1] = t706 * ((real)1 / (real)12) + (t570 + (((real)1 / (real)240) * (t747 * t313) + (((real)1
+    / (real)240) * (t752 * t326) + (((real)1 / (real)240) * (t423 * t723) + (((real)1 / (real)240) *
+    (t416 * t684) - ((real)1 / (real)240) * (t381 * t767)) - ((real)1 / (real)240) * (t390 * t788))
+    - ((real)1 / (real)240) * (t596 * t376)) - ((real)1 / (real)240) * (t566 * t368)));
+  Omd[2] = t591 * ((real)1 / (real)12) + (t593 + (((real)1 / (real)240) * (t737 * t368) + (((real)1
+    / (real)240) * (t730 * t376) + (((real)1 / (real)240) * (t349 * t788) + (((real)1 / (real)240) *
+    (t338 * t767) - ((real)1 / (real)240) * (t416 * t662) - ((real)1 / (real)240) * (t423 * t651)) -
+    ((real)1 / (real)240) * (t752 * t320)) - ((real)1 / (real)240) * (t747 * t303))));
+  Omd[3] = t631 * ((real)1 / (real)12) + (t557 + (((real)1 / (real)240) * (t566 * t320) + (((real)1
+    / (real)240) * (t390 * t662) - ((real)1 / (real)240) * (t349 * t684) - ((real)1 / (real)240) *
+    (t737 * t326))));
+  Omd[4] = t674 * ((real)1 / (real)12) + (t546 + (((real)1 / (real)240) * (t747 * t326) + (((real)1
+    / (real)240) * (t423 * t684) - ((real)1 / (real)240) * (t390 * t767)) - ((real)1 / (real)240) *
+    (t566 * t376)));
+  Omd[5] = t561 * ((real)1 / (real)12) + (t563 + (((real)1 / (real)240) * (t737 * t376) + (((real)1
+    / (real)240) * (t349 * t767) - ((real)1 / (real)240) * (t423 * t662) - ((real)1 / (real)240) *
+    (t747 * t320))));
+  real t879 = 2.0 * (t563 * t552 - t546 * t606);
+  real t885 = 2.0 * (t546 * t549 - t557 * t552);
+  real t892 = ((real)1 / (real)30) * (t563 * t633) + (((real)1 / (real)60) * (t34 * t879) - ((real)1
+    / (real)60) * (t61 * t885) - ((real)1 / (real)30) * (t557 * t636));
+  real t906 = 2.0 * (t563 * t580 + (t593 * t552 - t570 * t606 - t546 * t610));
+  real t921 = 2.0 * (t546 * t574 + (t570 * t549 - t544 * t552 - t557 * t580));
+  real t933 = ((real)1 / (real)30) * (t563 * t621) + (((real)1 / (real)30) * (t593 * t633) +
+    (((real)1 / (real)60) * (t34 * t906) + (((real)1 / (real)60) * (t25 * t879) - ((real)1 /
+    (real)60) * (t55 * t885) - ((real)1 / (real)60) * (t61 * t921)) - ((real)1 / (real)30) * (t544 *
+    t636)) - ((real)1 / (real)30) * (t557 * t640));
+  real t947 = 2.0 * (t557 * t610 + (t544 * t606 - t593 * t549) - t563 * t574);
+  real t954 = 2.0 * (t557 * t606 - t563 * t549);
+  real t982 = ((real)1 / (real)30) * (t557 * t708) + (((real)1 / (real)30) * (t544 * t676) +
+    (((real)1 / (real)60) * (t61 * t947) + (((real)1 / (real)60) * (t55 * t954) - ((real)1 /
+    (real)60) * (t21 * t879)) - ((real)1 / (real)60) * (t30 * t906)) - ((real)1 / (real)30) * (t570
+    * t633)) - ((real)1 / (real)30) * (t546 * t621);
+  real t997 = ((real)1 / (real)30) * (t557 * t676) + (((real)1 / (real)60) * (t61 * t954) - ((real)1
+    / (real)60) * (t30 * t879)) - ((real)1 / (real)30) * (t546 * t633);
+  Omdd[0] = ((real)1 / (real)120) * (t566 * t651) + (((real)1 / (real)120) * (t596 * t662) +
+    (((real)1 / (real)240) * (t892 * t381) + (((real)1 / (real)240) * (t933 * t390) + (((real)1 /
+    (real)240) * (t885 * t303) + (((real)1 / (real)240) * (t921 * t320) - ((real)1 / (real)240) *
+    (t947 * t326) - ((real)1 / (real)240) * (t954 * t313))) - ((real)1 / (real)240) * (t982 * t349))
+    - ((real)1 / (real)240) * (t997 * t338) - t730 * t684 * ((real)1 / (real)120)) - ((real)1 /
+    (real)120) * (t737 * t723));
+  real t1050 = ((real)1 / (real)30) * (t546 * t640) + (t570 * t636 * ((real)1 / (real)30) +
+    (((real)1 / (real)60) * (t30 * t921) + (((real)1 / (real)60) * (t21 * t885) - ((real)1 /
+    (real)60) * (t25 * t954)) - ((real)1 / (real)60) * (t34 * t947)) - ((real)1 / (real)30) * (t593
+    * t676)) - ((real)1 / (real)30) * (t563 * t708);
+  real t1065 = ((real)1 / (real)30) * (t546 * t636) + (((real)1 / (real)60) * (t30 * t885) -
+    ((real)1 / (real)60) * (t34 * t954)) - ((real)1 / (real)30) * (t563 * t676);
+  Omdd[1] = ((real)1 / (real)120) * (t747 * t723) + (((real)1 / (real)120) * (t752 * t684) +
+    (((real)1 / (real)240) * (t997 * t416) + (((real)1 / (real)240) * (t982 * t423) + (((real)1 /
+    (real)240) * (t879 * t313) + (((real)1 / (real)240) * (t906 * t326) - ((real)1 / (real)240) *
+    (t921 * t376)) - ((real)1 / (real)240) * (t885 * t368) - ((real)1 / (real)240) * (t1050 * t390))
+    - ((real)1 / (real)240) * (t1065 * t381))) - ((real)1 / (real)120) * (t596 * t767)) - ((real)1 /
+    (real)120) * (t566 * t788);
+  Omdd[2] = ((real)1 / (real)120) * (t737 * t788) + (((real)1 / (real)120) * (t730 * t767) +
+    (((real)1 / (real)240) * (t1065 * t338) + (((real)1 / (real)240) * (t1050 * t349) + (((real)1 /
+    (real)240) * (t954 * t368) + (((real)1 / (real)240) * (t947 * t376) - ((real)1 / (real)240) *
+    (t906 * t320) - ((real)1 / (real)240) * (t879 * t303))) - ((real)1 / (real)240) * (t933 * t423))
+    - ((real)1 / (real)240) * (t892 * t416) - ((real)1 / (real)120) * (t752 * t662)) - ((real)1 /
+    (real)120) * (t747 * t651));
+  Omdd[3] = ((real)1 / (real)120) * (t566 * t662) + (((real)1 / (real)240) * (t892 * t390) +
+    (((real)1 / (real)240) * (t885 * t320) - ((real)1 / (real)240) * (t954 * t326)) - ((real)1 /
+    (real)240) * (t997 * t349) - ((real)1 / (real)120) * (t737 * t684));
+  Omdd[4] = ((real)1 / (real)120) * (t747 * t684) + (((real)1 / (real)240) * (t997 * t423) +
+    (((real)1 / (real)240) * (t879 * t326) - ((real)1 / (real)240) * (t885 * t376) - ((real)1 /
+    (real)240) * (t1065 * t390))) - ((real)1 / (real)120) * (t566 * t767);
+  Omdd[5] = ((real)1 / (real)120) * (t737 * t767) + (((real)1 / (real)240) * (t1065 * t349) +
+    (((real)1 / (real)240) * (t954 * t376) - ((real)1 / (real)240) * (t879 * t320)) - ((real)1 /
+    (real)240) * (t892 * t423) - ((real)1 / (real)120) * (t747 * t662));
   return 0;
 }
 
 int mstmm_sweep_modal_segment(int n, in_t b, in_t Bm, in_t eta, in_t etad, out_t dC1, out_t dC2,
-    out_t Phi, out_t Om, out_t Omd, out_t Omdd)
+    out_t dX, out_t Phi, out_t Om, out_t Omd, out_t Omdd)
 {
   switch (n) { /* loops over a known number are unrolled */
-  case 1: return mstmm_sweep_modal_segment_sized(1, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
-  case 2: return mstmm_sweep_modal_segment_sized(2, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
-  case 3: return mstmm_sweep_modal_segment_sized(3, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
-  case 4: return mstmm_sweep_modal_segment_sized(4, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
-  default: return mstmm_sweep_modal_segment_sized(n, b, Bm, eta, etad, dC1, dC2, Phi, Om, Omd, Omdd);
+  case 1: return mstmm_sweep_modal_segment_sized(1, b, Bm, eta, etad, dC1, dC2, dX, Phi, Om, Omd, Omdd);
+  case 2: return mstmm_sweep_modal_segment_sized(2, b, Bm, eta, etad, dC1, dC2, dX, Phi, Om, Omd, Omdd);
+  case 3: return mstmm_sweep_modal_segment_sized(3, b, Bm, eta, etad, dC1, dC2, dX, Phi, Om, Omd, Omdd);
+  case 4: return mstmm_sweep_modal_segment_sized(4, b, Bm, eta, etad, dC1, dC2, dX, Phi, Om, Omd, Omdd);
+  default: return mstmm_sweep_modal_segment_sized(n, b, Bm, eta, etad, dC1, dC2, dX, Phi, Om, Omd, Omdd);
   }
 }
 
 MSTMM_CALL(mstmm_sweep_modal_segment, (n, in[0], in[1], in[2], in[3], out[0], out[1], out[2],
-  out[3], out[4], out[5]))
+  out[3], out[4], out[5], out[6]))
 
 /* motion across a segment of an exact beam
  * source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, 2009, 5.3
@@ -5228,11 +5238,13 @@ MSTMM_CALL(mstmm_sweep_modal_frame_motion_slope, (in[0], in[1], in[2], in[3], in
  * in  eta[n] modal coordinates
  * in  etad[n] modal speeds
  * in  dC1[6][n] derivatives of C1
+ * in  dX[6][n] derivatives of X
  * in  dC2[6][n] derivatives of C2
  * in  d_eta[n] derivative of eta
  * in  d_etad[n] derivative of etad
  * out d_dC1[6][n] derivative of dC1
  * out d_dC2[6][n] derivative of dC2
+ * out d_dX[6][n] derivative of dX
  * out d_Phi[6][n] derivative of Phi
  * out d_Om[6] derivative of Om
  * out d_Omd[6] derivative of Omd
@@ -5240,8 +5252,8 @@ MSTMM_CALL(mstmm_sweep_modal_frame_motion_slope, (in[0], in[1], in[2], in[3], in
  */
 static inline __attribute__((always_inline))
 int mstmm_sweep_modal_segment_slope_sized(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1,
-    in_t dC2, in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_Phi, out_t d_Om,
-    out_t d_Omd, out_t d_Omdd)
+    in_t dX, in_t dC2, in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_dX, out_t d_Phi,
+    out_t d_Om, out_t d_Omd, out_t d_Omdd)
 {
   real t1 = 0;
   for (int k = 0; k < n; ++k) {
@@ -5461,550 +5473,559 @@ int mstmm_sweep_modal_segment_slope_sized(int n, in_t b, in_t Bm, in_t eta, in_t
       * d_dC1[4 * n + k] - ((2.0 * Bm[15 * n + k] + dC1[3 * n + k]) * t16 + t95 * d_dC1[3 * n + k]))
       - ((real)1 / (real)60) * (Bm[4 * n + k] * t254 - Bm[3 * n + k] * t145);
   }
-  real t371 = t156 * t103 - t135 * t95;
-  real t373 = 0;
   for (int k = 0; k < n; ++k) {
-    t373 += eta[k] * Bm[15 * n + k];
+    d_dX[k] = d_dC1[k];
   }
-  real t374 = t373 + b[15];
-  real t376 = t371 + 2.0 * t374;
-  real t379 = t376 * t19 + t103 * t254;
-  real t382 = t95 * t140 - t156 * t131;
-  real t384 = 0;
   for (int k = 0; k < n; ++k) {
-    t384 += eta[k] * Bm[17 * n + k];
+    d_dX[n + k] = d_dC1[n + k];
   }
-  real t385 = t384 + b[17];
-  real t387 = t382 + 2.0 * t385;
-  real t393 = t1 + ((real)1 / (real)60) * (t379 - (t387 * t44 + t131 * t160));
-  real t399 = t156 + ((real)1 / (real)60) * (t103 * t376 - t131 * t387);
-  real t407 = t135 * t131 - t103 * t140;
-  real t409 = 0;
   for (int k = 0; k < n; ++k) {
-    t409 += eta[k] * Bm[16 * n + k];
+    d_dX[2 * n + k] = d_dC1[2 * n + k];
   }
-  real t410 = t409 + b[16];
-  real t412 = t407 + 2.0 * t410;
-  real t421 = t4 + ((real)1 / (real)60) * (t412 * t44 + t131 * t145 - (t376 * t16 + t95 * t254));
-  real t427 = t135 + ((real)1 / (real)60) * (t131 * t412 - t95 * t376);
-  real t440 = t376 * t26 + t120 * t254 - (t387 * t49 + t168 * t160);
-  real t447 = t95 * t185 + (t112 * t140 - t156 * t168 - t205 * t131);
-  real t449 = 0;
   for (int k = 0; k < n; ++k) {
-    t449 += eta[k] * Bm[14 * n + k];
+    d_dX[3 * n + k] = d_dC1[3 * n + k];
   }
-  real t450 = t449 + b[14];
-  real t452 = t447 + 2.0 * t450;
-  real t456 = t440 - (t452 * t44 + t131 * t213);
-  real t463 = t205 * t103 + (t156 * t120 - t135 * t112 - t179 * t95);
-  real t465 = 0;
   for (int k = 0; k < n; ++k) {
-    t465 += eta[k] * Bm[12 * n + k];
+    d_dX[4 * n + k] = d_dC1[4 * n + k];
   }
-  real t466 = t465 + b[12];
-  real t468 = t463 + 2.0 * t466;
-  real t474 = t8 + ((real)1 / (real)60) * (t456 + (t468 * t19 + t103 * t276));
-  real t484 = t205 + ((real)1 / (real)60) * (t103 * t468 + (t120 * t376 - t168 * t387 - t131 *
-    t452));
-  real t496 = t412 * t49 + t168 * t145 - (t376 * t23 + t112 * t254);
-  real t503 = t179 * t131 + (t135 * t168 - t120 * t140) - t103 * t185;
-  real t505 = 0;
   for (int k = 0; k < n; ++k) {
-    t505 += eta[k] * Bm[13 * n + k];
+    d_dX[5 * n + k] = d_dC1[5 * n + k];
   }
-  real t506 = t505 + b[13];
-  real t508 = t503 + t506 * 2.0;
-  real t518 = t11 + ((real)1 / (real)60) * (t496 + (t508 * t44 + t131 * t190) - (t468 * t16 + t95 *
+  real t368 = t156 * t103 - t135 * t95;
+  real t370 = 0;
+  for (int k = 0; k < n; ++k) {
+    t370 += eta[k] * Bm[15 * n + k];
+  }
+  real t371 = t370 + b[15];
+  real t373 = t368 + 2.0 * t371;
+  real t376 = t373 * t19 + t103 * t254;
+  real t379 = t95 * t140 - t156 * t131;
+  real t381 = 0;
+  for (int k = 0; k < n; ++k) {
+    t381 += eta[k] * Bm[17 * n + k];
+  }
+  real t382 = t381 + b[17];
+  real t384 = t379 + 2.0 * t382;
+  real t390 = t1 + ((real)1 / (real)60) * (t376 - (t384 * t44 + t131 * t160));
+  real t396 = t156 + ((real)1 / (real)60) * (t103 * t373 - t131 * t384);
+  real t401 = t135 * t131 - t103 * t140;
+  real t403 = 0;
+  for (int k = 0; k < n; ++k) {
+    t403 += eta[k] * Bm[16 * n + k];
+  }
+  real t404 = t403 + b[16];
+  real t406 = t401 + 2.0 * t404;
+  real t415 = t4 + ((real)1 / (real)60) * (t406 * t44 + t131 * t145 - (t373 * t16 + t95 * t254));
+  real t421 = t135 + ((real)1 / (real)60) * (t131 * t406 - t95 * t373);
+  real t431 = t373 * t26 + t120 * t254 - (t384 * t49 + t168 * t160);
+  real t438 = t95 * t185 + (t112 * t140 - t156 * t168 - t205 * t131);
+  real t440 = 0;
+  for (int k = 0; k < n; ++k) {
+    t440 += eta[k] * Bm[14 * n + k];
+  }
+  real t441 = t440 + b[14];
+  real t443 = t438 + 2.0 * t441;
+  real t447 = t431 - (t443 * t44 + t131 * t213);
+  real t454 = t205 * t103 + (t156 * t120 - t135 * t112 - t179 * t95);
+  real t456 = 0;
+  for (int k = 0; k < n; ++k) {
+    t456 += eta[k] * Bm[12 * n + k];
+  }
+  real t457 = t456 + b[12];
+  real t459 = t454 + 2.0 * t457;
+  real t465 = t8 + ((real)1 / (real)60) * (t447 + (t459 * t19 + t103 * t276));
+  real t475 = t205 + ((real)1 / (real)60) * (t103 * t459 + (t120 * t373 - t168 * t384 - t131 *
+    t443));
+  real t484 = t406 * t49 + t168 * t145 - (t373 * t23 + t112 * t254);
+  real t491 = t179 * t131 + (t135 * t168 - t120 * t140) - t103 * t185;
+  real t493 = 0;
+  for (int k = 0; k < n; ++k) {
+    t493 += eta[k] * Bm[13 * n + k];
+  }
+  real t494 = t493 + b[13];
+  real t496 = t491 + t494 * 2.0;
+  real t506 = t11 + ((real)1 / (real)60) * (t484 + (t496 * t44 + t131 * t190) - (t459 * t16 + t95 *
     t276));
-  real t528 = t179 + ((real)1 / (real)60) * (t131 * t508 + (t168 * t412 - t112 * t376) - t95 *
-    t468);
-  real t537 = t144 - (t127 + 20.0 * t16);
-  real t541 = t407 - (t410 + t95 * 20.0);
-  real t547 = t148 + 20.0 * t19 - t159;
-  real t551 = t385 + t103 * 20.0 - t382;
-  real t558 = t189 - (t164 + 20.0 * t23);
-  real t562 = t503 - (t506 + t112 * 20.0);
-  real t568 = t193 + 20.0 * t26 - t212;
-  real t572 = t450 + t120 * 20.0 - t447;
+  real t516 = t179 + ((real)1 / (real)60) * (t131 * t496 + (t168 * t406 - t112 * t373) - t95 *
+    t459);
+  real t525 = t144 - (t127 + 20.0 * t16);
+  real t529 = t401 - (t404 + t95 * 20.0);
+  real t535 = t148 + 20.0 * t19 - t159;
+  real t539 = t382 + t103 * 20.0 - t379;
+  real t546 = t189 - (t164 + 20.0 * t23);
+  real t550 = t491 - (t494 + t112 * 20.0);
+  real t556 = t193 + 20.0 * t26 - t212;
+  real t560 = t441 + t120 * 20.0 - t438;
   for (int k = 0; k < n; ++k) {
-    d_Phi[k] = ((real)1 / (real)240) * ((dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] * 20.0)) *
-      t393 + t399 * d_dC1[2 * n + k] - ((dC1[n + k] - (Bm[13 * n + k] + Bm[n + k] * 20.0)) * t421 +
-      t427 * d_dC1[n + k]) + ((dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] * 20.0)) * t474 +
-      t484 * d_dC1[5 * n + k] - ((dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] * 20.0)) * t518 +
-      t528 * d_dC1[4 * n + k]))) - ((real)1 / (real)240) * ((Bm[8 * n + k] + dC2[2 * n + k]) * t537
-      + t541 * d_dC2[2 * n + k] + ((Bm[7 * n + k] + dC2[n + k]) * t547 + t551 * d_dC2[n + k]) +
-      ((Bm[11 * n + k] + dC2[5 * n + k]) * t558 + t562 * d_dC2[5 * n + k] + ((Bm[10 * n + k] + dC2[4
-      * n + k]) * t568 + t572 * d_dC2[4 * n + k])));
+    d_Phi[k] = ((real)1 / (real)240) * (dX[2 * n + k] * t390 + t396 * d_dX[2 * n + k] - (dX[n + k] *
+      t415 + t421 * d_dX[n + k]) + (dX[5 * n + k] * t465 + t475 * d_dX[5 * n + k] - (dX[4 * n + k] *
+      t506 + t516 * d_dX[4 * n + k]))) - ((real)1 / (real)240) * ((Bm[8 * n + k] + dC2[2 * n + k]) *
+      t525 + t529 * d_dC2[2 * n + k] + ((Bm[7 * n + k] + dC2[n + k]) * t535 + t539 * d_dC2[n + k]) +
+      ((Bm[11 * n + k] + dC2[5 * n + k]) * t546 + t550 * d_dC2[5 * n + k] + ((Bm[10 * n + k] + dC2[4
+      * n + k]) * t556 + t560 * d_dC2[4 * n + k])));
   }
-  real t589 = t140 + ((real)1 / (real)60) * (t95 * t387 - t103 * t412);
-  real t602 = t33 + ((real)1 / (real)60) * (t387 * t16 + t95 * t160 - (t412 * t19 + t103 * t145));
-  real t620 = t185 + ((real)1 / (real)60) * (t95 * t452 + (t112 * t387 - t120 * t412) - t103 *
-    t508);
-  real t641 = t38 + ((real)1 / (real)60) * (t387 * t23 + t112 * t160 - (t412 * t26 + t120 * t145) +
-    (t452 * t16 + t95 * t213) - (t508 * t19 + t103 * t190));
-  real t649 = t374 + t131 * 20.0 - t371;
-  real t654 = t245 + 20.0 * t44 - t253;
-  real t664 = t466 + t168 * 20.0 - t463;
-  real t669 = t259 + 20.0 * t49 - t275;
+  real t574 = t140 + ((real)1 / (real)60) * (t95 * t384 - t103 * t406);
+  real t584 = t33 + ((real)1 / (real)60) * (t384 * t16 + t95 * t160 - (t406 * t19 + t103 * t145));
+  real t599 = t185 + ((real)1 / (real)60) * (t95 * t443 + (t112 * t384 - t120 * t406) - t103 *
+    t496);
+  real t617 = t38 + ((real)1 / (real)60) * (t384 * t23 + t112 * t160 - (t406 * t26 + t120 * t145) +
+    (t443 * t16 + t95 * t213) - (t496 * t19 + t103 * t190));
+  real t625 = t371 + t131 * 20.0 - t368;
+  real t630 = t245 + 20.0 * t44 - t253;
+  real t640 = t457 + t168 * 20.0 - t454;
+  real t645 = t259 + 20.0 * t49 - t275;
   for (int k = 0; k < n; ++k) {
-    d_Phi[n + k] = ((real)1 / (real)240) * ((dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)) * t421 + t427
-      * d_dC1[k] - (t589 * d_dC1[2 * n + k] + (dC1[2 * n + k] - (Bm[14 * n + k] + Bm[2 * n + k] *
-      20.0)) * t602) + ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) * t518 + t528 *
-      d_dC1[3 * n + k] - (t620 * d_dC1[5 * n + k] + (dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n +
-      k] * 20.0)) * t641))) - ((real)1 / (real)240) * (t649 * d_dC2[2 * n + k] + (Bm[8 * n + k] +
-      dC2[2 * n + k]) * t654 - ((Bm[6 * n + k] + dC2[k]) * t547 + t551 * d_dC2[k]) + (t664 * d_dC2[5
-      * n + k] + (Bm[11 * n + k] + dC2[5 * n + k]) * t669 - ((Bm[9 * n + k] + dC2[3 * n + k]) * t568
-      + t572 * d_dC2[3 * n + k])));
+    d_Phi[n + k] = ((real)1 / (real)240) * (dX[k] * t415 + t421 * d_dX[k] - (t574 * d_dX[2 * n + k]
+      + dX[2 * n + k] * t584) + (dX[3 * n + k] * t506 + t516 * d_dX[3 * n + k] - (t599 * d_dX[5 * n
+      + k] + dX[5 * n + k] * t617))) - ((real)1 / (real)240) * (t625 * d_dC2[2 * n + k] + (Bm[8 * n
+      + k] + dC2[2 * n + k]) * t630 - ((Bm[6 * n + k] + dC2[k]) * t535 + t539 * d_dC2[k]) + (t640 *
+      d_dC2[5 * n + k] + (Bm[11 * n + k] + dC2[5 * n + k]) * t645 - ((Bm[9 * n + k] + dC2[3 * n +
+      k]) * t556 + t560 * d_dC2[3 * n + k])));
   }
   for (int k = 0; k < n; ++k) {
-    d_Phi[2 * n + k] = ((real)1 / (real)240) * (t649 * d_dC2[n + k] + (Bm[7 * n + k] + dC2[n + k]) *
-      t654 + ((Bm[6 * n + k] + dC2[k]) * t537 + t541 * d_dC2[k]) + (t664 * d_dC2[4 * n + k] + (Bm[10
-      * n + k] + dC2[4 * n + k]) * t669 + ((Bm[9 * n + k] + dC2[3 * n + k]) * t558 + t562 * d_dC2[3
-      * n + k]))) + ((real)1 / (real)240) * (t589 * d_dC1[n + k] + (dC1[n + k] - (Bm[13 * n + k] +
-      Bm[n + k] * 20.0)) * t602 - ((dC1[k] - (Bm[12 * n + k] + Bm[k] * 20.0)) * t393 + t399 *
-      d_dC1[k]) + (t620 * d_dC1[4 * n + k] + (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] *
-      20.0)) * t641 - ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) * t474 + t484 *
-      d_dC1[3 * n + k])));
+    d_Phi[2 * n + k] = ((real)1 / (real)240) * (t625 * d_dC2[n + k] + (Bm[7 * n + k] + dC2[n + k]) *
+      t630 + ((Bm[6 * n + k] + dC2[k]) * t525 + t529 * d_dC2[k]) + (t640 * d_dC2[4 * n + k] + (Bm[10
+      * n + k] + dC2[4 * n + k]) * t645 + ((Bm[9 * n + k] + dC2[3 * n + k]) * t546 + t550 * d_dC2[3
+      * n + k]))) + ((real)1 / (real)240) * (t574 * d_dX[n + k] + dX[n + k] * t584 - (dX[k] * t390 +
+      t396 * d_dX[k]) + (t599 * d_dX[4 * n + k] + dX[4 * n + k] * t617 - (dX[3 * n + k] * t465 +
+      t475 * d_dX[3 * n + k])));
   }
   for (int k = 0; k < n; ++k) {
-    d_Phi[3 * n + k] = ((real)1 / (real)240) * ((dC1[5 * n + k] - (Bm[17 * n + k] + Bm[5 * n + k] *
-      20.0)) * t393 + t399 * d_dC1[5 * n + k] - ((dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 * n + k] *
-      20.0)) * t421 + t427 * d_dC1[4 * n + k])) - ((real)1 / (real)240) * ((Bm[11 * n + k] + dC2[5 *
-      n + k]) * t537 + t541 * d_dC2[5 * n + k] + ((Bm[10 * n + k] + dC2[4 * n + k]) * t547 + t551 *
-      d_dC2[4 * n + k]));
+    d_Phi[3 * n + k] = ((real)1 / (real)240) * (dX[5 * n + k] * t390 + t396 * d_dX[5 * n + k] -
+      (dX[4 * n + k] * t415 + t421 * d_dX[4 * n + k])) - ((real)1 / (real)240) * ((Bm[11 * n + k] +
+      dC2[5 * n + k]) * t525 + t529 * d_dC2[5 * n + k] + ((Bm[10 * n + k] + dC2[4 * n + k]) * t535 +
+      t539 * d_dC2[4 * n + k]));
   }
   for (int k = 0; k < n; ++k) {
-    d_Phi[4 * n + k] = ((real)1 / (real)240) * ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] *
-      20.0)) * t421 + t427 * d_dC1[3 * n + k] - (t589 * d_dC1[5 * n + k] + (dC1[5 * n + k] - (Bm[17
-      * n + k] + Bm[5 * n + k] * 20.0)) * t602)) - ((real)1 / (real)240) * (t649 * d_dC2[5 * n + k]
-      + (Bm[11 * n + k] + dC2[5 * n + k]) * t654 - ((Bm[9 * n + k] + dC2[3 * n + k]) * t547 + t551 *
-      d_dC2[3 * n + k]));
+    d_Phi[4 * n + k] = ((real)1 / (real)240) * (dX[3 * n + k] * t415 + t421 * d_dX[3 * n + k] -
+      (t574 * d_dX[5 * n + k] + dX[5 * n + k] * t584)) - ((real)1 / (real)240) * (t625 * d_dC2[5 * n
+      + k] + (Bm[11 * n + k] + dC2[5 * n + k]) * t630 - ((Bm[9 * n + k] + dC2[3 * n + k]) * t535 +
+      t539 * d_dC2[3 * n + k]));
   }
   for (int k = 0; k < n; ++k) {
-    d_Phi[5 * n + k] = ((real)1 / (real)240) * (t649 * d_dC2[4 * n + k] + (Bm[10 * n + k] + dC2[4 *
-      n + k]) * t654 + ((Bm[9 * n + k] + dC2[3 * n + k]) * t537 + t541 * d_dC2[3 * n + k])) +
-      ((real)1 / (real)240) * (t589 * d_dC1[4 * n + k] + (dC1[4 * n + k] - (Bm[16 * n + k] + Bm[4 *
-      n + k] * 20.0)) * t602 - ((dC1[3 * n + k] - (Bm[15 * n + k] + Bm[3 * n + k] * 20.0)) * t393 +
-      t399 * d_dC1[3 * n + k]));
+    d_Phi[5 * n + k] = ((real)1 / (real)240) * (t625 * d_dC2[4 * n + k] + (Bm[10 * n + k] + dC2[4 *
+      n + k]) * t630 + ((Bm[9 * n + k] + dC2[3 * n + k]) * t525 + t529 * d_dC2[3 * n + k])) +
+      ((real)1 / (real)240) * (t574 * d_dX[4 * n + k] + dX[4 * n + k] * t584 - (dX[3 * n + k] * t390
+      + t396 * d_dX[3 * n + k]));
   }
-  d_Om[0] = t49 - (((real)1 / (real)240) * (t541 * t518 + t528 * t537) + (((real)1 / (real)240) *
-    (t562 * t421 + t427 * t558) + ((real)1 / (real)240) * (t572 * t393 + t399 * t568)) + ((real)1 /
-    (real)240) * (t551 * t474 + t484 * t547)) + ((real)1 / (real)12) * t259;
-  d_Om[1] = t23 + (((real)1 / (real)240) * (t620 * t547 + t551 * t641) + (((real)1 / (real)240) *
-    (t589 * t568 + t572 * t602) - ((real)1 / (real)240) * (t664 * t421 + t427 * t669) - ((real)1 /
-    (real)240) * (t649 * t518 + t528 * t654))) + ((real)1 / (real)12) * t164;
-  d_Om[2] = t26 + (((real)1 / (real)240) * (t649 * t474 + t484 * t654) + (((real)1 / (real)240) *
-    (t664 * t393 + t399 * t669) + ((real)1 / (real)240) * (t589 * t558 + t562 * t602)) + ((real)1 /
-    (real)240) * (t620 * t537 + t541 * t641)) + ((real)1 / (real)12) * t193;
-  d_Om[3] = t44 - (((real)1 / (real)240) * (t541 * t421 + t427 * t537) + ((real)1 / (real)240) *
-    (t551 * t393 + t399 * t547)) + ((real)1 / (real)12) * t245;
-  d_Om[4] = t16 + (((real)1 / (real)240) * (t589 * t547 + t551 * t602) - ((real)1 / (real)240) *
-    (t649 * t421 + t427 * t654)) + ((real)1 / (real)12) * t127;
-  d_Om[5] = t19 + (((real)1 / (real)240) * (t649 * t393 + t399 * t654) + ((real)1 / (real)240) *
-    (t589 * t537 + t541 * t602)) + ((real)1 / (real)12) * t148;
-  real t907 = 0;
+  d_Om[0] = t49 - (((real)1 / (real)240) * (t529 * t506 + t516 * t525) + (((real)1 / (real)240) *
+    (t550 * t415 + t421 * t546) + ((real)1 / (real)240) * (t560 * t390 + t396 * t556)) + ((real)1 /
+    (real)240) * (t539 * t465 + t475 * t535)) + ((real)1 / (real)12) * t259;
+  d_Om[1] = t23 + (((real)1 / (real)240) * (t599 * t535 + t539 * t617) + (((real)1 / (real)240) *
+    (t574 * t556 + t560 * t584) - ((real)1 / (real)240) * (t640 * t415 + t421 * t645) - ((real)1 /
+    (real)240) * (t625 * t506 + t516 * t630))) + ((real)1 / (real)12) * t164;
+  d_Om[2] = t26 + (((real)1 / (real)240) * (t625 * t465 + t475 * t630) + (((real)1 / (real)240) *
+    (t640 * t390 + t396 * t645) + ((real)1 / (real)240) * (t574 * t546 + t550 * t584)) + ((real)1 /
+    (real)240) * (t599 * t525 + t529 * t617)) + ((real)1 / (real)12) * t193;
+  d_Om[3] = t44 - (((real)1 / (real)240) * (t529 * t415 + t421 * t525) + ((real)1 / (real)240) *
+    (t539 * t390 + t396 * t535)) + ((real)1 / (real)12) * t245;
+  d_Om[4] = t16 + (((real)1 / (real)240) * (t574 * t535 + t539 * t584) - ((real)1 / (real)240) *
+    (t625 * t415 + t421 * t630)) + ((real)1 / (real)12) * t127;
+  d_Om[5] = t19 + (((real)1 / (real)240) * (t625 * t390 + t396 * t630) + ((real)1 / (real)240) *
+    (t574 * t525 + t529 * t584)) + ((real)1 / (real)12) * t148;
+  real t853 = 0;
   for (int k = 0; k < n; ++k) {
-    t907 += Bm[k] * d_etad[k];
+    t853 += Bm[k] * d_etad[k];
   }
-  real t909 = 0;
+  real t855 = 0;
   for (int k = 0; k < n; ++k) {
-    t909 += Bm[n + k] * etad[k];
+    t855 += Bm[n + k] * etad[k];
   }
-  real t910 = t140 * t909;
+  real t856 = t140 * t855;
+  real t858 = 0;
+  for (int k = 0; k < n; ++k) {
+    t858 += Bm[4 * n + k] * etad[k];
+  }
+  real t859 = t185 * t858;
+  real t861 = 0;
+  for (int k = 0; k < n; ++k) {
+    t861 += Bm[6 * n + k] * etad[k];
+  }
+  real t862 = t95 * t861;
+  real t864 = 0;
+  for (int k = 0; k < n; ++k) {
+    t864 += Bm[9 * n + k] * etad[k];
+  }
+  real t865 = t112 * t864;
+  real t867 = 0;
+  for (int k = 0; k < n; ++k) {
+    t867 += Bm[10 * n + k] * etad[k];
+  }
+  real t869 = t865 - t168 * t867;
+  real t871 = 0;
+  for (int k = 0; k < n; ++k) {
+    t871 += Bm[7 * n + k] * etad[k];
+  }
+  real t875 = t859 + (t862 + (t869 - t131 * t871));
+  real t877 = 0;
+  for (int k = 0; k < n; ++k) {
+    t877 += Bm[3 * n + k] * etad[k];
+  }
+  real t880 = t856 + (t875 - t205 * t877);
+  real t882 = 0;
+  for (int k = 0; k < n; ++k) {
+    t882 += Bm[k] * etad[k];
+  }
+  real t884 = t880 - t156 * t882;
+  real t886 = 0;
+  for (int k = 0; k < n; ++k) {
+    t886 += Bm[14 * n + k] * etad[k];
+  }
+  real t888 = 0;
+  for (int k = 0; k < n; ++k) {
+    t888 += Bm[2 * n + k] * etad[k];
+  }
+  real t891 = t884 - (t886 + 20.0 * t888);
+  real t892 = t891 * t390;
+  real t893 = t864 * t23;
+  real t895 = 0;
+  for (int k = 0; k < n; ++k) {
+    t895 += Bm[9 * n + k] * d_etad[k];
+  }
+  real t897 = t893 + t112 * t895;
+  real t898 = t867 * t49;
+  real t900 = 0;
+  for (int k = 0; k < n; ++k) {
+    t900 += Bm[10 * n + k] * d_etad[k];
+  }
+  real t903 = t897 - (t898 + t168 * t900);
+  real t904 = t871 * t44;
+  real t906 = 0;
+  for (int k = 0; k < n; ++k) {
+    t906 += Bm[7 * n + k] * d_etad[k];
+  }
+  real t909 = t903 - (t904 + t131 * t906);
+  real t910 = t861 * t16;
   real t912 = 0;
   for (int k = 0; k < n; ++k) {
-    t912 += Bm[4 * n + k] * etad[k];
+    t912 += Bm[6 * n + k] * d_etad[k];
   }
-  real t913 = t185 * t912;
-  real t915 = 0;
-  for (int k = 0; k < n; ++k) {
-    t915 += Bm[6 * n + k] * etad[k];
-  }
-  real t916 = t95 * t915;
+  real t915 = t909 + (t910 + t95 * t912);
+  real t916 = t858 * t38;
   real t918 = 0;
   for (int k = 0; k < n; ++k) {
-    t918 += Bm[9 * n + k] * etad[k];
+    t918 += Bm[4 * n + k] * d_etad[k];
   }
-  real t919 = t112 * t918;
-  real t921 = 0;
+  real t921 = t915 + (t916 + t185 * t918);
+  real t922 = t877 * t8;
+  real t924 = 0;
   for (int k = 0; k < n; ++k) {
-    t921 += Bm[10 * n + k] * etad[k];
+    t924 += Bm[3 * n + k] * d_etad[k];
   }
-  real t923 = t919 - t168 * t921;
-  real t925 = 0;
+  real t927 = t921 - (t922 + t205 * t924);
+  real t928 = t855 * t33;
+  real t930 = 0;
   for (int k = 0; k < n; ++k) {
-    t925 += Bm[7 * n + k] * etad[k];
+    t930 += Bm[n + k] * d_etad[k];
   }
-  real t929 = t913 + (t916 + (t923 - t131 * t925));
-  real t931 = 0;
+  real t937 = t927 + (t928 + t140 * t930) - (t882 * t1 + t156 * t853);
+  real t939 = 0;
   for (int k = 0; k < n; ++k) {
-    t931 += Bm[3 * n + k] * etad[k];
+    t939 += Bm[14 * n + k] * d_etad[k];
   }
-  real t934 = t910 + (t929 - t205 * t931);
-  real t936 = 0;
+  real t941 = 0;
   for (int k = 0; k < n; ++k) {
-    t936 += Bm[k] * etad[k];
+    t941 += Bm[2 * n + k] * d_etad[k];
   }
-  real t938 = t934 - t156 * t936;
-  real t940 = 0;
+  real t944 = t937 - (t939 + 20.0 * t941);
+  real t947 = ((real)1 / (real)240) * (t892 + t396 * t944);
+  real t948 = t135 * t882;
+  real t949 = t179 * t877;
+  real t951 = 0;
   for (int k = 0; k < n; ++k) {
-    t940 += Bm[14 * n + k] * etad[k];
+    t951 += Bm[8 * n + k] * etad[k];
   }
-  real t942 = 0;
-  for (int k = 0; k < n; ++k) {
-    t942 += Bm[2 * n + k] * etad[k];
-  }
-  real t945 = t938 - (t940 + 20.0 * t942);
-  real t946 = t945 * t393;
-  real t947 = t918 * t23;
-  real t949 = 0;
-  for (int k = 0; k < n; ++k) {
-    t949 += Bm[9 * n + k] * d_etad[k];
-  }
-  real t951 = t947 + t112 * t949;
-  real t952 = t921 * t49;
+  real t952 = t131 * t951;
   real t954 = 0;
   for (int k = 0; k < n; ++k) {
-    t954 += Bm[10 * n + k] * d_etad[k];
+    t954 += Bm[11 * n + k] * etad[k];
   }
-  real t957 = t951 - (t952 + t168 * t954);
-  real t958 = t925 * t44;
-  real t960 = 0;
+  real t960 = t952 + (t168 * t954 - t120 * t864) - t103 * t861;
+  real t962 = 0;
   for (int k = 0; k < n; ++k) {
-    t960 += Bm[7 * n + k] * d_etad[k];
+    t962 += Bm[5 * n + k] * etad[k];
   }
-  real t963 = t957 - (t958 + t131 * t960);
-  real t964 = t915 * t16;
-  real t966 = 0;
+  real t968 = t948 + (t949 + (t960 - t185 * t962) - t140 * t888);
+  real t970 = 0;
   for (int k = 0; k < n; ++k) {
-    t966 += Bm[6 * n + k] * d_etad[k];
+    t970 += Bm[13 * n + k] * etad[k];
   }
-  real t969 = t963 + (t964 + t95 * t966);
-  real t970 = t912 * t38;
-  real t972 = 0;
+  real t973 = t968 - (t970 + 20.0 * t855);
+  real t974 = t973 * t415;
+  real t975 = t954 * t49;
+  real t977 = 0;
   for (int k = 0; k < n; ++k) {
-    t972 += Bm[4 * n + k] * d_etad[k];
+    t977 += Bm[11 * n + k] * d_etad[k];
   }
-  real t975 = t969 + (t970 + t185 * t972);
-  real t976 = t931 * t8;
-  real t978 = 0;
+  real t983 = t975 + t168 * t977 - (t864 * t26 + t120 * t895);
+  real t984 = t951 * t44;
+  real t986 = 0;
   for (int k = 0; k < n; ++k) {
-    t978 += Bm[3 * n + k] * d_etad[k];
+    t986 += Bm[8 * n + k] * d_etad[k];
   }
-  real t981 = t975 - (t976 + t205 * t978);
-  real t982 = t909 * t33;
-  real t984 = 0;
+  real t993 = t983 + (t984 + t131 * t986) - (t861 * t19 + t103 * t912);
+  real t994 = t962 * t38;
+  real t996 = 0;
   for (int k = 0; k < n; ++k) {
-    t984 += Bm[n + k] * d_etad[k];
+    t996 += Bm[5 * n + k] * d_etad[k];
   }
-  real t991 = t981 + (t982 + t140 * t984) - (t936 * t1 + t156 * t907);
-  real t993 = 0;
+  real t1011 = t993 - (t994 + t185 * t996) + (t877 * t11 + t179 * t924) - (t888 * t33 + t140 * t941)
+    + (t882 * t4 + t135 * t853);
+  real t1012 = 20.0 * t930;
+  real t1014 = 0;
   for (int k = 0; k < n; ++k) {
-    t993 += Bm[14 * n + k] * d_etad[k];
+    t1014 += Bm[13 * n + k] * d_etad[k];
   }
-  real t995 = 0;
+  real t1016 = t1011 - (t1012 + t1014);
+  real t1019 = ((real)1 / (real)240) * (t974 + t421 * t1016);
+  real t1020 = t496 * t877;
+  real t1021 = t406 * t882;
+  real t1023 = t968 + 2.0 * t970;
+  real t1024 = t131 * t1023;
+  real t1031 = t135 * t877 + (t131 * t954 - t103 * t864 - t140 * t962);
+  real t1033 = 0;
   for (int k = 0; k < n; ++k) {
-    t995 += Bm[2 * n + k] * d_etad[k];
+    t1033 += Bm[16 * n + k] * etad[k];
   }
-  real t998 = t991 - (t993 + 20.0 * t995);
-  real t1001 = ((real)1 / (real)240) * (t946 + t399 * t998);
-  real t1002 = t135 * t936;
-  real t1003 = t179 * t931;
-  real t1005 = 0;
+  real t1035 = t1031 + 2.0 * t1033;
+  real t1036 = t168 * t1035;
+  real t1043 = t156 * t962 + (t103 * t867 - t95 * t954) - t135 * t858;
+  real t1045 = 0;
   for (int k = 0; k < n; ++k) {
-    t1005 += Bm[8 * n + k] * etad[k];
+    t1045 += Bm[15 * n + k] * etad[k];
   }
-  real t1006 = t131 * t1005;
-  real t1008 = 0;
+  real t1047 = t1043 + 2.0 * t1045;
+  real t1050 = t1024 + (t1036 - t112 * t1047);
+  real t1065 = t156 * t888 + (t205 * t962 + (t103 * t871 + (t120 * t867 - t112 * t954 - t95 * t951))
+    - t179 * t858) - t135 * t855;
+  real t1067 = 0;
   for (int k = 0; k < n; ++k) {
-    t1008 += Bm[11 * n + k] * etad[k];
+    t1067 += Bm[12 * n + k] * etad[k];
   }
-  real t1014 = t1006 + (t168 * t1008 - t120 * t918) - t103 * t915;
-  real t1016 = 0;
+  real t1069 = t1065 + 2.0 * t1067;
+  real t1079 = t951 + ((real)1 / (real)60) * (t1020 + (t1021 + (t1050 - t95 * t1069) - t373 * t855)
+    - t459 * t858);
+  real t1080 = t1079 * t525;
+  real t1081 = t1035 * t49;
+  real t1096 = t954 * t44 + t131 * t977 - (t864 * t19 + t103 * t895) - (t962 * t33 + t140 * t996) +
+    (t877 * t4 + t135 * t924);
+  real t1098 = 0;
   for (int k = 0; k < n; ++k) {
-    t1016 += Bm[5 * n + k] * etad[k];
+    t1098 += Bm[16 * n + k] * d_etad[k];
   }
-  real t1022 = t1002 + (t1003 + (t1014 - t185 * t1016) - t140 * t942);
-  real t1024 = 0;
+  real t1100 = t1096 + 2.0 * t1098;
+  real t1102 = t1081 + t168 * t1100;
+  real t1103 = t1047 * t23;
+  real t1105 = 0;
   for (int k = 0; k < n; ++k) {
-    t1024 += Bm[13 * n + k] * etad[k];
+    t1105 += Bm[15 * n + k] * d_etad[k];
   }
-  real t1027 = t1022 - (t1024 + 20.0 * t909);
-  real t1028 = t1027 * t421;
-  real t1029 = t1008 * t49;
-  real t1031 = 0;
+  real t1121 = t867 * t19 + t103 * t900 - (t954 * t16 + t95 * t977) + (t962 * t1 + t156 * t996) -
+    (t858 * t4 + t135 * t918);
+  real t1122 = 2.0 * t1105 + t1121;
+  real t1128 = t1011 + 2.0 * t1014;
+  real t1131 = t1102 - (t1103 + t112 * t1122) + (t1023 * t44 + t131 * t1128);
+  real t1132 = t1069 * t16;
+  real t1134 = 0;
   for (int k = 0; k < n; ++k) {
-    t1031 += Bm[11 * n + k] * d_etad[k];
+    t1134 += Bm[12 * n + k] * d_etad[k];
   }
-  real t1037 = t1029 + t168 * t1031 - (t918 * t26 + t120 * t949);
-  real t1038 = t1005 * t44;
-  real t1040 = 0;
+  real t1166 = t867 * t26 + t120 * t900 - (t954 * t23 + t112 * t977) - (t951 * t16 + t95 * t986) +
+    (t871 * t19 + t103 * t906) + (t962 * t8 + t205 * t996) - (t858 * t11 + t179 * t918) + (t888 * t1
+    + t156 * t941) - (t855 * t4 + t135 * t930);
+  real t1167 = 2.0 * t1134 + t1166;
+  real t1188 = t986 + ((real)1 / (real)60) * (t1131 - (t1132 + t95 * t1167) + (t882 * t145 + t406 *
+    t853) - (t855 * t254 + t373 * t930) + (t877 * t190 + t496 * t924) - (t858 * t276 + t459 *
+    t918));
+  real t1191 = ((real)1 / (real)240) * (t1080 + t529 * t1188);
+  real t1200 = t954 + ((real)1 / (real)60) * (t406 * t877 + (t131 * t1035 - t95 * t1047) - t373 *
+    t858);
+  real t1218 = t977 + ((real)1 / (real)60) * (t1035 * t44 + t131 * t1100 - (t1047 * t16 + t95 *
+    t1122) + (t877 * t145 + t406 * t924) - (t858 * t254 + t373 * t918));
+  real t1221 = ((real)1 / (real)240) * (t1200 * t546 + t550 * t1218);
+  real t1222 = t373 * t962;
+  real t1223 = t103 * t1047;
+  real t1230 = t140 * t858 + (t95 * t864 - t131 * t867) - t156 * t877;
+  real t1232 = 0;
   for (int k = 0; k < n; ++k) {
-    t1040 += Bm[8 * n + k] * d_etad[k];
+    t1232 += Bm[17 * n + k] * etad[k];
   }
-  real t1047 = t1037 + (t1038 + t131 * t1040) - (t915 * t19 + t103 * t966);
-  real t1048 = t1016 * t38;
-  real t1050 = 0;
+  real t1234 = t1230 + 2.0 * t1232;
+  real t1241 = t867 + ((real)1 / (real)60) * (t1222 + (t1223 - t131 * t1234 - t384 * t877));
+  real t1242 = t1241 * t556;
+  real t1245 = t1047 * t19 + t103 * t1122;
+  real t1246 = t1234 * t44;
+  real t1248 = 0;
   for (int k = 0; k < n; ++k) {
-    t1050 += Bm[5 * n + k] * d_etad[k];
+    t1248 += Bm[17 * n + k] * d_etad[k];
   }
-  real t1065 = t1047 - (t1048 + t185 * t1050) + (t931 * t11 + t179 * t978) - (t942 * t33 + t140 *
-    t995) + (t936 * t4 + t135 * t907);
-  real t1066 = 20.0 * t984;
-  real t1068 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1068 += Bm[13 * n + k] * d_etad[k];
-  }
-  real t1070 = t1065 - (t1066 + t1068);
-  real t1073 = ((real)1 / (real)240) * (t1028 + t427 * t1070);
-  real t1074 = t508 * t931;
-  real t1075 = t412 * t936;
-  real t1077 = t1022 + 2.0 * t1024;
-  real t1078 = t131 * t1077;
-  real t1085 = t135 * t931 + (t131 * t1008 - t103 * t918 - t140 * t1016);
-  real t1087 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1087 += Bm[16 * n + k] * etad[k];
-  }
-  real t1089 = t1085 + 2.0 * t1087;
-  real t1090 = t168 * t1089;
-  real t1097 = t156 * t1016 + (t103 * t921 - t95 * t1008) - t135 * t912;
-  real t1099 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1099 += Bm[15 * n + k] * etad[k];
-  }
-  real t1101 = t1097 + 2.0 * t1099;
-  real t1104 = t1078 + (t1090 - t112 * t1101);
-  real t1119 = t156 * t942 + (t205 * t1016 + (t103 * t925 + (t120 * t921 - t112 * t1008 - t95 *
-    t1005)) - t179 * t912) - t135 * t909;
-  real t1121 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1121 += Bm[12 * n + k] * etad[k];
-  }
-  real t1123 = t1119 + 2.0 * t1121;
-  real t1133 = t1005 + ((real)1 / (real)60) * (t1074 + (t1075 + (t1104 - t95 * t1123) - t376 * t909)
-    - t468 * t912);
-  real t1134 = t1133 * t537;
-  real t1135 = t1089 * t49;
-  real t1150 = t1008 * t44 + t131 * t1031 - (t918 * t19 + t103 * t949) - (t1016 * t33 + t140 *
-    t1050) + (t931 * t4 + t135 * t978);
-  real t1152 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1152 += Bm[16 * n + k] * d_etad[k];
-  }
-  real t1154 = t1150 + 2.0 * t1152;
-  real t1156 = t1135 + t168 * t1154;
-  real t1157 = t1101 * t23;
-  real t1159 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1159 += Bm[15 * n + k] * d_etad[k];
-  }
-  real t1175 = t921 * t19 + t103 * t954 - (t1008 * t16 + t95 * t1031) + (t1016 * t1 + t156 * t1050)
-    - (t912 * t4 + t135 * t972);
-  real t1176 = 2.0 * t1159 + t1175;
-  real t1182 = t1065 + 2.0 * t1068;
-  real t1185 = t1156 - (t1157 + t112 * t1176) + (t1077 * t44 + t131 * t1182);
-  real t1186 = t1123 * t16;
-  real t1188 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1188 += Bm[12 * n + k] * d_etad[k];
-  }
-  real t1220 = t921 * t26 + t120 * t954 - (t1008 * t23 + t112 * t1031) - (t1005 * t16 + t95 * t1040)
-    + (t925 * t19 + t103 * t960) + (t1016 * t8 + t205 * t1050) - (t912 * t11 + t179 * t972) + (t942
-    * t1 + t156 * t995) - (t909 * t4 + t135 * t984);
-  real t1221 = 2.0 * t1188 + t1220;
-  real t1242 = t1040 + ((real)1 / (real)60) * (t1185 - (t1186 + t95 * t1221) + (t936 * t145 + t412 *
-    t907) - (t909 * t254 + t376 * t984) + (t931 * t190 + t508 * t978) - (t912 * t276 + t468 *
-    t972));
-  real t1245 = ((real)1 / (real)240) * (t1134 + t541 * t1242);
-  real t1254 = t1008 + ((real)1 / (real)60) * (t412 * t931 + (t131 * t1089 - t95 * t1101) - t376 *
-    t912);
-  real t1272 = t1031 + ((real)1 / (real)60) * (t1089 * t44 + t131 * t1154 - (t1101 * t16 + t95 *
-    t1176) + (t931 * t145 + t412 * t978) - (t912 * t254 + t376 * t972));
-  real t1275 = ((real)1 / (real)240) * (t1254 * t558 + t562 * t1272);
-  real t1276 = t376 * t1016;
-  real t1277 = t103 * t1101;
-  real t1284 = t140 * t912 + (t95 * t918 - t131 * t921) - t156 * t931;
-  real t1286 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1286 += Bm[17 * n + k] * etad[k];
-  }
-  real t1288 = t1284 + 2.0 * t1286;
-  real t1295 = t921 + ((real)1 / (real)60) * (t1276 + (t1277 - t131 * t1288 - t387 * t931));
-  real t1296 = t1295 * t568;
-  real t1299 = t1101 * t19 + t103 * t1176;
-  real t1300 = t1288 * t44;
-  real t1302 = 0;
-  for (int k = 0; k < n; ++k) {
-    t1302 += Bm[17 * n + k] * d_etad[k];
-  }
-  real t1318 = t918 * t16 + t95 * t949 - (t921 * t44 + t131 * t954) + (t912 * t33 + t140 * t972) -
-    (t931 * t1 + t156 * t978);
-  real t1319 = 2.0 * t1302 + t1318;
-  real t1332 = t954 + ((real)1 / (real)60) * (t1299 - (t1300 + t131 * t1319) - (t931 * t160 + t387 *
-    t978) + (t1016 * t254 + t376 * t1050));
-  real t1345 = t938 + 2.0 * t940;
-  real t1356 = t925 + ((real)1 / (real)60) * (t468 * t1016 + (t376 * t942 + (t103 * t1123 + (t120 *
-    t1101 - t168 * t1288 - t131 * t1345) - t387 * t936) - t452 * t931));
-  real t1367 = 2.0 * t993 + t991;
-  real t1392 = t960 + ((real)1 / (real)60) * (t1101 * t26 + t120 * t1176 - (t1288 * t49 + t168 *
-    t1319) - (t1345 * t44 + t131 * t1367) + (t1123 * t19 + t103 * t1221) - (t936 * t160 + t387 *
-    t907) + (t942 * t254 + t376 * t995) - (t931 * t213 + t452 * t978) + (t1016 * t276 + t468 *
-    t1050));
-  real t1401 = t1085 - (t1087 + 20.0 * t912);
-  real t1405 = t1150 - (20.0 * t972 + t1152);
-  real t1412 = t1284 - (t1286 + 20.0 * t1016);
-  real t1416 = t1318 - (t1302 + 20.0 * t1050);
-  d_Omd[0] = t907 + (t1001 - (t1073 + (t1245 + (t1275 + ((real)1 / (real)240) * (t1296 + t572 *
-    t1332)) + ((real)1 / (real)240) * (t1356 * t547 + t551 * t1392))) - ((real)1 / (real)240) *
-    (t1401 * t518 + t528 * t1405) + ((real)1 / (real)240) * (t1412 * t474 + t484 * t1416)) +
-    ((real)1 / (real)12) * t1188;
-  real t1440 = t915 + ((real)1 / (real)60) * (t452 * t912 + (t387 * t909 + (t95 * t1345 + (t112 *
-    t1288 - t120 * t1089) - t103 * t1077) - t412 * t942) - t508 * t1016);
-  real t1474 = t966 + ((real)1 / (real)60) * (t1288 * t23 + t112 * t1319 - (t1089 * t26 + t120 *
-    t1154) + (t1345 * t16 + t95 * t1367) - (t1077 * t19 + t103 * t1182) + (t909 * t160 + t387 *
-    t984) - (t942 * t145 + t412 * t995) + (t912 * t213 + t452 * t972) - (t1016 * t190 + t508 *
-    t1050));
-  real t1486 = t918 + ((real)1 / (real)60) * (t387 * t912 + (t95 * t1288 - t103 * t1089) - t412 *
-    t1016);
-  real t1504 = t949 + ((real)1 / (real)60) * (t1288 * t16 + t95 * t1319 - (t1089 * t19 + t103 *
-    t1154) + (t912 * t160 + t387 * t972) - (t1016 * t145 + t412 * t1050));
-  real t1521 = t1119 - (t1121 + 20.0 * t936);
-  real t1525 = t1220 - (t1188 + 20.0 * t907);
-  real t1537 = t1097 - (t1099 + 20.0 * t931);
-  real t1541 = t1175 - (t1159 + 20.0 * t978);
-  d_Omd[1] = t984 + (((real)1 / (real)240) * (t1440 * t547 + t551 * t1474) + (((real)1 / (real)240)
-    * (t1486 * t568 + t572 * t1504) - ((real)1 / (real)240) * (t1254 * t669 + t664 * t1272) -
-    ((real)1 / (real)240) * (t1133 * t654 + t649 * t1242)) + ((real)1 / (real)240) * (t1521 * t421 +
-    t427 * t1525) - ((real)1 / (real)240) * (t945 * t602 + t589 * t998) + ((real)1 / (real)240) *
-    (t1537 * t518 + t528 * t1541) - ((real)1 / (real)240) * (t1412 * t641 + t620 * t1416)) +
-    ((real)1 / (real)12) * t1068;
-  d_Omd[2] = t995 + (((real)1 / (real)240) * (t1356 * t654 + t649 * t1392) + (((real)1 / (real)240)
-    * (t1295 * t669 + t664 * t1332) + ((real)1 / (real)240) * (t1486 * t558 + t562 * t1504)) +
-    ((real)1 / (real)240) * (t1440 * t537 + t541 * t1474) - ((real)1 / (real)240) * (t1521 * t393 +
-    t399 * t1525) + ((real)1 / (real)240) * (t1027 * t602 + t589 * t1070) - ((real)1 / (real)240) *
-    (t1537 * t474 + t484 * t1541) + ((real)1 / (real)240) * (t1401 * t641 + t620 * t1405)) +
-    ((real)1 / (real)12) * t993;
-  d_Omd[3] = t978 + (((real)1 / (real)240) * (t1412 * t393 + t399 * t1416) - (((real)1 / (real)240)
-    * (t1401 * t421 + t427 * t1405) + (((real)1 / (real)240) * (t1254 * t537 + t541 * t1272) +
-    ((real)1 / (real)240) * (t1295 * t547 + t551 * t1332)))) + ((real)1 / (real)12) * t1159;
-  d_Omd[4] = t972 + (((real)1 / (real)240) * (t1486 * t547 + t551 * t1504) - ((real)1 / (real)240) *
-    (t1254 * t654 + t649 * t1272) + ((real)1 / (real)240) * (t1537 * t421 + t427 * t1541) - ((real)1
-    / (real)240) * (t1412 * t602 + t589 * t1416)) + ((real)1 / (real)12) * t1152;
-  d_Omd[5] = t1050 + (((real)1 / (real)240) * (t1295 * t654 + t649 * t1332) + ((real)1 / (real)240)
-    * (t1486 * t537 + t541 * t1504) - ((real)1 / (real)240) * (t1537 * t393 + t399 * t1541) +
-    ((real)1 / (real)240) * (t1401 * t602 + t589 * t1405)) + ((real)1 / (real)12) * t1302;
-  real t1669 = 2.0 * (t912 * t915 + (t918 * t909 - t936 * t921 - t931 * t925));
-  real t1686 = 2.0 * (t909 * t949 + t918 * t984 - (t921 * t907 + t936 * t954) - (t925 * t978 + t931
-    * t960) + (t915 * t972 + t912 * t966));
-  real t1697 = 2.0 * (t931 * t1005 + (t936 * t1008 - t918 * t942) - t1016 * t915);
-  real t1714 = 2.0 * (t1008 * t907 + t936 * t1031 - (t942 * t949 + t918 * t995) + (t1005 * t978 +
-    t931 * t1040) - (t915 * t1050 + t1016 * t966));
-  real t1722 = 2.0 * (t931 * t1008 - t918 * t1016);
-  real t1731 = 2.0 * (t1008 * t978 + t931 * t1031 - (t1016 * t949 + t918 * t1050));
-  real t1739 = 2.0 * (t912 * t918 - t921 * t931);
-  real t1748 = 2.0 * (t918 * t972 + t912 * t949 - (t931 * t954 + t921 * t978));
-  real t1764 = 2.0 * (t1016 * t925 + (t921 * t942 - t909 * t1008 - t912 * t1005));
-  real t1770 = 2.0 * (t921 * t1016 - t912 * t1008);
-  real t1787 = ((real)1 / (real)30) * (t1016 * t1123) + (((real)1 / (real)30) * (t942 * t1101) +
-    (((real)1 / (real)60) * (t103 * t1764) + (((real)1 / (real)60) * (t120 * t1770) - ((real)1 /
-    (real)60) * (t168 * t1739) - ((real)1 / (real)60) * (t131 * t1669)) - ((real)1 / (real)30) *
-    (t936 * t1288)) - ((real)1 / (real)30) * (t931 * t1345));
-  real t1797 = 2.0 * (t1016 * t954 + t921 * t1050 - (t1008 * t972 + t912 * t1031));
-  real t1827 = 2.0 * (t942 * t954 + t921 * t995 - (t1008 * t984 + t909 * t1031) - (t1005 * t972 +
-    t912 * t1040) + (t925 * t1050 + t1016 * t960));
-  real t1851 = ((real)1 / (real)60) * (t1770 * t26 + t120 * t1797) - ((real)1 / (real)60) * (t1739 *
-    t49 + t168 * t1748) - ((real)1 / (real)60) * (t1669 * t44 + t131 * t1686) + ((real)1 / (real)60)
-    * (t1764 * t19 + t103 * t1827) - ((real)1 / (real)30) * (t1288 * t907 + t936 * t1319) + ((real)1
-    / (real)30) * (t1101 * t995 + t942 * t1176) - ((real)1 / (real)30) * (t1345 * t978 + t931 *
-    t1367) + ((real)1 / (real)30) * (t1123 * t1050 + t1016 * t1221);
-  real t1878 = ((real)1 / (real)30) * (t931 * t1077) + (((real)1 / (real)30) * (t936 * t1089) +
-    (((real)1 / (real)60) * (t131 * t1697) + (((real)1 / (real)60) * (t168 * t1722) - ((real)1 /
-    (real)60) * (t112 * t1770)) - ((real)1 / (real)60) * (t95 * t1764)) - ((real)1 / (real)30) *
-    (t909 * t1101)) - ((real)1 / (real)30) * (t912 * t1123);
-  real t1918 = ((real)1 / (real)60) * (t1722 * t49 + t168 * t1731) - ((real)1 / (real)60) * (t1770 *
-    t23 + t112 * t1797) + ((real)1 / (real)60) * (t1697 * t44 + t131 * t1714) - ((real)1 / (real)60)
-    * (t1764 * t16 + t95 * t1827) + ((real)1 / (real)30) * (t1089 * t907 + t936 * t1154) - ((real)1
-    / (real)30) * (t1101 * t984 + t909 * t1176) + ((real)1 / (real)30) * (t1077 * t978 + t931 *
-    t1182) - ((real)1 / (real)30) * (t1123 * t972 + t912 * t1221);
-  real t1933 = t1016 * t1101 * ((real)1 / (real)30) + (((real)1 / (real)60) * (t103 * t1770) -
-    ((real)1 / (real)60) * (t131 * t1739) - ((real)1 / (real)30) * (t931 * t1288));
-  real t1953 = ((real)1 / (real)60) * (t1770 * t19 + t103 * t1797) - ((real)1 / (real)60) * (t1739 *
-    t44 + t131 * t1748) - ((real)1 / (real)30) * (t1288 * t978 + t931 * t1319) + ((real)1 /
-    (real)30) * (t1101 * t1050 + t1016 * t1176);
-  real t1968 = ((real)1 / (real)30) * (t931 * t1089) + (((real)1 / (real)60) * (t131 * t1722) -
-    ((real)1 / (real)60) * (t95 * t1770)) - ((real)1 / (real)30) * (t912 * t1101);
-  real t1988 = ((real)1 / (real)60) * (t1722 * t44 + t131 * t1731) - ((real)1 / (real)60) * (t1770 *
-    t16 + t95 * t1797) + ((real)1 / (real)30) * (t1089 * t978 + t931 * t1154) - ((real)1 / (real)30)
-    * (t1101 * t972 + t912 * t1176);
-  d_Omdd[0] = ((real)1 / (real)240) * (t1669 * t393 + t399 * t1686) - ((real)1 / (real)240) * (t1697
-    * t421 + t427 * t1714) - ((real)1 / (real)240) * (t1722 * t518 + t528 * t1731) + ((real)1 /
-    (real)240) * (t1739 * t474 + t484 * t1748) - ((real)1 / (real)240) * (t1787 * t547 + t551 *
-    t1851) - ((real)1 / (real)240) * (t1878 * t537 + t541 * t1918) - ((real)1 / (real)240) * (t1933
-    * t568 + t572 * t1953) - ((real)1 / (real)240) * (t1968 * t558 + t562 * t1988) - ((real)1 /
-    (real)120) * (t1027 * t1272 + t1254 * t1070) + ((real)1 / (real)120) * (t1295 * t998 + t945 *
-    t1332) - ((real)1 / (real)120) * (t1401 * t1242 + t1133 * t1405) + ((real)1 / (real)120) *
-    (t1356 * t1416 + t1412 * t1392);
-  real t2023 = ((real)1 / (real)30) * (t912 * t1288) + (((real)1 / (real)60) * (t95 * t1739) -
-    ((real)1 / (real)60) * (t103 * t1722)) - ((real)1 / (real)30) * (t1016 * t1089);
-  real t2043 = ((real)1 / (real)60) * (t1739 * t16 + t95 * t1748) - ((real)1 / (real)60) * (t1722 *
-    t19 + t103 * t1731) + ((real)1 / (real)30) * (t1288 * t972 + t912 * t1319) - ((real)1 /
-    (real)30) * (t1089 * t1050 + t1016 * t1154);
-  real t2069 = ((real)1 / (real)30) * (t912 * t1345) + (((real)1 / (real)30) * (t909 * t1288) +
-    (((real)1 / (real)60) * (t95 * t1669) + (((real)1 / (real)60) * (t112 * t1739) - ((real)1 /
-    (real)60) * (t120 * t1722)) - ((real)1 / (real)60) * (t103 * t1697)) - ((real)1 / (real)30) *
-    (t942 * t1089)) - ((real)1 / (real)30) * (t1016 * t1077);
-  real t2109 = ((real)1 / (real)60) * (t1739 * t23 + t112 * t1748) - ((real)1 / (real)60) * (t1722 *
-    t26 + t120 * t1731) + ((real)1 / (real)60) * (t1669 * t16 + t95 * t1686) - ((real)1 / (real)60)
-    * (t1697 * t19 + t103 * t1714) + ((real)1 / (real)30) * (t1288 * t984 + t909 * t1319) - ((real)1
-    / (real)30) * (t1089 * t995 + t942 * t1154) + ((real)1 / (real)30) * (t1345 * t972 + t912 *
-    t1367) - ((real)1 / (real)30) * (t1077 * t1050 + t1016 * t1182);
-  d_Omdd[1] = ((real)1 / (real)240) * (t2023 * t568 + t572 * t2043) + (((real)1 / (real)240) *
-    (t2069 * t547 + t551 * t2109) + (((real)1 / (real)240) * (t1764 * t421 + t427 * t1827) -
-    ((real)1 / (real)240) * (t1669 * t602 + t589 * t1686) + ((real)1 / (real)240) * (t1770 * t518 +
-    t528 * t1797) - ((real)1 / (real)240) * (t1739 * t641 + t620 * t1748)) - ((real)1 / (real)240) *
-    (t1878 * t654 + t649 * t1918)) - ((real)1 / (real)240) * (t1968 * t669 + t664 * t1988) +
-    ((real)1 / (real)120) * (t1521 * t1272 + t1254 * t1525) - ((real)1 / (real)120) * (t1486 * t998
-    + t945 * t1504) + ((real)1 / (real)120) * (t1537 * t1242 + t1133 * t1541) - ((real)1 /
-    (real)120) * (t1440 * t1416 + t1412 * t1474);
-  d_Omdd[2] = ((real)1 / (real)240) * (t1933 * t669 + t664 * t1953) + (((real)1 / (real)240) *
-    (t1787 * t654 + t649 * t1851) + (((real)1 / (real)240) * (t1697 * t602 + t589 * t1714) -
-    ((real)1 / (real)240) * (t1764 * t393 + t399 * t1827) - ((real)1 / (real)240) * (t1770 * t474 +
-    t484 * t1797) + ((real)1 / (real)240) * (t1722 * t641 + t620 * t1731) + ((real)1 / (real)240) *
-    (t2069 * t537 + t541 * t2109)) + ((real)1 / (real)240) * (t2023 * t558 + t562 * t2043)) -
-    ((real)1 / (real)120) * (t1521 * t1332 + t1295 * t1525) + ((real)1 / (real)120) * (t1486 * t1070
-    + t1027 * t1504) - ((real)1 / (real)120) * (t1537 * t1392 + t1356 * t1541) + ((real)1 /
-    (real)120) * (t1440 * t1405 + t1401 * t1474);
-  d_Omdd[3] = ((real)1 / (real)240) * (t1739 * t393 + t399 * t1748) - ((real)1 / (real)240) * (t1722
-    * t421 + t427 * t1731) - ((real)1 / (real)240) * (t1933 * t547 + t551 * t1953) - ((real)1 /
-    (real)240) * (t1968 * t537 + t541 * t1988) - ((real)1 / (real)120) * (t1401 * t1272 + t1254 *
-    t1405) + ((real)1 / (real)120) * (t1295 * t1416 + t1412 * t1332);
-  d_Omdd[4] = ((real)1 / (real)240) * (t2023 * t547 + t551 * t2043) + (((real)1 / (real)240) *
-    (t1770 * t421 + t427 * t1797) - ((real)1 / (real)240) * (t1739 * t602 + t589 * t1748)) -
-    ((real)1 / (real)240) * (t1968 * t654 + t649 * t1988) + ((real)1 / (real)120) * (t1537 * t1272 +
-    t1254 * t1541) - ((real)1 / (real)120) * (t1486 * t1416 + t1412 * t1504);
-  d_Omdd[5] = ((real)1 / (real)240) * (t1933 * t654 + t649 * t1953) + (((real)1 / (real)240) *
-    (t1722 * t602 + t589 * t1731) - ((real)1 / (real)240) * (t1770 * t393 + t399 * t1797) + ((real)1
-    / (real)240) * (t2023 * t537 + t541 * t2043)) - ((real)1 / (real)120) * (t1537 * t1332 + t1295 *
-    t1541) + ((real)1 / (real)120) * (t1486 * t1405 + t1401 * t1504);
+  real t1264 = t864 * t16 + t95 * t895 - (t867 * t44 + t131 * t900) + (t858 * t33 + t140 * t918) -
+    (t877 * t1 + t156 * t924);
+  real t1265 = 2.0 * t1248 + t1264;
+  real t1278 = t900 + ((real)1 / (real)60) * (t1245 - (t1246 + t131 * t1265) - (t877 * t160 + t384 *
+    t924) + (t962 * t254 + t373 * t996));
+  real t1291 = t884 + 2.0 * t886;
+  real t1302 = t871 + ((real)1 / (real)60) * (t459 * t962 + (t373 * t888 + (t103 * t1069 + (t120 *
+    t1047 - t168 * t1234 - t131 * t1291) - t384 * t882) - t443 * t877));
+  real t1313 = 2.0 * t939 + t937;
+  real t1338 = t906 + ((real)1 / (real)60) * (t1047 * t26 + t120 * t1122 - (t1234 * t49 + t168 *
+    t1265) - (t1291 * t44 + t131 * t1313) + (t1069 * t19 + t103 * t1167) - (t882 * t160 + t384 *
+    t853) + (t888 * t254 + t373 * t941) - (t877 * t213 + t443 * t924) + (t962 * t276 + t459 *
+    t996));
+  real t1347 = t1031 - (t1033 + 20.0 * t858);
+  real t1351 = t1096 - (20.0 * t918 + t1098);
+  real t1358 = t1230 - (t1232 + 20.0 * t962);
+  real t1362 = t1264 - (t1248 + 20.0 * t996);
+  d_Omd[0] = t853 + (t947 - (t1019 + (t1191 + (t1221 + ((real)1 / (real)240) * (t1242 + t560 *
+    t1278)) + ((real)1 / (real)240) * (t1302 * t535 + t539 * t1338))) - ((real)1 / (real)240) *
+    (t1347 * t506 + t516 * t1351) + ((real)1 / (real)240) * (t1358 * t465 + t475 * t1362)) +
+    ((real)1 / (real)12) * t1134;
+  real t1386 = t861 + ((real)1 / (real)60) * (t443 * t858 + (t384 * t855 + (t95 * t1291 + (t112 *
+    t1234 - t120 * t1035) - t103 * t1023) - t406 * t888) - t496 * t962);
+  real t1420 = t912 + ((real)1 / (real)60) * (t1234 * t23 + t112 * t1265 - (t1035 * t26 + t120 *
+    t1100) + (t1291 * t16 + t95 * t1313) - (t1023 * t19 + t103 * t1128) + (t855 * t160 + t384 *
+    t930) - (t888 * t145 + t406 * t941) + (t858 * t213 + t443 * t918) - (t962 * t190 + t496 *
+    t996));
+  real t1432 = t864 + ((real)1 / (real)60) * (t384 * t858 + (t95 * t1234 - t103 * t1035) - t406 *
+    t962);
+  real t1450 = t895 + ((real)1 / (real)60) * (t1234 * t16 + t95 * t1265 - (t1035 * t19 + t103 *
+    t1100) + (t858 * t160 + t384 * t918) - (t962 * t145 + t406 * t996));
+  real t1467 = t1065 - (t1067 + 20.0 * t882);
+  real t1471 = t1166 - (t1134 + 20.0 * t853);
+  real t1483 = t1043 - (t1045 + 20.0 * t877);
+  real t1487 = t1121 - (t1105 + 20.0 * t924);
+  d_Omd[1] = t930 + (((real)1 / (real)240) * (t1386 * t535 + t539 * t1420) + (((real)1 / (real)240)
+    * (t1432 * t556 + t560 * t1450) - ((real)1 / (real)240) * (t1200 * t645 + t640 * t1218) -
+    ((real)1 / (real)240) * (t1079 * t630 + t625 * t1188)) + ((real)1 / (real)240) * (t1467 * t415 +
+    t421 * t1471) - ((real)1 / (real)240) * (t891 * t584 + t574 * t944) + ((real)1 / (real)240) *
+    (t1483 * t506 + t516 * t1487) - ((real)1 / (real)240) * (t1358 * t617 + t599 * t1362)) +
+    ((real)1 / (real)12) * t1014;
+  d_Omd[2] = t941 + (((real)1 / (real)240) * (t1302 * t630 + t625 * t1338) + (((real)1 / (real)240)
+    * (t1241 * t645 + t640 * t1278) + ((real)1 / (real)240) * (t1432 * t546 + t550 * t1450)) +
+    ((real)1 / (real)240) * (t1386 * t525 + t529 * t1420) - ((real)1 / (real)240) * (t1467 * t390 +
+    t396 * t1471) + ((real)1 / (real)240) * (t973 * t584 + t574 * t1016) - ((real)1 / (real)240) *
+    (t1483 * t465 + t475 * t1487) + ((real)1 / (real)240) * (t1347 * t617 + t599 * t1351)) +
+    ((real)1 / (real)12) * t939;
+  d_Omd[3] = t924 + (((real)1 / (real)240) * (t1358 * t390 + t396 * t1362) - (((real)1 / (real)240)
+    * (t1347 * t415 + t421 * t1351) + (((real)1 / (real)240) * (t1200 * t525 + t529 * t1218) +
+    ((real)1 / (real)240) * (t1241 * t535 + t539 * t1278)))) + ((real)1 / (real)12) * t1105;
+  d_Omd[4] = t918 + (((real)1 / (real)240) * (t1432 * t535 + t539 * t1450) - ((real)1 / (real)240) *
+    (t1200 * t630 + t625 * t1218) + ((real)1 / (real)240) * (t1483 * t415 + t421 * t1487) - ((real)1
+    / (real)240) * (t1358 * t584 + t574 * t1362)) + ((real)1 / (real)12) * t1098;
+  d_Omd[5] = t996 + (((real)1 / (real)240) * (t1241 * t630 + t625 * t1278) + ((real)1 / (real)240) *
+    (t1432 * t525 + t529 * t1450) - ((real)1 / (real)240) * (t1483 * t390 + t396 * t1487) + ((real)1
+    / (real)240) * (t1347 * t584 + t574 * t1351)) + ((real)1 / (real)12) * t1248;
+  real t1615 = 2.0 * (t858 * t861 + (t864 * t855 - t882 * t867 - t877 * t871));
+  real t1632 = 2.0 * (t855 * t895 + t864 * t930 - (t867 * t853 + t882 * t900) - (t871 * t924 + t877
+    * t906) + (t861 * t918 + t858 * t912));
+  real t1643 = 2.0 * (t877 * t951 + (t882 * t954 - t864 * t888) - t962 * t861);
+  real t1660 = 2.0 * (t954 * t853 + t882 * t977 - (t888 * t895 + t864 * t941) + (t951 * t924 + t877
+    * t986) - (t861 * t996 + t962 * t912));
+  real t1668 = 2.0 * (t877 * t954 - t864 * t962);
+  real t1677 = 2.0 * (t954 * t924 + t877 * t977 - (t962 * t895 + t864 * t996));
+  real t1685 = 2.0 * (t858 * t864 - t867 * t877);
+  real t1694 = 2.0 * (t864 * t918 + t858 * t895 - (t877 * t900 + t867 * t924));
+  real t1710 = 2.0 * (t962 * t871 + (t867 * t888 - t855 * t954 - t858 * t951));
+  real t1716 = 2.0 * (t867 * t962 - t858 * t954);
+  real t1733 = ((real)1 / (real)30) * (t962 * t1069) + (((real)1 / (real)30) * (t888 * t1047) +
+    (((real)1 / (real)60) * (t103 * t1710) + (((real)1 / (real)60) * (t120 * t1716) - ((real)1 /
+    (real)60) * (t168 * t1685) - ((real)1 / (real)60) * (t131 * t1615)) - ((real)1 / (real)30) *
+    (t882 * t1234)) - ((real)1 / (real)30) * (t877 * t1291));
+  real t1743 = 2.0 * (t962 * t900 + t867 * t996 - (t954 * t918 + t858 * t977));
+  real t1773 = 2.0 * (t888 * t900 + t867 * t941 - (t954 * t930 + t855 * t977) - (t951 * t918 + t858
+    * t986) + (t871 * t996 + t962 * t906));
+  real t1797 = ((real)1 / (real)60) * (t1716 * t26 + t120 * t1743) - ((real)1 / (real)60) * (t1685 *
+    t49 + t168 * t1694) - ((real)1 / (real)60) * (t1615 * t44 + t131 * t1632) + ((real)1 / (real)60)
+    * (t1710 * t19 + t103 * t1773) - ((real)1 / (real)30) * (t1234 * t853 + t882 * t1265) + ((real)1
+    / (real)30) * (t1047 * t941 + t888 * t1122) - ((real)1 / (real)30) * (t1291 * t924 + t877 *
+    t1313) + ((real)1 / (real)30) * (t1069 * t996 + t962 * t1167);
+  real t1824 = ((real)1 / (real)30) * (t877 * t1023) + (((real)1 / (real)30) * (t882 * t1035) +
+    (((real)1 / (real)60) * (t131 * t1643) + (((real)1 / (real)60) * (t168 * t1668) - ((real)1 /
+    (real)60) * (t112 * t1716)) - ((real)1 / (real)60) * (t95 * t1710)) - ((real)1 / (real)30) *
+    (t855 * t1047)) - ((real)1 / (real)30) * (t858 * t1069);
+  real t1864 = ((real)1 / (real)60) * (t1668 * t49 + t168 * t1677) - ((real)1 / (real)60) * (t1716 *
+    t23 + t112 * t1743) + ((real)1 / (real)60) * (t1643 * t44 + t131 * t1660) - ((real)1 / (real)60)
+    * (t1710 * t16 + t95 * t1773) + ((real)1 / (real)30) * (t1035 * t853 + t882 * t1100) - ((real)1
+    / (real)30) * (t1047 * t930 + t855 * t1122) + ((real)1 / (real)30) * (t1023 * t924 + t877 *
+    t1128) - ((real)1 / (real)30) * (t1069 * t918 + t858 * t1167);
+  real t1879 = t962 * t1047 * ((real)1 / (real)30) + (((real)1 / (real)60) * (t103 * t1716) -
+    ((real)1 / (real)60) * (t131 * t1685) - ((real)1 / (real)30) * (t877 * t1234));
+  real t1899 = ((real)1 / (real)60) * (t1716 * t19 + t103 * t1743) - ((real)1 / (real)60) * (t1685 *
+    t44 + t131 * t1694) - ((real)1 / (real)30) * (t1234 * t924 + t877 * t1265) + ((real)1 /
+    (real)30) * (t1047 * t996 + t962 * t1122);
+  real t1914 = ((real)1 / (real)30) * (t877 * t1035) + (((real)1 / (real)60) * (t131 * t1668) -
+    ((real)1 / (real)60) * (t95 * t1716)) - ((real)1 / (real)30) * (t858 * t1047);
+  real t1934 = ((real)1 / (real)60) * (t1668 * t44 + t131 * t1677) - ((real)1 / (real)60) * (t1716 *
+    t16 + t95 * t1743) + ((real)1 / (real)30) * (t1035 * t924 + t877 * t1100) - ((real)1 / (real)30)
+    * (t1047 * t918 + t858 * t1122);
+  d_Omdd[0] = ((real)1 / (real)240) * (t1615 * t390 + t396 * t1632) - ((real)1 / (real)240) * (t1643
+    * t415 + t421 * t1660) - ((real)1 / (real)240) * (t1668 * t506 + t516 * t1677) + ((real)1 /
+    (real)240) * (t1685 * t465 + t475 * t1694) - ((real)1 / (real)240) * (t1733 * t535 + t539 *
+    t1797) - ((real)1 / (real)240) * (t1824 * t525 + t529 * t1864) - ((real)1 / (real)240) * (t1879
+    * t556 + t560 * t1899) - ((real)1 / (real)240) * (t1914 * t546 + t550 * t1934) - ((real)1 /
+    (real)120) * (t973 * t1218 + t1200 * t1016) + ((real)1 / (real)120) * (t1241 * t944 + t891 *
+    t1278) - ((real)1 / (real)120) * (t1347 * t1188 + t1079 * t1351) + ((real)1 / (real)120) *
+    (t1302 * t1362 + t1358 * t1338);
+  real t1969 = ((real)1 / (real)30) * (t858 * t1234) + (((real)1 / (real)60) * (t95 * t1685) -
+    ((real)1 / (real)60) * (t103 * t1668)) - ((real)1 / (real)30) * (t962 * t1035);
+  real t1989 = ((real)1 / (real)60) * (t1685 * t16 + t95 * t1694) - ((real)1 / (real)60) * (t1668 *
+    t19 + t103 * t1677) + ((real)1 / (real)30) * (t1234 * t918 + t858 * t1265) - ((real)1 /
+    (real)30) * (t1035 * t996 + t962 * t1100);
+  real t2015 = ((real)1 / (real)30) * (t858 * t1291) + (((real)1 / (real)30) * (t855 * t1234) +
+    (((real)1 / (real)60) * (t95 * t1615) + (((real)1 / (real)60) * (t112 * t1685) - ((real)1 /
+    (real)60) * (t120 * t1668)) - ((real)1 / (real)60) * (t103 * t1643)) - ((real)1 / (real)30) *
+    (t888 * t1035)) - ((real)1 / (real)30) * (t962 * t1023);
+  real t2055 = ((real)1 / (real)60) * (t1685 * t23 + t112 * t1694) - ((real)1 / (real)60) * (t1668 *
+    t26 + t120 * t1677) + ((real)1 / (real)60) * (t1615 * t16 + t95 * t1632) - ((real)1 / (real)60)
+    * (t1643 * t19 + t103 * t1660) + ((real)1 / (real)30) * (t1234 * t930 + t855 * t1265) - ((real)1
+    / (real)30) * (t1035 * t941 + t888 * t1100) + ((real)1 / (real)30) * (t1291 * t918 + t858 *
+    t1313) - ((real)1 / (real)30) * (t1023 * t996 + t962 * t1128);
+  d_Omdd[1] = ((real)1 / (real)240) * (t1969 * t556 + t560 * t1989) + (((real)1 / (real)240) *
+    (t2015 * t535 + t539 * t2055) + (((real)1 / (real)240) * (t1710 * t415 + t421 * t1773) -
+    ((real)1 / (real)240) * (t1615 * t584 + t574 * t1632) + ((real)1 / (real)240) * (t1716 * t506 +
+    t516 * t1743) - ((real)1 / (real)240) * (t1685 * t617 + t599 * t1694)) - ((real)1 / (real)240) *
+    (t1824 * t630 + t625 * t1864)) - ((real)1 / (real)240) * (t1914 * t645 + t640 * t1934) +
+    ((real)1 / (real)120) * (t1467 * t1218 + t1200 * t1471) - ((real)1 / (real)120) * (t1432 * t944
+    + t891 * t1450) + ((real)1 / (real)120) * (t1483 * t1188 + t1079 * t1487) - ((real)1 /
+    (real)120) * (t1386 * t1362 + t1358 * t1420);
+  d_Omdd[2] = ((real)1 / (real)240) * (t1879 * t645 + t640 * t1899) + (((real)1 / (real)240) *
+    (t1733 * t630 + t625 * t1797) + (((real)1 / (real)240) * (t1643 * t584 + t574 * t1660) -
+    ((real)1 / (real)240) * (t1710 * t390 + t396 * t1773) - ((real)1 / (real)240) * (t1716 * t465 +
+    t475 * t1743) + ((real)1 / (real)240) * (t1668 * t617 + t599 * t1677) + ((real)1 / (real)240) *
+    (t2015 * t525 + t529 * t2055)) + ((real)1 / (real)240) * (t1969 * t546 + t550 * t1989)) -
+    ((real)1 / (real)120) * (t1467 * t1278 + t1241 * t1471) + ((real)1 / (real)120) * (t1432 * t1016
+    + t973 * t1450) - ((real)1 / (real)120) * (t1483 * t1338 + t1302 * t1487) + ((real)1 /
+    (real)120) * (t1386 * t1351 + t1347 * t1420);
+  d_Omdd[3] = ((real)1 / (real)240) * (t1685 * t390 + t396 * t1694) - ((real)1 / (real)240) * (t1668
+    * t415 + t421 * t1677) - ((real)1 / (real)240) * (t1879 * t535 + t539 * t1899) - ((real)1 /
+    (real)240) * (t1914 * t525 + t529 * t1934) - ((real)1 / (real)120) * (t1347 * t1218 + t1200 *
+    t1351) + ((real)1 / (real)120) * (t1241 * t1362 + t1358 * t1278);
+  d_Omdd[4] = ((real)1 / (real)240) * (t1969 * t535 + t539 * t1989) + (((real)1 / (real)240) *
+    (t1716 * t415 + t421 * t1743) - ((real)1 / (real)240) * (t1685 * t584 + t574 * t1694)) -
+    ((real)1 / (real)240) * (t1914 * t630 + t625 * t1934) + ((real)1 / (real)120) * (t1483 * t1218 +
+    t1200 * t1487) - ((real)1 / (real)120) * (t1432 * t1362 + t1358 * t1450);
+  d_Omdd[5] = ((real)1 / (real)240) * (t1879 * t630 + t625 * t1899) + (((real)1 / (real)240) *
+    (t1668 * t584 + t574 * t1677) - ((real)1 / (real)240) * (t1716 * t390 + t396 * t1743) + ((real)1
+    / (real)240) * (t1969 * t525 + t529 * t1989)) - ((real)1 / (real)120) * (t1483 * t1278 + t1241 *
+    t1487) + ((real)1 / (real)120) * (t1432 * t1351 + t1347 * t1450);
   return 0;
 }
 
-int mstmm_sweep_modal_segment_slope(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1, in_t dC2,
-    in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_Phi, out_t d_Om, out_t d_Omd,
-    out_t d_Omdd)
+int mstmm_sweep_modal_segment_slope(int n, in_t b, in_t Bm, in_t eta, in_t etad, in_t dC1, in_t dX,
+    in_t dC2, in_t d_eta, in_t d_etad, out_t d_dC1, out_t d_dC2, out_t d_dX, out_t d_Phi,
+    out_t d_Om, out_t d_Omd, out_t d_Omdd)
 {
   switch (n) { /* loops over a known number are unrolled */
-  case 1: return mstmm_sweep_modal_segment_slope_sized(1, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
-  case 2: return mstmm_sweep_modal_segment_slope_sized(2, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
-  case 3: return mstmm_sweep_modal_segment_slope_sized(3, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
-  case 4: return mstmm_sweep_modal_segment_slope_sized(4, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
-  default: return mstmm_sweep_modal_segment_slope_sized(n, b, Bm, eta, etad, dC1, dC2, d_eta, d_etad, d_dC1, d_dC2, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 1: return mstmm_sweep_modal_segment_slope_sized(1, b, Bm, eta, etad, dC1, dX, dC2, d_eta, d_etad, d_dC1, d_dC2, d_dX, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 2: return mstmm_sweep_modal_segment_slope_sized(2, b, Bm, eta, etad, dC1, dX, dC2, d_eta, d_etad, d_dC1, d_dC2, d_dX, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 3: return mstmm_sweep_modal_segment_slope_sized(3, b, Bm, eta, etad, dC1, dX, dC2, d_eta, d_etad, d_dC1, d_dC2, d_dX, d_Phi, d_Om, d_Omd, d_Omdd);
+  case 4: return mstmm_sweep_modal_segment_slope_sized(4, b, Bm, eta, etad, dC1, dX, dC2, d_eta, d_etad, d_dC1, d_dC2, d_dX, d_Phi, d_Om, d_Omd, d_Omdd);
+  default: return mstmm_sweep_modal_segment_slope_sized(n, b, Bm, eta, etad, dC1, dX, dC2, d_eta, d_etad, d_dC1, d_dC2, d_dX, d_Phi, d_Om, d_Omd, d_Omdd);
   }
 }
 
 MSTMM_CALL(mstmm_sweep_modal_segment_slope, (n, in[0], in[1], in[2], in[3], in[4], in[5], in[6],
-  in[7], out[0], out[1], out[2], out[3], out[4], out[5]))
+  in[7], in[8], out[0], out[1], out[2], out[3], out[4], out[5], out[6]))
 
 /* segment_motion and its derivative along a direction
  * source: Blanes, Casas, Oteo, Ros, The Magnus expansion and some of its applications, 2009, 5.3
@@ -6772,11 +6793,11 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     3, "m/s", 0, 0}, {"w", 3, "rad/s", 0, 0}, {"c", 6, "m/s2, rad/s2", 0, 0}},
     "1a9365dcba5402f0b29574ff039e0d20b23f653b753f4765d9e3e8f2a028d34d", 1, (const mstmm_guard[]){{1,
     "a section rotates by more than 3/2 rad relative to its floating frame"}}},
-  {"segment", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment), 4, 6, (const mstmm_port[]){{"b", 18, "",
+  {"segment", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment), 4, 7, (const mstmm_port[]){{"b", 18, "",
     0, 0}, {"Bm", 18, "", 0, 1}, {"eta", 1, "", 0, 1}, {"etad", 1, "", 0, 1}}, (const
-    mstmm_port[]){{"dC1", 6, "", 0, 1}, {"dC2", 6, "", 0, 1}, {"Phi", 6, "", 0, 1}, {"Om", 6, "", 0,
-    0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "", 0, 0}},
-    "0cc76666287731f0713b7d09f0e12335b04b630ab0a49842a29c3832ce680ecc", 0, NULL},
+    mstmm_port[]){{"dC1", 6, "", 0, 1}, {"dC2", 6, "", 0, 1}, {"dX", 6, "", 0, 1}, {"Phi", 6, "", 0,
+    1}, {"Om", 6, "", 0, 0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "", 0, 0}},
+    "41b6675a0d9e0f651db81a7e1e94ed20a1c471a0a050399383f06cb290b7dcd8", 0, NULL},
   {"segment_motion", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_motion), 4, 6, (const
     mstmm_port[]){{"R_end", 9, "", 0, 0}, {"Om", 6, "", 0, 0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "",
     0, 0}}, (const mstmm_port[]){{"R", 9, "", 0, 0}, {"d", 3, "m", 0, 0}, {"H6", 36, "", 0, 0},
@@ -6901,12 +6922,13 @@ static const mstmm_kernel mstmm_sweep_modal_kernels[] = {
     mstmm_port[]){{"d_R", 9, "", 0, 0}, {"d_d", 3, "m", 0, 0}, {"d_H6", 36, "", 0, 0}, {"d_v", 3,
     "m/s", 0, 0}, {"d_w", 3, "rad/s", 0, 0}, {"d_c", 6, "m/s2, rad/s2", 0, 0}},
     "03fcefdd4b3fd4857435baf2ea7f4cb939e7014116c6165462e063c71acfd6b3", 0, NULL},
-  {"segment_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_slope), 8, 6, (const
+  {"segment_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_slope), 9, 7, (const
     mstmm_port[]){{"b", 18, "", 0, 0}, {"Bm", 18, "", 0, 1}, {"eta", 1, "", 0, 1}, {"etad", 1, "",
-    0, 1}, {"dC1", 6, "", 0, 1}, {"dC2", 6, "", 0, 1}, {"d_eta", 1, "", 0, 1}, {"d_etad", 1, "", 0,
-    1}}, (const mstmm_port[]){{"d_dC1", 6, "", 0, 1}, {"d_dC2", 6, "", 0, 1}, {"d_Phi", 6, "", 0,
-    1}, {"d_Om", 6, "", 0, 0}, {"d_Omd", 6, "", 0, 0}, {"d_Omdd", 6, "", 0, 0}},
-    "44026db9563d0ea0873e87e71f079689fe2374d0b1909bc3b9b2f8e1126a7f85", 0, NULL},
+    0, 1}, {"dC1", 6, "", 0, 1}, {"dX", 6, "", 0, 1}, {"dC2", 6, "", 0, 1}, {"d_eta", 1, "", 0, 1},
+    {"d_etad", 1, "", 0, 1}}, (const mstmm_port[]){{"d_dC1", 6, "", 0, 1}, {"d_dC2", 6, "", 0, 1},
+    {"d_dX", 6, "", 0, 1}, {"d_Phi", 6, "", 0, 1}, {"d_Om", 6, "", 0, 0}, {"d_Omd", 6, "", 0, 0},
+    {"d_Omdd", 6, "", 0, 0}}, "f80482be90e6fa159026140df23dea0727b357d77438f643db44157fe91193cb", 0,
+    NULL},
   {"segment_motion_slope", MSTMM_FUNCTIONS(mstmm_sweep_modal_segment_motion_slope), 7, 6, (const
     mstmm_port[]){{"R_end", 9, "", 0, 0}, {"Om", 6, "", 0, 0}, {"Omd", 6, "", 0, 0}, {"Omdd", 6, "",
     0, 0}, {"d_Om", 6, "", 0, 0}, {"d_Omd", 6, "", 0, 0}, {"d_Omdd", 6, "", 0, 0}}, (const
@@ -6936,7 +6958,7 @@ const mstmm_element mstmm_sweep_modal = {
     .abi = MSTMM_ABI,
     .kind = "sweep",
     .name = "modal",
-    .hash = "70f06877897abd0adc9b149cd88ee00b2ca7419de8089d454c94383fdb5a7182",
+    .hash = "ef71f37e7b7c1bbef85413bc41de8f6dc43514c0131d41d3bc356d2448fa4954",
     .nq = 0,
     .nu = 0,
     .np = 0,

@@ -389,9 +389,9 @@ int mstmm_at_section_motion(mstmm_state *state, int index)
         mstmm_modal_segment(
             .n = modal->n, .b = section->b, .Bm = section->Bm, .eta = state->q + modal->q,
             .etad = state->u + modal->u, .dC1 = laid + MSTMM_SECTION_DC1(n),
-            .dC2 = laid + MSTMM_SECTION_DC2(n), .Phi = laid + MSTMM_SECTION_PHI(n),
-            .Om = laid + MSTMM_SECTION_X(n), .Omd = laid + MSTMM_SECTION_XD(n),
-            .Omdd = laid + MSTMM_SECTION_XDD(n));
+            .dC2 = laid + MSTMM_SECTION_DC2(n), .dX = laid + MSTMM_SECTION_DX(n),
+            .Phi = laid + MSTMM_SECTION_PHI(n), .Om = laid + MSTMM_SECTION_X(n),
+            .Omd = laid + MSTMM_SECTION_XD(n), .Omdd = laid + MSTMM_SECTION_XDD(n));
         code = mstmm_modal_segment_motion(
             .R_end = section->end, .Om = laid + MSTMM_SECTION_X(n),
             .Omd = laid + MSTMM_SECTION_XD(n), .Omdd = laid + MSTMM_SECTION_XDD(n),
@@ -2618,9 +2618,10 @@ static int mstmm_at_section_motion_slope(mstmm_state *state, int index)
         mstmm_modal_segment_slope(
             .n = modal->n, .b = section->b, .Bm = section->Bm, .eta = state->q + modal->q,
             .etad = state->u + modal->u, .dC1 = laid + MSTMM_SECTION_DC1(n),
-            .dC2 = laid + MSTMM_SECTION_DC2(n), .d_eta = state->slope->q + modal->q,
-            .d_etad = state->slope->u + modal->u, .d_dC1 = d_laid + MSTMM_SECTION_DC1(n),
-            .d_dC2 = d_laid + MSTMM_SECTION_DC2(n), .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
+            .dX = laid + MSTMM_SECTION_DX(n), .dC2 = laid + MSTMM_SECTION_DC2(n),
+            .d_eta = state->slope->q + modal->q, .d_etad = state->slope->u + modal->u,
+            .d_dC1 = d_laid + MSTMM_SECTION_DC1(n), .d_dC2 = d_laid + MSTMM_SECTION_DC2(n),
+            .d_dX = d_laid + MSTMM_SECTION_DX(n), .d_Phi = d_laid + MSTMM_SECTION_PHI(n),
             .d_Om = d_laid + MSTMM_SECTION_X(n), .d_Omd = d_laid + MSTMM_SECTION_XD(n),
             .d_Omdd = d_laid + MSTMM_SECTION_XDD(n));
         mstmm_modal_segment_motion_slope(

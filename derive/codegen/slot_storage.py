@@ -61,7 +61,9 @@ LAYOUTS = {
     "modes": Layout(
         "modes", "S_rf S_rf_I A right gain A_drag S_ff work e_f etadd", "(n)", "(n)"
     ),
-    "section": Layout("laid", "Phi H push H6 x Psi xd Psid xdd Psidd dC1 dC2 S_rf", "(n)", "(n)"),
+    "section": Layout(
+        "laid", "Phi H push H6 x Psi xd Psid xdd Psidd dC1 dC2 dX S_rf", "(n)", "(n)"
+    ),
     "tangent": Layout(
         "tangent", "S B G W laws H V gain inverse y known along rates_by_speeds"
         " rates_by_coordinates unit rates Q Q_work", *_BODY_SIZES,

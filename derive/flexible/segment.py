@@ -55,6 +55,7 @@ REST_STRAINS = Quantity(vector("b", 18), "", "B1, B2, B3 at eta = 0")
 STRAIN_SHAPES = modal_columns("Bm", 18, "derivatives of B1, B2, B3 by the strain coordinates")
 FIRST_BRACKETS = modal_columns("dC1", 6, "derivatives of C1")
 SECOND_BRACKETS = modal_columns("dC2", 6, "derivatives of C2")
+FIRST_SUM = modal_columns("dX", 6, "derivatives of X")
 #: Omega, its rate, and its second rate at etadd = 0.
 POSE = Quantity(vector("Om", 6), "", "Omega: displacement, then rotation vector")
 POSE_RATE = Quantity(vector("Omd", 6), "", "rate of Omega")
@@ -68,9 +69,13 @@ def bracket(x: sp.Basic, y: sp.Basic) -> Matrix:
 
 
 def bracket_columns(x: sp.Basic, *summands: sp.Basic) -> sp.BlockMatrix:
-    """[x, y] for every column y of a sum of arrays."""
+    """[x, y] for every column y of a sum of arrays with factors."""
     x_v, x_w = tilde(part(x, 0)), tilde(part(x, 3))
-    linear, angular = (sp.MatAdd(*(y[first : first + 3, :] for y in summands)) for first in (0, 3))
+    terms = [y.as_coeff_mmul() for y in summands]
+    linear, angular = (
+        sp.MatAdd(*(factor * array[first : first + 3, :] for factor, array in terms))
+        for first in (0, 3)
+    )
     return stack(x_w * linear + x_v * angular, x_w * angular)
 
 
@@ -109,11 +114,11 @@ def _bracket_equations() -> tuple[Equation, ...]:
 
 
 def _column_equations() -> tuple[Equation, ...]:
-    """Derivatives of C1, C2 and Omega by the strain coordinates."""
+    """Derivatives of C1, C2, X and Omega by the strain coordinates."""
     shapes = [STRAIN_SHAPES.symbol[6 * k : 6 * k + 6, :] for k in range(3)]
     b1, b2 = (part(vector("B", 18), 6 * k, 6) for k in range(2))
     w, x, y = (part(vector(name, 6), 0, 6) for name in "WXY")
-    dc1, dc2 = FIRST_BRACKETS.symbol, SECOND_BRACKETS.symbol
+    dc1, dc2, dx = FIRST_BRACKETS.symbol, SECOND_BRACKETS.symbol, FIRST_SUM.symbol
     return (
         Equation("dC1", dc1, bracket_columns(b2, shapes[0]) - bracket_columns(b1, shapes[1])),
         Equation(
@@ -121,13 +126,14 @@ def _column_equations() -> tuple[Equation, ...]:
             dc2,
             (bracket_columns(b1, 2 * shapes[2], dc1) - bracket_columns(w, shapes[0])) / 60,
         ),
+        Equation("dX", dx, dc1 - 20 * shapes[0] - shapes[2]),
         Equation(
             "dOmega / deta",
             JACOBIAN.symbol,
             shapes[0]
             + shapes[2] / 12
             - bracket_columns(x, shapes[1], dc2) / 240
-            + bracket_columns(y, dc1, -20 * shapes[0], -shapes[2]) / 240,
+            + bracket_columns(y, dx) / 240,
         ),
     )
 
@@ -140,7 +146,7 @@ def segment() -> Derivation:
         "modal",
         "segment of an exact beam",
         (REST_STRAINS, STRAIN_SHAPES, ETA, ETAD),
-        (FIRST_BRACKETS, SECOND_BRACKETS, JACOBIAN, POSE, POSE_RATE, POSE_BIAS),
+        (FIRST_BRACKETS, SECOND_BRACKETS, FIRST_SUM, JACOBIAN, POSE, POSE_RATE, POSE_BIAS),
         (
             *_bracket_equations(),
             *_column_equations(),

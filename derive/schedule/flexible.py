@@ -26,7 +26,8 @@ SECTION_MOTION = Pass(
     "section_motion", "body", "Relative motion across a section of a flexible body.",
     (
         call("modal.segment", when="segment", b="section.b", Bm="section.Bm", **_STATE,
-             dC1="section.dC1", dC2="section.dC2", Phi="section.Phi", **_SEGMENT_MOTION),
+             dC1="section.dC1", dC2="section.dC2", dX="section.dX",
+             Phi="section.Phi", **_SEGMENT_MOTION),
         call("modal.segment_motion", when="segment", fails="section", R_end="section.end",
              **_SEGMENT_MOTION, **_HINGE_PORTS),
         call("modal.section", when="!segment", **_SECTION_DATA, **_STATE, Phi="section.Phi",

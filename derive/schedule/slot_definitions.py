@@ -123,6 +123,7 @@ b | 18 | strains of a segment at rest
 Bm | 18 n | strains of a segment per strain coordinate
 dC1 | 6 n | brackets of the strains per strain coordinate
 dC2 | 6 n | brackets of the strains per strain coordinate, second kind
+dX | 6 n | their sum with the strains per strain coordinate
 Om | 6 | displacement and rotation vector along a segment
 Omd | 6 | its rate
 Omdd | 6 | its bias
