@@ -16,7 +16,7 @@ from mstmm.array_validation import Array
 from mstmm.ir.hinge_properties import HingeProperties, builtin_hinges
 from mstmm.numerics.rotations import perpendicular_vector
 from mstmm.scene import Hinge, Names, Scene
-from mstmm.scene.tables.beam import DIRECTIONS, Beam, Modes, Shapes
+from mstmm.scene.tables.beam import DIRECTIONS, EXACT, Beam, Modes, Shapes
 from mstmm.scene.tables.elastic import Elastic
 from mstmm.scene.tables.hinge import Initial
 
@@ -41,7 +41,7 @@ def model_levels(scene: Scene) -> tuple[Variant, ...]:
     """Model levels from the smallest to the richest, all flexible bodies on the same level.
 
     A scene without flexible bodies has one level.  For an elastic body the number of shapes counts
-    its vibration shapes; its static shapes are always kept.
+    its vibration shapes; its static shapes are always kept.  Exact beams have no linear levels.
     """
     modes = beam_modes(scene)
     elastic_counts = [vibration_mode_count(body) for body in scene.elastic if body.model != "rigid"]
@@ -49,9 +49,10 @@ def model_levels(scene: Scene) -> tuple[Variant, ...]:
     if not max_count:
         return (Variant("rigid", scene),)
     levels = [Variant("rigid", with_model_level(scene, "rigid"))]
-    for word, level, stiffening in (
-        ("one-way", "one-way", True), ("linear", "coupled", False), ("stiffened", "coupled", True),
-    ):  # fmt: skip
+    flexible = [("stiffened", "coupled", True)]
+    if not exact_beam_names(scene):
+        flexible = [("one-way", "one-way", True), ("linear", "coupled", False), *flexible]
+    for word, level, stiffening in flexible:
         for n in range(1, max_count + 1):
             limited = with_model_level(limit_modes(scene, modes, n, stiffening), level)
             levels.append(Variant(f"{word}, {n} shape{'s' if n > 1 else ''}", limited))
@@ -63,6 +64,13 @@ def beam_modes(scene: Scene) -> dict[str, Modes]:
     coupled = with_model_level(scene, "coupled")
     bodies = BeamBodies(coupled)
     return {beam.name: bodies.modes(beam) for beam in coupled.beam if beam.model != "rigid"}
+
+
+def exact_beam_names(scene: Scene) -> frozenset[str]:
+    """Flexible beams with exact kinematics: they have no linear and no one-way model."""
+    return frozenset(
+        beam.name for beam in scene.beam if beam.kinematics == EXACT and beam.model != "rigid"
+    )
 
 
 def with_model_level(scene: Scene, level: str) -> Scene:

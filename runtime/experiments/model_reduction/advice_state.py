@@ -14,7 +14,7 @@ from mstmm.errors import MstmmError, SceneError
 from ...integrate.steppers import AUTO
 from ...result.checks.flexible import MAX_SLOPE
 from ..error_measure import PositionMeasure
-from ..model_levels import with_model_level
+from ..model_levels import exact_beam_names, with_model_level
 from ..runs import Budget, Runs
 from ..trial import Setting
 from ..tuning import REDUCTION as TUNING
@@ -79,7 +79,9 @@ class AdviceState:
     skipped: list[str] = field(default_factory=list)
 
     def run_one_way(self, scene: Scene) -> Result | None:
-        """Run with one-way coupling of all flexible bodies; None if it fails."""
+        """Run with one-way coupling of all flexible bodies; None if it fails or does not exist."""
+        if exact_beam_names(scene):
+            return None
         self.report("one-way coupling, for error estimates")
         times = np.linspace(0.0, self.request.t_end, self.request.samples)
         runs = Runs(self.request.t_end, times, self.budget)

@@ -19,7 +19,13 @@ from ...result.checks.flexible import MAX_LOAD_RATIO
 from ...result.flexible.model_range import ModelRange
 from ...result.one_way.response import rigidified_bodies
 from ...result.one_way.result import OneWayResult
-from ..model_levels import beam_modes, vibration_mode_count, with_mode_counts, with_tables
+from ..model_levels import (
+    beam_modes,
+    exact_beam_names,
+    vibration_mode_count,
+    with_mode_counts,
+    with_tables,
+)
 from ..tuning import REDUCTION as TUNING
 
 if TYPE_CHECKING:
@@ -92,12 +98,17 @@ class Bodies:
     def __init__(self, richest: Scene) -> None:
         self.scene = richest
         self._modes = beam_modes(richest)
+        self._exact = exact_beam_names(richest)
         self.richest: dict[str, BodyModel] = {}
         bodies: tuple[Beam | Elastic, ...] = (*richest.beam, *richest.elastic)
         for body in bodies:
             if body.model != RIGID:
                 level = STIFFENED if body.stiffening else LINEAR
                 self.richest[body.name] = BodyModel(level, self._shape_counts(body))
+
+    def has_linear_model(self, name: str) -> bool:
+        """Whether a body has linear and one-way models; exact beams have none."""
+        return name not in self._exact
 
     def _shape_counts(self, body: Beam | Elastic) -> tuple[tuple[str, int], ...]:
         if isinstance(body, Elastic):

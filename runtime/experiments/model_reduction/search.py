@@ -117,7 +117,8 @@ class ModelSearch:
         richest = self.bodies.richest[name]
         yield BodyModel(RIGID)
         for shapes in self._shape_counts_upward(name):
-            yield BodyModel(LINEAR, shapes)
+            if self.bodies.has_linear_model(name):
+                yield BodyModel(LINEAR, shapes)
             if richest.level == STIFFENED:
                 yield BodyModel(STIFFENED, shapes)
 
@@ -207,14 +208,16 @@ class ModelSearch:
         yield BodyModel(RIGID)
         if choice.level == ONE_WAY:
             return
-        # All shapes: their oscillators are computed after the run, at negligible cost.
-        yield BodyModel(ONE_WAY, self.bodies.richest[name].shapes)
+        has_linear = self.bodies.has_linear_model(name)
+        if has_linear:
+            # All shapes: their oscillators are computed after the run, at negligible cost.
+            yield BodyModel(ONE_WAY, self.bodies.richest[name].shapes)
         for direction, n in reversed(choice.shapes):
             for count in sorted({0, n // 2, max(n - 1, 0)} - {n}):
                 smaller = choice.with_count(direction, count)
                 if smaller.total or direction == VIBRATION:
                     yield smaller
-        if choice.level == STIFFENED:
+        if choice.level == STIFFENED and has_linear:
             yield BodyModel(LINEAR, choice.shapes)
 
     def _has_time(self) -> bool:

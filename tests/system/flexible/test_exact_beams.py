@@ -15,6 +15,7 @@ from scipy.special import ellipeinc, ellipk, ellipkinc
 
 import mstmm
 from mstmm.errors import SceneError
+from mstmm.runtime.experiments.model_levels import model_levels
 from tests.reference.flexible.inextensible import Beam, spectral
 from tests.reference.flexible.inextensible import spin_up as turning
 from tests.support.models import compile_scene, looped_model
@@ -310,3 +311,14 @@ def test_refused(keys: Scene, part: str) -> None:
     data = scene(rod, hinge("pin", "pin", "ground", "rod"))
     with pytest.raises(SceneError, match=re.escape(part)):
         mstmm.Scene(**data)
+
+
+def test_advice_tries_no_linear_model_of_an_exact_beam() -> None:
+    """It would be the same beam under another name, or a scene that is refused."""
+    data = scene(exact("rod", modes={"y": 2}), hinge("pin", "pin", "ground", "rod"), gravity=DOWN)
+    rod = mstmm.Scene(**data)
+    names = [level.name for level in model_levels(rod)]
+    assert names == ["rigid", "stiffened, 1 shape", "stiffened, 2 shapes"]
+    advice = mstmm.advise(rod, 0.2, error=1e-3, rounds=0, samples=5, budget=600)
+    tried = " ".join(trial.name for trial in advice.tried_models)
+    assert "rigid" in tried and "linear" not in tried and "one-way" not in tried
