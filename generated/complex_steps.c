@@ -6735,8 +6735,8 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
             .K_x = port + MSTMM_PORT_K(n),
-            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
-            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .K = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
         mstmm_complex_tangent_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -6744,8 +6744,8 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .w = block + MSTMM_BLOCK_HINGE_W, .H = laid + MSTMM_SECTION_H(n),
             .B = port + MSTMM_PORT_B(n), .K_o = port + MSTMM_PORT_OUTBOARD_K(n),
             .Z_o = port + MSTMM_PORT_OUTBOARD_Z_Z(n),
-            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
-            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .K = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     if (body->section && !body->section->inward && body->placed && !(body->section && body->section->Bm)) {
@@ -6775,14 +6775,14 @@ static int mstmm_complex_at_tangent_elimination(mstmm_complex_state *state, int 
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
-            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
-            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .K = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_p = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
         mstmm_complex_tangent_placed_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .B_p = port + MSTMM_PORT_PLACE_B(n), .Z_o = port + MSTMM_PORT_OUTBOARD_Z_P(n),
-            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
-            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .Z_p = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .Z_z = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     return 0;

@@ -990,7 +990,7 @@ int mstmm_at_condense(mstmm_state *state, int index)
         mstmm_modal_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .S_rf_I = laid + MSTMM_SECTION_PUSH(n),
-            .S_rf = state->workspace + (section->before ? section->before->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
+            .S_rf = state->workspace + (section->previous ? section->previous->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
     }
     if ((body->generic || state->required)) {
         real *block = state->workspace + body->block;
@@ -1459,7 +1459,7 @@ static int mstmm_at_condense_with_rows(mstmm_state *state, int index)
         mstmm_modal_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .S_rf_I = laid + MSTMM_SECTION_PUSH(n),
-            .S_rf = state->workspace + (section->before ? section->before->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
+            .S_rf = state->workspace + (section->previous ? section->previous->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
     }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
@@ -2430,7 +2430,7 @@ static int mstmm_at_factorise(mstmm_state *state, int index)
         mstmm_modal_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .S_rf_I = laid + MSTMM_SECTION_PUSH(n),
-            .S_rf = state->workspace + (section->before ? section->before->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
+            .S_rf = state->workspace + (section->previous ? section->previous->place + MSTMM_SECTION_S_RF(n) : modal->place + MSTMM_MODES_S_RF(n)));
     }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)
@@ -4362,8 +4362,8 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .G = port + MSTMM_PORT_G(n), .W = port + MSTMM_PORT_W(n),
             .S = state->tangents->numbers + mstmm_carried_at(state->tangents, body), .T = T,
             .K_x = port + MSTMM_PORT_K(n),
-            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
-            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .K = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
         mstmm_tangent_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
@@ -4371,8 +4371,8 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .w = block + MSTMM_BLOCK_HINGE_W, .H = laid + MSTMM_SECTION_H(n),
             .B = port + MSTMM_PORT_B(n), .K_o = port + MSTMM_PORT_OUTBOARD_K(n),
             .Z_o = port + MSTMM_PORT_OUTBOARD_Z_Z(n),
-            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
-            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .K = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_z = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     if (body->section && !body->section->inward && body->placed && !(body->section && body->section->Bm)) {
@@ -4402,14 +4402,14 @@ static int mstmm_at_tangent_condense(mstmm_state *state, int index)
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .H = laid + MSTMM_SECTION_H(n), .B_p = port + MSTMM_PORT_PLACE_B(n),
             .S_p = place + MSTMM_PLACE_S(body->nu, body->nq), .T_p = T_p,
-            .K = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
-            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .K = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_K(n)),
+            .Z_p = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
         mstmm_tangent_placed_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
             .B_p = port + MSTMM_PORT_PLACE_B(n), .Z_o = port + MSTMM_PORT_OUTBOARD_Z_P(n),
-            .Z_p = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
-            .Z_z = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
+            .Z_p = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_P(n) : modal->tangent + MSTMM_BEND_PLACE_Z(n)),
+            .Z_z = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_Z_Z(n) : modal->tangent + MSTMM_BEND_Z_Z(n)),
             .Z_x = bend + MSTMM_BEND_Z_X(n));
     }
     return 0;
@@ -5546,7 +5546,7 @@ static int mstmm_at_laws_factorise(mstmm_state *state, int index)
         mstmm_modal_carry_columns(
             .n = modal->n, .Rc = block + MSTMM_BLOCK_HINGE_R, .r = block + MSTMM_BLOCK_HINGE_D,
             .S_rf_I = port + MSTMM_PORT_K(n),
-            .S_rf = state->tangents->numbers + (section->before ? section->before->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_V(n)));
+            .S_rf = state->tangents->numbers + (section->previous ? section->previous->tangent + MSTMM_PORT_OUTBOARD_K(n) : modal->tangent + MSTMM_BEND_V(n)));
     }
     for (int k = 0; k < speeds; k++)
         for (int row = 0; row < 6; row++)

@@ -109,11 +109,11 @@ _RECORDS = {
 
 
 def _station_text(numbers: str, section_slot: str, modal_slot: str) -> str:
-    """C expression of columns at the station before a segment; of the modes at the first one."""
+    """C expression of columns at the previous station; of the modes for the first segment."""
     offset = "tangent" if "tangents" in numbers else "place"
     return (
-        f"{numbers} + (section->before"
-        f" ? section->before->{offset} + {_macro_name(section_slot)}(n)"
+        f"{numbers} + (section->previous"
+        f" ? section->previous->{offset} + {_macro_name(section_slot)}(n)"
         f" : modal->{offset} + {_macro_name(modal_slot)}(n))"
     )
 

@@ -33,7 +33,7 @@ MODAL_SUBSPACE = modal_columns("H", 6, "motion subspace of the modes, rows v the
 WORK = modal_columns("U", 6, "S H")
 MODAL_ACCELERATIONS = modal_vector("etadd", "modal accelerations")
 MODAL_EFFORTS = modal_vector("tau", "efforts on the modes")
-RELATED_COLUMNS = modal_columns("S_rf_I", 6, "S_rf + S H")
+REBASED_COLUMNS = modal_columns("S_rf_I", 6, "S_rf + S H")
 MODAL_GAIN = Quantity(sp.MatrixSymbol("Gg", N, 7), "", "etadd = g - G a: columns of G, then -g")
 
 
@@ -52,7 +52,7 @@ def assemble_port() -> Derivation:
         (WORK, _accumulating(S_RF), _accumulating(S_FF), _accumulating(E_F)),
         (
             Equation("U = S H", WORK.symbol, S.symbol * MODAL_SUBSPACE.symbol),
-            Equation("X^T U", S_RF.symbol, _carried(force, moment)),
+            Equation("X^T U", S_RF.symbol, _columns_at_frame(force, moment)),
             Equation("H^T U", S_FF.symbol, MODAL_SUBSPACE.symbol.T * WORK.symbol),
             Equation("H^T e", E_F.symbol, MODAL_SUBSPACE.symbol.T * E.symbol),
         ),
@@ -62,8 +62,7 @@ def assemble_port() -> Derivation:
 
 def rebase() -> Derivation:
     """Modal rows and columns for the frame acceleration a_I + H etadd."""
-    rebased = RELATED_COLUMNS
-    coupling = S_RF.symbol
+    rebased, coupling = REBASED_COLUMNS, S_RF.symbol
     return Derivation(
         "modal",
         "frame relative to the supported section",
@@ -82,19 +81,19 @@ def rebase() -> Derivation:
 
 
 def carry_columns() -> Derivation:
-    """Frame rows of the modes at a station, carried to the station before it: X^T S_rf."""
-    force, moment = RELATED_COLUMNS.symbol[:3, :], RELATED_COLUMNS.symbol[3:, :]
+    """Frame rows of the modes at a station, carried to the previous station: X^T S_rf."""
+    force, moment = REBASED_COLUMNS.symbol[:3, :], REBASED_COLUMNS.symbol[3:, :]
     return Derivation(
         "modal",
         "columns of the modes carried along a segment",
-        (R, SHIFT, RELATED_COLUMNS),
+        (R, SHIFT, REBASED_COLUMNS),
         (_accumulating(S_RF),),
-        (Equation("X^T S_rf", S_RF.symbol, _carried(force, moment)),),
+        (Equation("X^T S_rf", S_RF.symbol, _columns_at_frame(force, moment)),),
         sources=SOURCES,
     )
 
 
-def _carried(force: sp.Basic, moment: sp.Basic) -> sp.BlockMatrix:
+def _columns_at_frame(force: sp.Basic, moment: sp.Basic) -> sp.BlockMatrix:
     """Columns of forces and moments at a port, in the axes and about the origin of the frame."""
     lever = tilde(part(SHIFT.symbol, 0))
     rotated_force = R.symbol * force

@@ -121,9 +121,9 @@ H | 6 n | motion subspace of the modes
 push | 6 n | S H of the bodies outboard of the section
 b | 18 | strains of a segment at rest
 Bm | 18 n | strains of a segment per strain coordinate
-dC1 | 6 n | brackets of the strains per strain coordinate
-dC2 | 6 n | brackets of the strains per strain coordinate, second kind
-dX | 6 n | their sum with the strains per strain coordinate
+dC1 | 6 n | derivatives of the term C1 of the Magnus series
+dC2 | 6 n | derivatives of its term C2
+dX | 6 n | derivatives of its term X
 Om | 6 | displacement and rotation vector along a segment
 Omd | 6 | its rate
 Omdd | 6 | its bias

@@ -32,8 +32,8 @@ def tip(angle: float) -> Array:
     return np.asarray(model.positions(model.equilibrium(), "beam.tip"))
 
 
-def rotated(quaternion: Array, vectors: Array) -> Array:
-    """Vectors (3, m) turned by unit quaternions (4, m)."""
+def rotate(quaternion: Array, vectors: Array) -> Array:
+    """Vectors (3, m) rotated by unit quaternions (4, m)."""
     w, u = quaternion[0], quaternion[1:]
     cross = np.cross(u, vectors, axis=0)
     return vectors + 2 * (w * cross + np.cross(u, cross, axis=0))
@@ -46,11 +46,14 @@ def rod_tip(angle: float) -> Array:
     def slopes(_: Array, y: Array) -> Array:
         quaternion, moment = y[3:7], y[7:]
         back = np.vstack([quaternion[:1], -quaternion[1:]])
-        curvature = rotated(back, moment) / STIFFNESS[:, None]
-        axis = rotated(quaternion, np.tile([[1.0], [0.0], [0.0]], y.shape[1]))
+        curvature = rotate(back, moment) / STIFFNESS[:, None]
+        axis = rotate(quaternion, np.tile([[1.0], [0.0], [0.0]], y.shape[1]))
         w, u = quaternion[0], quaternion[1:]
-        turned = [-np.sum(u * curvature, axis=0), *(w * curvature + np.cross(u, curvature, axis=0))]
-        return np.vstack([axis, np.array(turned) / 2, -np.cross(axis, force[:, None], axis=0)])
+        product = [
+            -np.sum(u * curvature, axis=0),
+            *(w * curvature + np.cross(u, curvature, axis=0)),
+        ]
+        return np.vstack([axis, np.array(product) / 2, -np.cross(axis, force[:, None], axis=0)])
 
     def conditions(root: Array, end: Array) -> Array:
         clamped = root[:7] - np.array([0.0, 0, 0, 1, 0, 0, 0])

@@ -149,8 +149,8 @@ _TEXTS: dict[int, str | Callable[[_Failure], str]] = {
         'requested accuracy (errors grow geometrically along the chain); use sweep = "riccati"'
     ),
     FailureCode.SECTION: lambda failure: (
-        '"{0.section}" {0.at}: the segment to it turns by more than 1.5 rad; use more modes, which '
-        "shortens the segments, or split the beam"
+        '"{0.section}" {0.at}: the segment to it rotates by more than 1.5 rad; use more modes, '
+        "which shortens the segments, or split the beam"
         if failure.is_segment
         else '"{0.section}" {0.at}: a section rotates by more than 1.5 rad relative to its '
         'floating frame, the limit of small deflections; use kinematics = "exact" for a beam, or '

@@ -67,8 +67,8 @@ class Station:
 
     The segment starts at the node with the index `previous`; -1 is the supported section, whose
     axes are those of the flexible body.  `rest` and `shapes` are B1, B2, B3 of
-    `derive.flexible.segment` at eta = 0 and per strain coordinate.  The rigid slice has `mass`,
-    mass centre `center` and `inertia` about that centre, in the axes of the section.
+    `derive.flexible.segment` at eta = 0 and per strain coordinate.  The rigid slice of `length` has
+    `mass`, mass centre `center` and `inertia` about that centre, in the axes of the section.
 
     Attributes:
         x: section, m from the root.
@@ -80,6 +80,7 @@ class Station:
     previous: int
     rest: Array  #: (18,)
     shapes: Array  #: (18, n)
+    length: float = 0.0  #: m, of the slice
     mass: float = 0.0  #: kg
     center: Array = field(default_factory=lambda: np.zeros(3))  #: m
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))  #: kg m^2

@@ -11,7 +11,7 @@ from mstmm.array_validation import Array
 from .beam.boundary_conditions import BoundaryConditions
 from .beam.section_ports import BeamShapes
 from .beam.shape_fields import ROW
-from .beam.shear_elements import condensed
+from .beam.shear_elements import condense_statically
 from .beam.static_shapes import bending_matrices, element_nodes, nearest_node, rod_matrices
 
 #: Largest relative error (too high) of a natural frequency whose mode counts as resolved.
@@ -74,7 +74,7 @@ def _resolution(shapes: BeamShapes, conditions: BoundaryConditions, direction: s
     )
     bends = direction in ("y", "z")
     if bends:
-        k, m = condensed(*bending_matrices(shapes.data, direction, nodes), 2 * len(nodes))
+        k, m = condense_statically(*bending_matrices(shapes.data, direction, nodes), 2 * len(nodes))
     else:
         nodes, k, m = rod_matrices(shapes.data, direction, nodes)
     columns = _nodal_columns(shapes, indices, direction, nodes)

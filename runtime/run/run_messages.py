@@ -17,7 +17,8 @@ from ..engine.failure_messages import (
     find_nonfinite_expression,
 )
 from ..engine.looped_engine import LoopedEngine
-from ..flexible.mass_definiteness import Supports, is_definite_at
+from ..flexible.mass_definiteness import is_definite_at
+from ..flexible.supports import Supports
 from ..integrate.c_loop import Integrator, Status
 from ..integrate.steppers import get
 from ..packing.packed_scene import PackedScene

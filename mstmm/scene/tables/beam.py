@@ -532,8 +532,8 @@ def _shape_problems(beam: Beam) -> Iterator[Problem]:
     if (shapes.y or shapes.z) and any(p.shear_stiffness is not None for p in beam.sections):
         yield (
             ("shapes",),
-            "expected no bending shapes with shear_stiffness, as sections then rotate apart from "
-            "the slope; leave out shapes or shear_stiffness",
+            "expected no bending shapes with shear_stiffness: sections then rotate by other angles "
+            "than the slope; leave out shapes or shear_stiffness",
         )
     if beam.modes is not None and beam.modes != shapes.modes:
         pairs = zip(DIRECTIONS, shapes.modes.counts, strict=True)

@@ -39,7 +39,7 @@ typedef struct mstmm_section {
     const real *r, *phi, *theta, *end;
     const real *g_x, *g_y, *g_z, *h_x, *h_y, *h_z; /* of second order */
     const real *b, *Bm; /* see derive/flexible/segment.py; NULL: no segment */
-    const struct mstmm_section *before; /* that of the station before; NULL: the first segment */
+    const struct mstmm_section *previous; /* of the previous station; NULL: first segment */
     int64_t place; /* of its numbers in the workspace, see mstmm_section_numbers */
     int64_t tangent; /* of its numbers in those of the tangent */
 } mstmm_section;

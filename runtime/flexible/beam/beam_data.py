@@ -55,8 +55,8 @@ class BeamData:
         return len(self.breaks) == 2
 
     @property
-    def sheared(self) -> bool:
-        """Whether the sections shear."""
+    def has_shear(self) -> bool:
+        """Whether the sections have a shear stiffness."""
         return bool(self.stiffness[4:].any())
 
     @property
@@ -79,8 +79,8 @@ class BeamData:
         )
 
 
-#: Stiffness of a beam that has none in both planes.
-_NONE = (0.0, 0.0)
+#: Stiffness in the two planes of a beam without.
+_NO_STIFFNESS = (0.0, 0.0)
 
 
 def beam_data(beam: Beam) -> BeamData:
@@ -91,7 +91,10 @@ def beam_data(beam: Beam) -> BeamData:
         polar = section.polar_inertia_per_length or 0.0
         about_y, about_z = section.rotary_inertia or (polar / 2, polar / 2)
         inertia.append((section.mass_per_length or 0.0, about_z, about_y))
-        bending, shear = section.bending_stiffness or _NONE, section.shear_stiffness or _NONE
+        bending, shear = (
+            section.bending_stiffness or _NO_STIFFNESS,
+            section.shear_stiffness or _NO_STIFFNESS,
+        )
         stiffness.append(
             (section.axial_stiffness or 0.0, section.torsional_stiffness or 0.0, *bending, *shear)
         )

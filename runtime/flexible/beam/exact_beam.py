@@ -2,10 +2,10 @@
 
 The mass sits in rigid slices at Gauss points.  The default shapes are *strain modes*: strains of
 the lowest vibrations about the shape at rest, with the motions that the inboard hinge permits and
-with the inertia of what hangs on the other ends.  They are combinations of Legendre polynomials, so
-that any stiffness along the beam is treated alike.  Legendre polynomials themselves represent
-static end loads and moments better; `basis = "auto"` takes them where a load, spring or closed loop
-acts on an end.
+with the inertia of the bodies outboard of the other ends.  They are combinations of Legendre
+polynomials, so that any stiffness along the beam is treated alike.  Legendre polynomials themselves
+represent static end loads and moments better; `basis = "auto"` selects them where a load, spring or
+closed loop acts on an end.
 """
 
 from __future__ import annotations
@@ -19,24 +19,26 @@ from scipy.linalg import block_diag, eigh
 
 from mstmm.array_validation import Array
 
-from ..mass_definiteness import Support
 from ..modal_body import ModalBody
 from ..modal_parts import ModalPort, Moments, Station
+from ..supports import Support, spatial_inertia
 from .beam_data import BeamData
 from .exact_sections import ExactSections
-from .strain_shapes import STRAIN_ROWS, Chain, StrainShapes, gauss_sections, legendre_shapes
+from .segment_chain import SegmentChain, gauss_sections, twist_at
+from .static_shapes import direction_stiffness
+from .strain_shapes import STRAIN_ROWS, StrainShapes, legendre_shapes
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
 
 LEGENDRE, STRAIN_MODES = "legendre", "modes"
-#: Polynomials beyond the number of modes, and least number, from which strain modes are formed.
-_MORE_POLYNOMIALS, _LEAST_POLYNOMIALS = 7, 10
+#: Polynomials beyond the number of modes, and smallest number, from which strain modes are formed.
+_EXTRA_POLYNOMIALS, _MIN_POLYNOMIALS = 7, 10
 #: Stations beyond the number of shapes.  Two avoid phantom frequencies; with five the poses of
 #: Legendre strains are accurate to 1e-8 at slopes of 1.5, and modes have errors of 1e-4.
-_MORE_STATIONS = 5
+_EXTRA_STATIONS = 5
 #: Share of the largest inertia below which a motion counts as massless.
-_NO_INERTIA = 1e-13
+_MASSLESS_RATIO = 1e-13
 #: Points at which shapes are scaled.
 _SCALE_POINTS = 201
 
@@ -51,7 +53,7 @@ class ExactBeamSetting:
         basis: LEGENDRE or STRAIN_MODES.
         support: motion of the inboard end, axes of that end.
         inboard_end: its name.
-        hanging: inertia (6, 6) of what hangs on an end, by its name; axes and point of the end.
+        outboard_inertia: end -> inertia (6, 6) of the bodies outboard of it, axes and point of it.
         spans: load per length -> part of the beam on which it acts, m.
     """
 
@@ -60,13 +62,18 @@ class ExactBeamSetting:
     basis: str
     support: Support
     inboard_end: str
-    hanging: Mapping[str, Array]
+    outboard_inertia: Mapping[str, Array]
     spans: Mapping[str, tuple[float, float]]
 
     @property
     def start(self) -> float:
         """Supported section, m."""
         return self.data.ends[self.inboard_end][0]
+
+    @property
+    def station_count(self) -> int:
+        """Number of stations with mass, about."""
+        return max(self.counts.values()) + _EXTRA_STATIONS
 
     @property
     def ends(self) -> list[str]:
@@ -81,19 +88,17 @@ def exact_beam_body(beam: Beam, setting: ExactBeamSetting) -> ModalBody:
     D = int B^T diag(tau) C B.
     """
     shapes = _shapes(setting)
-    most = max(setting.counts.values())
-    chain, lengths = _chain(setting, shapes, most + _MORE_STATIONS, setting.spans)
-    stations = _stations(setting, chain, lengths)
+    chain, stations = _stations(setting, shapes, setting.station_count, setting.spans)
     moments = _moments(stations, chain)
     stiffness, viscosity = (
-        _stiffness(setting.data, shapes, most + _MORE_STATIONS, np.array(factors))
+        _stiffness(setting.data, shapes, setting.station_count, np.array(factors))
         for factors in ((1.0,), beam.damping.strain)
     )
     return ModalBody(
         **vars(moments), name=beam.name, modes=shapes.names, K=stiffness, D=viscosity,
         ports=_ports(setting, chain), stations=stations,
         exact=ExactSections(setting.data, chain),
-        line_loads=_line_loads(setting, stations, lengths), frame="tangent",
+        line_loads=_line_loads(setting, stations), frame="tangent",
         notes=_notes(setting),
     )  # fmt: skip
 
@@ -120,37 +125,32 @@ def _shapes(setting: ExactBeamSetting) -> StrainShapes:
 
 def _strain_modes(setting: ExactBeamSetting, direction: str, count: int) -> Array:
     """Coefficients (polynomials, count) of the strains of the lowest vibrations in a direction."""
-    degree = max(count + _MORE_POLYNOMIALS, _LEAST_POLYNOMIALS)
+    degree = max(count + _EXTRA_POLYNOMIALS, _MIN_POLYNOMIALS)
     shapes = legendre_shapes(setting.data, {direction: degree})
-    chain, lengths = _chain(setting, shapes, degree + _MORE_STATIONS, {})
-    stations = _stations(setting, chain, lengths)
-    rotations, positions, twists = chain.at_rest
+    chain, stations = _stations(setting, shapes, degree + _EXTRA_STATIONS, {})
     supported = (
         block_diag(*[setting.data.ends[setting.inboard_end][1]] * 2) @ setting.support.motion
     )
     m = setting.support.speeds
     mass = block_diag(setting.support.inertia, np.zeros((degree, degree)))
-    for station, r, d, twist in zip(stations, rotations, positions, twists, strict=True):
-        carried = np.concatenate(
-            [r.T @ (supported[:3] + np.cross(supported[3:], d, axis=0)), r.T @ supported[3:]]
-        )
-        motion = np.hstack([carried, twist])
+    for station, rotation, position, twist in zip(stations, *chain.at_rest, strict=True):
+        motion = np.hstack([twist_at(rotation, position, supported), twist])
         mass += motion.T @ _spatial_inertia(setting, station) @ motion
-    stiffness = _stiffness(setting.data, shapes, degree + _MORE_STATIONS, np.ones(1))
+    stiffness = _stiffness(setting.data, shapes, degree + _EXTRA_STATIONS, np.ones(1))
     rigid = mass[:m, :m]
-    free = np.linalg.pinv(rigid, rcond=_NO_INERTIA, hermitian=True) @ mass[:m, m:]
+    free = np.linalg.pinv(rigid, rcond=_MASSLESS_RATIO, hermitian=True) @ mass[:m, m:]
     condensed = mass[m:, m:] - mass[m:, :m] @ free
     # Flexibilities are bounded, whereas a condensed mass may be singular.
     _, vectors = eigh(condensed, stiffness)
-    return _scaled(setting.data, shapes, vectors[:, ::-1][:, :count])
+    return _with_unit_integral(setting.data, shapes, vectors[:, ::-1][:, :count])
 
 
-def _scaled(data: BeamData, shapes: StrainShapes, vectors: Array) -> Array:
+def _with_unit_integral(data: BeamData, shapes: StrainShapes, vectors: Array) -> Array:
     """Columns of one direction whose integral along the beam (rad, m) is 1 where it is largest."""
     x = np.linspace(0.0, data.length, _SCALE_POINTS)
     (direction,) = shapes.coefficients
     row, sign = STRAIN_ROWS[direction]
-    integrals = np.cumsum(sign * shapes.at(x)[:, row] @ vectors, axis=0) * (x[1] - x[0])
+    integrals = np.cumsum(sign * shapes.values_at(x)[:, row] @ vectors, axis=0) * (x[1] - x[0])
     largest = integrals[np.abs(integrals).argmax(axis=0), np.arange(vectors.shape[1])]
     return np.asarray(vectors / largest)
 
@@ -158,13 +158,13 @@ def _scaled(data: BeamData, shapes: StrainShapes, vectors: Array) -> Array:
 # --- mass and stiffness ---------------------------------------------------------------------------
 
 
-def _chain(
+def _stations(
     setting: ExactBeamSetting,
     shapes: StrainShapes,
     count: int,
     spans: Mapping[str, tuple[float, float]],
-) -> tuple[Chain, dict[float, float]]:
-    """Chain of stations and ends; station (m) -> length that its slice stands for, m.
+) -> tuple[SegmentChain, tuple[Station, ...]]:
+    """Chain of about `count` stations with mass, and its stations and ends in their order.
 
     Further stations, without mass, are where the section changes, so that strains are smooth along
     each segment, and where loads act on a part of the beam.
@@ -173,50 +173,34 @@ def _chain(
     x, weights = gauss_sections(data.breaks, count)
     lengths = {section: 0.0 for section in data.breaks[1:-1] if section != setting.start}
     lengths |= dict(zip(x.tolist(), weights.tolist(), strict=True))
-    for begin, end in spans.values():
-        if (begin, end) != (0.0, data.length):
-            sections = gauss_sections((begin, end), count)[0].tolist()
+    for span in spans.values():
+        if span != (0.0, data.length):
+            sections = gauss_sections(span, count)[0].tolist()
             lengths |= {section: lengths.get(section, 0.0) for section in sections}
     ends = np.array([data.ends[name][0] for name in setting.ends])
-    return Chain(shapes, setting.start, np.array(list(lengths)), ends), lengths
-
-
-def _stations(
-    setting: ExactBeamSetting, chain: Chain, lengths: Mapping[float, float]
-) -> tuple[Station, ...]:
-    """Stations and ends in the order of the chain."""
-    stations = []
-    ends = iter(setting.ends)
-    for k, (x, before) in enumerate(chain.links):
-        segment = Station(x, before, chain.rest[k], chain.slopes[k])
-        if k >= len(lengths):
-            name = next(ends)
-            stations.append(replace(segment, end=name, rotation=setting.data.ends[name][1]))
-            continue
-        section = setting.data.sections(np.array([x]))
-        mass = float(section.mass_per_length[0]) * lengths[x]
-        inertia = np.diag(section.rho_I[:, 0]) * lengths[x]
-        stations.append(replace(segment, mass=mass, inertia=inertia))
-    return tuple(stations)
+    chain = SegmentChain(shapes, setting.start, np.array(list(lengths)), ends)
+    stations = [
+        Station(x, previous, chain.rest[k], chain.slopes[k])
+        for k, (x, previous) in enumerate(chain.links)
+    ]
+    for k, station in enumerate(stations[: len(lengths)]):
+        section, length = data.sections(np.array([station.x])), lengths[station.x]
+        stations[k] = replace(
+            station, length=length, mass=float(section.mass_per_length[0]) * length,
+            inertia=np.diag(section.rho_I[:, 0]) * length,
+        )  # fmt: skip
+    for k, name in enumerate(setting.ends, len(lengths)):
+        stations[k] = replace(stations[k], end=name, rotation=data.ends[name][1])
+    return chain, tuple(stations)
 
 
 def _spatial_inertia(setting: ExactBeamSetting, station: Station) -> Array:
-    """Spatial inertia (6, 6) of a slice, or of what hangs on an end, in the axes of the section."""
+    """Spatial inertia (6, 6) of a slice, or outboard of an end, in the axes of the section."""
     if station.end:
         axes = block_diag(station.rotation, station.rotation)
-        return np.asarray(axes @ setting.hanging.get(station.end, np.zeros((6, 6))) @ axes.T)
-    return slice_inertia(station)
-
-
-def slice_inertia(station: Station) -> Array:
-    """Spatial inertia (6, 6) of the slice of a station about its section, v before w."""
-    x, y, z = station.center
-    lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    inertia = np.zeros((6, 6))
-    inertia[:3, :3] = station.mass * np.eye(3)
-    inertia[:3, 3:], inertia[3:, :3] = -station.mass * lever, station.mass * lever
-    inertia[3:, 3:] = station.inertia - station.mass * lever @ lever
-    return inertia
+        inertia = setting.outboard_inertia.get(station.end, np.zeros((6, 6)))
+        return np.asarray(axes @ inertia @ axes.T)
+    return spatial_inertia(station.mass, station.center, station.inertia)
 
 
 def _stiffness(data: BeamData, shapes: StrainShapes, count: int, factors: Array) -> Array:
@@ -225,18 +209,16 @@ def _stiffness(data: BeamData, shapes: StrainShapes, count: int, factors: Array)
     `factors` are one, or six by strain.
     """
     x, weights = gauss_sections(data.breaks, max(count, 2) * (len(data.breaks) - 1))
-    section = data.sections(x)
     stiffness = np.zeros((len(x), 6))
-    by_direction = {"y": section.EI_z, "z": section.EI_y, "twist": section.GI_t,
-                    "axial": section.EA}  # fmt: skip
-    for direction, values in by_direction.items():
-        stiffness[:, STRAIN_ROWS[direction][0]] = values
+    for direction in shapes.coefficients:
+        pieces = direction_stiffness(data, direction)
+        stiffness[:, STRAIN_ROWS[direction][0]] = pieces[data.piece(x)]
     stiffness *= factors
-    strains = shapes.at(x)
+    strains = shapes.values_at(x)
     return np.asarray(np.einsum("m,mi,mik,mil->kl", weights, stiffness, strains, strains))
 
 
-def _moments(stations: tuple[Station, ...], chain: Chain) -> Moments:
+def _moments(stations: tuple[Station, ...], chain: SegmentChain) -> Moments:
     """Moments of first order at rest, about the supported section."""
     n = chain.shapes.n
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
@@ -265,31 +247,30 @@ def _moments(stations: tuple[Station, ...], chain: Chain) -> Moments:
 # --- ends and loads -------------------------------------------------------------------------------
 
 
-def _ports(setting: ExactBeamSetting, chain: Chain) -> dict[str, ModalPort]:
+def _ports(setting: ExactBeamSetting, chain: SegmentChain) -> dict[str, ModalPort]:
     """Ends with the linear fields of the beam at rest, axes of the supported section."""
     n, ports = chain.shapes.n, {}
     zeros = np.zeros((3, n))
     for name, (x, rotation) in setting.data.ends.items():
         r, d, phi, theta = np.eye(3), np.zeros(3), zeros, zeros
         if x != setting.start:
-            place = len(chain.x) + setting.ends.index(name)
-            r, d, twist = (values[place] for values in chain.at_rest)
+            index = len(chain.x) + setting.ends.index(name)
+            r, d, twist = (values[index] for values in chain.at_rest)
             phi, theta = r @ twist[:3], r @ twist[3:]
         ports[name] = ModalPort(d, r @ rotation, phi, theta, np.zeros((6, n, n)))
     return ports
 
 
 def _line_loads(
-    setting: ExactBeamSetting, stations: tuple[Station, ...], lengths: Mapping[float, float]
+    setting: ExactBeamSetting, stations: tuple[Station, ...]
 ) -> dict[str, tuple[tuple[int, float], ...]]:
-    """Stations and lengths (m) on which each load per length acts."""
+    """Indices of stations and lengths (m) on which each load per length acts."""
     loads = {}
-    most = max(setting.counts.values()) + _MORE_STATIONS
-    places = {station.x: k for k, station in enumerate(stations) if not station.end}
-    for name, (begin, end) in setting.spans.items():
-        parts: Mapping[float, float] = lengths
-        if (begin, end) != (0.0, setting.data.length):
-            x, weights = gauss_sections((begin, end), most)
-            parts = dict(zip(x.tolist(), weights.tolist(), strict=True))
-        loads[name] = tuple((places[x], length) for x, length in parts.items() if length)
+    indices = {station.x: k for k, station in enumerate(stations) if not station.end}
+    for name, span in setting.spans.items():
+        lengths = {x: stations[k].length for x, k in indices.items()}
+        if span != (0.0, setting.data.length):
+            x, weights = gauss_sections(span, setting.station_count)
+            lengths = dict(zip(x.tolist(), weights.tolist(), strict=True))
+        loads[name] = tuple((indices[x], length) for x, length in lengths.items() if length)
     return loads

@@ -76,7 +76,7 @@ def _weighted_field(
     With shear also the rotation of the sections: fast shapes of two kinds differ in it alone.
     """
     values = np.sqrt(mass) * (shape(x) - a - b * x)
-    if not (data.sheared and inertia.any()):
+    if not (data.has_shear and inertia.any()):
         return np.asarray(values)
     return np.append(values, np.sqrt(inertia) * (section_rotation(shape, x) - b))
 

@@ -14,9 +14,10 @@ from mstmm.scene.tables.beam import EXACT, ROOT, Modes
 from mstmm.scene.tables.flexible_keys import AUTO
 from mstmm.scene.tables.loads import Load
 
-from ..mass_definiteness import Support, Supports, is_definite_with_first_shape, is_mass_definite
+from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
 from ..modal_body import ModalBody, checked_result
 from ..modal_parts import CacheKey
+from ..supports import Support, Supports
 from .automatic_choices import (
     BENDING,
     DirectionChoice,
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 #: What determines the body of a beam.
 _Source = tuple["Beam", BeamData, BoundaryConditions, Support, frozenset[str]]
 #: Default numbers of strain shapes of an exact beam, per bending plane and of twist.
-DEFAULT_BENDING_COUNT, DEFAULT_TWIST_COUNT = 3, 2
+_BENDING_COUNT, _TWIST_COUNT = 3, 2
 #: Largest number of bodies kept, for equal beams of this and of later scenes.
 _MAX_CACHED_BODIES = 64
 
@@ -89,8 +90,8 @@ class BeamBodies:
         }
         setting = ExactBeamSetting(
             data, dict(zip(DIRECTIONS, self.modes(beam).counts, strict=True)),
-            self._exact_basis(beam), self._supports.own_support(beam.name), inboard_end,
-            {end: self._supports.hanging_inertia(beam.name, end) for end in data.ends}, spans,
+            self._exact_basis(beam), self._supports.inboard_hinge_support(beam.name), inboard_end,
+            {end: self._supports.outboard_inertia(beam.name, end) for end in data.ends}, spans,
         )  # fmt: skip
         what = f'beam "{beam.name}"'
         body = checked_result(what, lambda: exact_beam_body(beam, setting))
@@ -100,7 +101,7 @@ class BeamBodies:
         return replace(body, D=body.D + d, eta=eta, etad=etad)
 
     def _exact_basis(self, beam: Beam) -> str:
-        """Basis of an exact beam; "auto" is Legendre where an end carries a load of its own."""
+        """Basis of an exact beam; "auto" is Legendre if a load, spring or loop acts on an end."""
         if beam.basis != AUTO:
             return beam.basis
         environment = self._environment
@@ -127,11 +128,11 @@ class BeamBodies:
         if beam.modes is not None:
             return beam.modes
         idle = self._idle_directions(beam)
-        counts = {d: 0 if d in idle else DEFAULT_BENDING_COUNT for d in BENDING}
+        counts = {d: 0 if d in idle else _BENDING_COUNT for d in BENDING}
         section = beam.sections[0]
         can_twist = None not in (section.torsional_stiffness, section.polar_inertia_per_length)
         if can_twist and all(counts.values()):
-            counts["twist"] = DEFAULT_TWIST_COUNT
+            counts["twist"] = _TWIST_COUNT
         return Modes(**counts)
 
     def _idle_directions(self, beam: Beam) -> frozenset[str]:

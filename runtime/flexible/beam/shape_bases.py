@@ -67,9 +67,9 @@ def basis_shapes(data: BeamData, direction: str, basis: Basis, count: int) -> li
     return (_bending_shapes if bends else _rod_shapes)(data, direction, basis, count)
 
 
-def _is_closed_form(data: BeamData) -> bool:
+def _has_closed_form(data: BeamData) -> bool:
     """Whether the bending eigenfunctions are those of the uniform beam without shear."""
-    return data.uniform and not data.sheared
+    return data.uniform and not data.has_shear
 
 
 def _bending_shapes(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
@@ -77,12 +77,12 @@ def _bending_shapes(data: BeamData, direction: str, basis: Basis, count: int) ->
     if basis.kind == CLAMPED_FREE:
         return _clamped_free_shapes(data, direction, basis.base, count)
     if basis.kind == FREE_FREE:
-        if _is_closed_form(data):
+        if _has_closed_form(data):
             return [Eigenfunction(FREE_FREE, k, 0.0, length) for k in range(1, count + 1)]
         return list(bending_eigenfunctions(data, direction, count, skip=2))
     slopes = [end_slope_shape(data, direction, x) for x in basis.slopes][:count]
     sine_count = count - len(slopes)
-    if _is_closed_form(data):
+    if _has_closed_form(data):
         sines = [Eigenfunction(SIMPLY_SUPPORTED, k, 0.0, length) for k in range(1, sine_count + 1)]
         return [*slopes, *sines]
     supports = (0.0, length)
@@ -92,7 +92,7 @@ def _bending_shapes(data: BeamData, direction: str, basis: Basis, count: int) ->
 def _clamped_free_shapes(data: BeamData, direction: str, base: float, count: int) -> list[Shape]:
     """Clamped-free shapes of the parts on both sides of the clamp, root side first."""
     length = data.length
-    if _is_closed_form(data):
+    if _has_closed_form(data):
         shapes: list[Shape] = []
         for start, end, mirrored in ((0.0, base, True), (base, length, False)):
             if end > start:
@@ -130,7 +130,7 @@ def _fixed_interface_shapes(
 ) -> list[Shape]:
     """The `count` lowest eigenfunctions with all interfaces fixed."""
     bends = direction in ("y", "z")
-    if not (_is_closed_form(data) if bends else data.uniform):
+    if not (_has_closed_form(data) if bends else data.uniform):
         if bends:
             return list(bending_eigenfunctions(data, direction, count, clamped=interfaces))
         return list(rod_eigenfunctions(data, direction, count, fixed=interfaces))

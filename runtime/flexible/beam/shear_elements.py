@@ -51,7 +51,7 @@ def sheared_shape(nodes: Array, u: Array) -> ShearedShape:
     return ShearedShape(nodes, coefficients[:, 0], coefficients[:, 1])
 
 
-def condensed(k: Array, m: Array, size: int) -> tuple[Array, Array]:
+def condense_statically(k: Array, m: Array, size: int) -> tuple[Array, Array]:
     """Matrices of the first `size` unknowns; the others follow statically."""
     motion = np.vstack([np.eye(size), -np.linalg.solve(k[size:, size:], k[size:, :size])])
     return motion.T @ k @ motion, motion.T @ m @ motion

@@ -46,7 +46,7 @@ def bending_static_shapes(
     fixed = [dof for i in interface_nodes for dof in (2 * i, 2 * i + 1)]
     k, _ = bending_matrices(data, direction, nodes)
     return [
-        _bent_shape(nodes, _static_displacement(k, fixed, dof, size))
+        _bending_shape(nodes, _static_displacement(k, fixed, dof, size))
         for i in interface_nodes[1:]
         for dof, size in ((2 * i, 1.0), (2 * i + 1, 1.0 / data.length))
     ]
@@ -58,7 +58,7 @@ def end_slope_shape(data: BeamData, direction: str, x: float) -> Piecewise:
     slope_dof = 2 * nearest_node(nodes, x) + 1
     k, _ = bending_matrices(data, direction, nodes)
     fixed = [0, 2 * len(nodes) - 2, slope_dof]
-    return _bent_shape(nodes, _static_displacement(k, fixed, slope_dof, 1.0 / data.length))
+    return _bending_shape(nodes, _static_displacement(k, fixed, slope_dof, 1.0 / data.length))
 
 
 def _static_displacement(k: Array, fixed: list[int], dof: int, size: float) -> Array:
@@ -85,7 +85,7 @@ def bending_eigenfunctions(
     fixed = [2 * nearest_node(nodes, x) for x in (*clamped, *supported)]
     fixed += [2 * nearest_node(nodes, x) + 1 for x in clamped]
     vectors = _eigenvectors(k, m, fixed, skip + count)[:, skip:]
-    return [_bent_shape(nodes, _normalise(nodes, u)) for u in vectors.T]
+    return [_bending_shape(nodes, _normalise(nodes, u)) for u in vectors.T]
 
 
 def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Array, Array]:
@@ -98,7 +98,7 @@ def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Arra
     middle = (nodes[1:] + nodes[:-1]) / 2
     pieces = data.piece(middle)
     bending, mass = direction_stiffness(data, direction)[pieces], data.inertia[0][pieces]
-    if data.sheared:
+    if data.has_shear:
         shear, inertia = data.stiffness[_SHEAR[direction]], data.inertia[_ROTARY[direction]]
         return timoshenko_matrices(nodes, bending, shear[pieces], mass, inertia[pieces])
     for i, h in enumerate(np.diff(nodes)):
@@ -114,7 +114,7 @@ def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Arra
     return k, m
 
 
-def _bent_shape(nodes: Array, u: Array) -> Piecewise:
+def _bending_shape(nodes: Array, u: Array) -> Piecewise:
     """Shape of the coordinates of `bending_matrices`."""
     return _cubic(nodes, u) if len(u) == 2 * len(nodes) else sheared_shape(nodes, u)
 

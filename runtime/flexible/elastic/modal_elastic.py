@@ -22,9 +22,10 @@ from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND, split_reference
 
 from ...platform_support.subprocesses import run_in_subprocess
-from ..mass_definiteness import Supports, is_definite_with_first_shape, is_mass_definite
+from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
 from ..modal_body import ModalBody, checked_result
 from ..modal_parts import CacheKey, ModalPort
+from ..supports import Supports
 from .craig_bampton import Reduction, Release, reduce, resolution
 from .finite_element_model import ElasticModel
 from .interface_nodes import Port, check_separate_nodes, select_port

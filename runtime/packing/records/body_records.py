@@ -181,8 +181,8 @@ class ModalRecords:
     def add_section(self, place: int, parent: int, section: SectionNumbers) -> Any:
         """Create the `mstmm_section *` between the bodies at positions `parent` and `place`."""
         record, modal = self.memory.new("mstmm_section *"), self._modal[section.frame]
-        before = self._sections.get(parent) if section.is_segment else None
-        self.memory.fill(record, section, modal=modal, before=before, **section.inputs.named)
+        previous = self._sections.get(parent) if section.is_segment else None
+        self.memory.fill(record, section, modal=modal, previous=previous, **section.inputs.named)
         self.sections[place] = self._reserve(self.lib.mstmm_section_numbers(modal.n))
         self._sections[place] = record
         return record

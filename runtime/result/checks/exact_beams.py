@@ -10,7 +10,7 @@ from mstmm.risk import Risk
 
 from ..flexible.exact_range import ExactRange, exact_ranges
 from .check import Check, MeasuringCheck, RunStart
-from .flexible import MAX_MISSED_SHARE, MAX_SHEAR_ERROR, MAX_STRAIN, worst_of
+from .flexible import MAX_MISSED_SHARE, MAX_SHEAR_ERROR, MAX_STRAIN, worst_risk
 
 if TYPE_CHECKING:
     from ..result_record import Record
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Thresholds: rotation along a segment (rad; a run ends at 1.5), difference of Magnus steps of
 #: orders 6 and 4 (of the length; the error of order 6 is below a tenth of it), energy share of the
 #: last shape of a direction.
-MAX_SEGMENT_TURN, MAX_MAGNUS_DIFFERENCE, MAX_LAST_SHARE = 1.0, 1e-2, 0.1
+MAX_SEGMENT_ROTATION, MAX_MAGNUS_DIFFERENCE, MAX_LAST_SHARE = 1.0, 1e-2, 0.1
 
 
 class ExactRangeCheck(MeasuringCheck[tuple[ExactRange, ...]]):
@@ -33,7 +33,7 @@ EXACT_RANGE = ExactRangeCheck()
 
 
 class _ExactBeamCheck(Check):
-    """Check of each exact beam, with one risk for the one that turns most."""
+    """Check of each exact beam, with one risk for the one whose segments rotate most."""
 
     @abstractmethod
     def _risk(self, body: ExactRange) -> Risk | None:
@@ -41,22 +41,22 @@ class _ExactBeamCheck(Check):
 
     def after(self, result: Record) -> Iterator[Risk]:
         """Risk of the worst beam, with the number of others."""
-        ranges = sorted(EXACT_RANGE.measured(result), key=lambda body: -body.segment_turn)
-        yield from worst_of(map(self._risk, ranges))
+        ranges = sorted(EXACT_RANGE.measured(result), key=lambda body: -body.segment_rotation)
+        yield from worst_risk(map(self._risk, ranges))
 
 
-class SegmentTurnCheck(_ExactBeamCheck):
+class SegmentRotationCheck(_ExactBeamCheck):
     """Beams that bend or twist nearly as far as a segment can."""
 
     def _risk(self, body: ExactRange) -> Risk | None:
-        if body.segment_turn <= MAX_SEGMENT_TURN:
+        if body.segment_rotation <= MAX_SEGMENT_ROTATION:
             return None
         return Risk(
             "turn", f'"{body.name}"',
-            f'a segment of "{body.name}" turns by {body.segment_turn:.2g} rad; a run stops where '
-            "one turns by more than 1.5 rad",
+            f'a segment of "{body.name}" rotates by {body.segment_rotation:.2g} rad; a run stops '
+            "where one rotates by more than 1.5 rad",
             "use more modes, which shortens the segments, or split the beam",
-            body.segment_turn, MAX_SEGMENT_TURN, "rad", invalidates=False,
+            body.segment_rotation, MAX_SEGMENT_ROTATION, "rad", invalidates=False,
         )  # fmt: skip
 
 
@@ -64,14 +64,15 @@ class MagnusCheck(_ExactBeamCheck):
     """Beams with segments too long for the Magnus series of their poses."""
 
     def _risk(self, body: ExactRange) -> Risk | None:
-        if body.magnus <= MAX_MAGNUS_DIFFERENCE:
+        if body.magnus_difference <= MAX_MAGNUS_DIFFERENCE:
             return None
         return Risk(
             "segments", f'"{body.name}"',
             f'positions on "{body.name}" by Magnus steps of orders 6 and 4 differ by '
-            f"{body.magnus:.1%} of its length: its segments are too long for its curvature",
+            f"{body.magnus_difference:.1%} of its length: its segments are too long for its "
+            "curvature",
             "use more modes, which shortens the segments, or split the beam",
-            body.magnus, MAX_MAGNUS_DIFFERENCE,
+            body.magnus_difference, MAX_MAGNUS_DIFFERENCE,
         )  # fmt: skip
 
 
@@ -93,13 +94,13 @@ class SectionLoadCheck(_ExactBeamCheck):
     """Beams whose strains differ from those of the section loads from equilibrium."""
 
     def _risk(self, body: ExactRange) -> Risk | None:
-        if body.missed is None or body.missed <= MAX_MISSED_SHARE:
+        if body.missed_energy is None or body.missed_energy <= MAX_MISSED_SHARE:
             return None
         return Risk(
             "shapes", f'"{body.name}"',
             f'bending moments of "{body.name}" from strain and from equilibrium differ by '
-            f"{body.missed:.0%} of their energy", 'use more modes, or basis = "legendre"',
-            body.missed, MAX_MISSED_SHARE,
+            f"{body.missed_energy:.0%} of their energy", 'use more modes, or basis = "legendre"',
+            body.missed_energy, MAX_MISSED_SHARE,
         )  # fmt: skip
 
 
@@ -138,7 +139,7 @@ class StretchCheck(Check):
 
     def before(self, start: RunStart) -> Iterator[Risk]:
         """Advice for the first such beam."""
-        yield from worst_of(
+        yield from worst_risk(
             Risk(
                 "stretch", f'"{name}"',
                 f'"{name}" has one stretch coordinate, but its axial force varies along it',
@@ -152,6 +153,6 @@ class StretchCheck(Check):
 
 
 EXACT_BEAM_CHECKS = (
-    SegmentTurnCheck(), MagnusCheck(), FibreStrainCheck(), SectionLoadCheck(), LastShapeCheck(),
+    SegmentRotationCheck(), MagnusCheck(), FibreStrainCheck(), SectionLoadCheck(), LastShapeCheck(),
     ShearRuleCheck(),
 )  # fmt: skip

@@ -42,7 +42,7 @@ _MAX_FREQUENCY_RATIO = 1.5
 
 
 #: Remedy where one floating frame is not enough.
-_BENDS_FAR = 'use kinematics = "exact" for a beam, or split the body into welded parts'
+_LARGE_SLOPE_REMEDY = 'use kinematics = "exact" for a beam, or split the body into welded parts'
 
 
 class ModelRangeCheck(MeasuringCheck[tuple[ModelRange, ...]]):
@@ -63,7 +63,7 @@ class ModelRangeCheck(MeasuringCheck[tuple[ModelRange, ...]]):
 MODEL_RANGE = ModelRangeCheck()
 
 
-def worst_of(risks: Iterable[Risk | None]) -> Iterator[Risk]:
+def worst_risk(risks: Iterable[Risk | None]) -> Iterator[Risk]:
     """First risk of those of several bodies, with the number of others; nothing without any."""
     found = [risk for risk in risks if risk is not None]
     if found:
@@ -84,7 +84,7 @@ class _BodyCheck(Check):
             MODEL_RANGE.measured(result),
             key=lambda body: -max(body.slope, body.spin_ratio, body.load_ratio),
         )
-        yield from worst_of(map(self._risk, worst_first))
+        yield from worst_risk(map(self._risk, worst_first))
 
 
 class StiffeningCheck(_BodyCheck):
@@ -144,7 +144,7 @@ class SlopeCheck(_BodyCheck):
             f'"{body.name}" bends to a slope of {body.slope:.2g} relative to its floating frame; '
             f"above {MAX_SLOPE:g} one frame is not accurate (error up to {body.frame_error:.0%} of "
             f"the deflection, {min(body.shortening_error, 9.99):.0%} of the foreshortening)",
-            _BENDS_FAR, body.slope, MAX_SLOPE,
+            _LARGE_SLOPE_REMEDY, body.slope, MAX_SLOPE,
         )  # fmt: skip
 
 
@@ -158,7 +158,7 @@ class RotationCheck(_BodyCheck):
             "turn", f'"{body.name}"',
             f'a section of "{body.name}" rotates by {body.turn:.2g} rad relative to its floating '
             "frame; the model is not valid above 1.5 rad",
-            _BENDS_FAR, body.turn, MAX_ROTATION, "rad",
+            _LARGE_SLOPE_REMEDY, body.turn, MAX_ROTATION, "rad",
         )  # fmt: skip
 
 

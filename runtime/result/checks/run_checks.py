@@ -146,8 +146,7 @@ FINITENESS, STEP_STABILITY = FinitenessCheck(), StepStabilityCheck()
 #: Checks before a run.
 START_CHECKS: tuple[Check, ...] = (
     TimeMapCheck(), PIVOT_LOSS, SINGULARITY, StiffeningCheck(), ShapeCheck(), StretchCheck(),
-    STIFFNESS,
-    SingularStartCheck(), CLOSURE,
+    STIFFNESS, SingularStartCheck(), CLOSURE,
 )  # fmt: skip
 
 #: Checks after a run.

@@ -31,25 +31,25 @@ class ExactRange:
 
     Attributes:
         name, modes: of the beam, and its number of strain coordinates.
-        segment_turn: rad, largest rotation along a segment between stations.
-        magnus: largest difference of positions by Magnus steps of orders 6 and 4, of the length; a
-            bound of the error of order 6.
+        segment_rotation: rad, largest rotation along a segment between stations.
+        magnus_difference: largest difference of positions by Magnus steps of orders 6 and 4, of the
+            length; a bound of the error of order 6.
         fibre_strain: largest strain of the outermost fibres; None if the radius of gyration is
             unknown.
         last_share: largest energy share of the last shape of a direction, and its name.
-        missed: part of the bending energy of the section loads from equilibrium by which those from
-            strain differ; None without bending.
+        missed_energy: part of the bending energy of the section loads from equilibrium by which
+            those from strain differ; None without bending.
         shear: error of bending frequencies without shear, weighted by energy; None if the radius of
             gyration is unknown.
     """
 
     name: str
     modes: int
-    segment_turn: float
-    magnus: float
+    segment_rotation: float
+    magnus_difference: float
     fibre_strain: float | None
     last_share: tuple[float, str] | None
-    missed: float | None
+    missed_energy: float | None
     shear: float | None
 
 
@@ -71,7 +71,7 @@ def _exact_range(flexible: FlexibleBodies, name: str) -> ExactRange:
     assert exact is not None
     return ExactRange(
         name, body.n,
-        float(exact.segment_turns(motion.eta).max(initial=0.0)),
+        float(exact.segment_rotations(motion.eta).max(initial=0.0)),
         float(exact.magnus_difference(motion.eta).max(initial=0.0)) / exact.length,
         _fibre_strain(motion, np.linspace(0.0, exact.length, e.SECTION_COUNT)),
         e.last_shape_share(motion) if len(samples) else None,
@@ -136,21 +136,21 @@ _MAX_BODY_ROWS = 4
 
 def rows(ranges: Sequence[ExactRange]) -> list[tuple[str, str]]:
     """Rows of the certificate, (name, text)."""
-    beams = sorted(ranges, key=lambda body: -body.segment_turn)[:_MAX_BODY_ROWS]
+    beams = sorted(ranges, key=lambda body: -body.segment_rotation)[:_MAX_BODY_ROWS]
     return [(body.name, _text(body)) for body in beams]
 
 
 def _text(body: ExactRange) -> str:
     parts = [
-        f"exact, {body.segment_turn:.2g} rad along a segment",
-        f"Magnus order 6 to 4 {body.magnus:.0e} of the length",
+        f"exact, {body.segment_rotation:.2g} rad along a segment",
+        f"Magnus order 6 to 4 {body.magnus_difference:.0e} of the length",
     ]
     if body.fibre_strain is not None:
         parts.append(f"strain {body.fibre_strain:.1e}")
     if body.last_share is not None and body.last_share[1]:
         parts.append(f"{body.last_share[1]} holds {body.last_share[0]:.1e} of the energy")
-    if body.missed is not None:
-        parts.append(f"{body.missed:.1e} of the bending energy missed")
+    if body.missed_energy is not None:
+        parts.append(f"{body.missed_energy:.1e} of the bending energy missed")
     if body.shear is not None:
         parts.append(f"shear {body.shear:.0e}")
     return "; ".join(parts)

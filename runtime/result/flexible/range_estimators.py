@@ -232,7 +232,7 @@ def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
         return _shear_errors_of_strains(body, body.exact)
     if shapes is None:
         return None
-    if shapes.data.sheared:
+    if shapes.data.has_shear:
         return np.zeros(body.n)
     x, weights = shapes.rule()
     errors, is_known = np.zeros(body.n), False

@@ -16,7 +16,6 @@ from mstmm.array_validation import Array
 
 if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
-    from ...flexible.modal_parts import Station
     from .motion import Motion
     from .section_loads import FlexibleBodies
 
@@ -32,18 +31,18 @@ def station_loads(
     exact = motion.body.exact
     assert exact is not None
     start = exact.chain.start
-    outer = x >= start if start < exact.length else x > start
+    on_tip_side = x >= start if start < exact.length else x > start
     rotations, positions = exact.poses(motion.eta, x)
     force, moment = np.zeros((2, len(motion.t), len(x), 3))
     for load in _own_loads(flexible, motion, samples):
         begin, end = load.part
-        length, is_outer = end - begin, (begin + end) / 2 >= start
+        length, is_tip_side = end - begin, (begin + end) / 2 >= start
         cut = np.clip(x, begin, end)
         # Part of the load beyond the section, and how far its centre is from that of the whole.
-        beyond = end - cut if is_outer else cut - begin
-        share = beyond / length if length else (begin >= x if is_outer else x >= begin)
-        share = np.where(outer == is_outer, share, 0.0) * (1.0 if is_outer else -1.0)
-        shift = (length - beyond) / 2 * (1.0 if is_outer else -1.0)
+        beyond = end - cut if is_tip_side else cut - begin
+        share = beyond / length if length else (begin >= x if is_tip_side else x >= begin)
+        share = np.where(on_tip_side == is_tip_side, share, 0.0) * (1.0 if is_tip_side else -1.0)
+        shift = (length - beyond) / 2 * (1.0 if is_tip_side else -1.0)
         place = load.place[:, None] + load.axis[:, None] * shift[:, None]
         own_force = load.force[:, None]
         force += share[:, None] * own_force
@@ -77,43 +76,28 @@ def _own_loads(flexible: FlexibleBodies, motion: Motion, samples: Any) -> Iterat
         across.append(load and (motion.inward(load[0][samples]), motion.inward(load[1][samples])))
     sections = np.array([station.x for station in body.stations])
     rotations, points = body.exact.poses(motion.eta, sections)
-    parts = _parts(body)
-    for k, load in enumerate(across):
-        if load is None:
-            continue
-        force, moment = load
-        for j, station in enumerate(body.stations):
-            next_load = across[j]
-            if station.previous == k and next_load is not None:
-                lever = points[:, j] - points[:, k]
-                moment = moment - next_load[1] - np.cross(lever, next_load[0])
-                force = force - next_load[0]
-        yield _OwnLoad(parts[k], points[:, k], rotations[:, k, :, 0], force, moment)
+    own = list(across)
+    for k, station in enumerate(body.stations):
+        inboard, outboard = own[station.previous], across[k]
+        if station.previous >= 0 and inboard is not None and outboard is not None:
+            lever = points[:, k] - points[:, station.previous]
+            moment = inboard[1] - outboard[1] - np.cross(lever, outboard[0])
+            own[station.previous] = inboard[0] - outboard[0], moment
+    for k, (load, part) in enumerate(zip(own, _parts(body), strict=True)):
+        if load is not None:
+            yield _OwnLoad(part, points[:, k], rotations[:, k, :, 0], *load)
 
 
 def _parts(body: ModalBody) -> list[tuple[float, float]]:
-    """Part of the beam that each station or end stands for, m."""
-    assert body.exact is not None
-    masses = [station for station in body.stations if not station.end and station.mass]
-    borders = _borders(body, masses)
-    parts = {id(station): borders[k] for k, station in enumerate(sorted(masses, key=_place))}
-    return [parts.get(id(station), (station.x, station.x)) for station in body.stations]
+    """Part of the beam (m) that each station or end stands for, from begin to end.
 
-
-def _place(station: Station) -> float:
-    return station.x
-
-
-def _borders(body: ModalBody, masses: list[Station]) -> list[tuple[float, float]]:
-    """Begin and end of the part of each slice, from root to tip: its share of the mass of a piece.
-
-    The weights of Gauss points add up to the lengths of the pieces.
+    The lengths of the slices add up to that of the beam.
     """
     assert body.exact is not None
-    edges, begin = [], 0.0
-    for station in sorted(masses, key=_place):
-        density = float(body.exact.sections(np.array([station.x])).mass_per_length[0])
-        end = min(begin + station.mass / density, body.exact.length)
-        edges.append((begin, end))
-        begin = end
-    return edges
+    parts, begin = [(station.x, station.x) for station in body.stations], 0.0
+    for k in sorted(range(len(parts)), key=lambda k: body.stations[k].x):
+        length = body.stations[k].length
+        if length:
+            parts[k] = begin, min(begin + length, body.exact.length)
+            begin += length
+    return parts

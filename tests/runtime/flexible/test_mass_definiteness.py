@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.mass_definiteness import ANY, Supports, is_definite_at, is_mass_definite
+from mstmm.runtime.flexible.mass_definiteness import is_definite_at, is_mass_definite
 from mstmm.runtime.flexible.modal_body import ModalBody
+from mstmm.runtime.flexible.supports import ANY, Supports
 from tests.support.scenes.single_beam import HELD, PIN, body_of
 
 Array = NDArray[np.float64]

@@ -275,14 +275,14 @@ def test_section_loads_balance_the_hinge() -> None:
     assert np.abs(moment).max() < 1e-9
 
 
-def test_a_run_ends_where_a_segment_turns_too_far() -> None:
+def test_a_run_ends_where_a_segment_rotates_too_far() -> None:
     moment = {"on": "rod.tip", "moment": [0.0, 0.0, "40*t"]}
     data = scene(
         exact("rod", modes={"y": 1}), hinge("clamp", "fixed", "ground", "rod"), load=[moment]
     )
     result = compile_scene(data, "looped").simulate(1.0)
     assert not result.success
-    assert "the segment to it turns by more than 1.5 rad" in result.message
+    assert "the segment to it rotates by more than 1.5 rad" in result.message
 
 
 def test_no_one_way_response() -> None:

@@ -21,7 +21,7 @@ ROD: dict[str, Any] = {
 }  # fmt: skip
 
 
-def grounded(body: ModalBody, free: Any = (), count: int = 3, end: str = "root") -> Array:
+def omegas_on_ground(body: ModalBody, free: Any = (), count: int = 3, end: str = "root") -> Array:
     port = (0, body.ports[end], np.eye(3))
     return frequencies([body], [np.eye(3)], ground_hinge_equations(port, free), count)
 
@@ -37,9 +37,9 @@ def test_frequencies_of_a_uniform_beam(
 ) -> None:
     """Three strain modes: the mass in eight stations limits the highest frequency."""
     modes = body_of(hinge, modes={"y": 3}, basis="modes", **THIN)
-    assert (np.abs(grounded(modes, free) / exact - 1) < errors).all()
+    assert (np.abs(omegas_on_ground(modes, free) / exact - 1) < errors).all()
     legendre = body_of(hinge, modes={"y": 13}, basis="legendre", **THIN)
-    assert grounded(legendre, free) == pytest.approx(exact, rel=1e-6)
+    assert omegas_on_ground(legendre, free) == pytest.approx(exact, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,9 @@ def test_frequencies_of_a_uniform_beam(
 )
 def test_frequencies_of_a_rod(direction: str, speed: float) -> None:
     body = body_of(HELD, modes={direction: 3}, **ROD, **EXACT)
-    assert grounded(body) == pytest.approx(np.array([1, 3, 5]) * np.pi / 2 * speed, rel=5e-5)
+    assert omegas_on_ground(body) == pytest.approx(
+        np.array([1, 3, 5]) * np.pi / 2 * speed, rel=5e-5
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 5.0])
@@ -69,7 +71,7 @@ def test_strain_modes_include_a_mass_on_the_tip(ratio: float) -> None:
 def test_frequencies_do_not_depend_on_the_supported_section() -> None:
     beam: dict[str, Any] = {"modes": {"y": 10}, "basis": "legendre", "ends": {"mid": 0.37}, **EXACT}
     found = [
-        grounded(body_of(FREE, at=f"b.{end}", **beam), range(6), end=end)
+        omegas_on_ground(body_of(FREE, at=f"b.{end}", **beam), range(6), end=end)
         for end in ("root", "mid", "tip")
     ]
     assert found[1] == pytest.approx(found[0], rel=1e-5)
@@ -85,7 +87,7 @@ def test_a_stepped_beam_has_the_frequencies_of_the_second_order_beam() -> None:
     second_order = body_of(HELD, modes={"y": 8, "z": 8}, **beam)
     for basis, count in (("legendre", 8), ("modes", 3)):
         exact = body_of(HELD, modes={"y": count, "z": count}, basis=basis, **beam, **EXACT)
-        assert grounded(exact) == pytest.approx(grounded(second_order), rel=5e-5)
+        assert omegas_on_ground(exact) == pytest.approx(omegas_on_ground(second_order), rel=5e-5)
 
 
 def test_damping_by_strain_dissipates_by_its_own_strain() -> None:

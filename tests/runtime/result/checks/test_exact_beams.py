@@ -36,14 +36,14 @@ def test_turn_of_the_longest_segment() -> None:
     result = _cantilever({"moment": [0.0, 0.0, 4.0]}, modes={"y": 2})
     body = result.model.flexible_bodies["rod"]
     sections = np.sort([0.0, *(station.x for station in body.stations)])
-    assert _range(result).segment_turn == pytest.approx(4 * np.diff(sections).max(), rel=1e-9)
-    assert _range(result).magnus < 1e-12  # of a circle both orders are exact
-    assert (_range(result).missed or 0.0) < 1e-12
+    assert _range(result).segment_rotation == pytest.approx(4 * np.diff(sections).max(), rel=1e-9)
+    assert _range(result).magnus_difference < 1e-12  # of a circle both orders are exact
+    assert (_range(result).missed_energy or 0.0) < 1e-12
 
 
 def test_a_segment_that_turns_far_is_reported() -> None:
     result = _cantilever({"moment": [0.0, 0.0, 5.2]}, modes={"y": 1})
-    assert _range(result).segment_turn > checks.MAX_SEGMENT_TURN
+    assert _range(result).segment_rotation > checks.MAX_SEGMENT_ROTATION
     assert [risk.name for risk in result.risks] == ["turn"]
 
 
@@ -51,7 +51,7 @@ def test_strain_modes_miss_the_moment_of_a_dead_load() -> None:
     """Two modes vanish at the tip with their moment's slope; four Legendre strains do not."""
     push = {"force": [0.0, 1.0, 0.0]}
     missed = [
-        _range(_cantilever(push, **keys)).missed or 0.0
+        _range(_cantilever(push, **keys)).missed_energy or 0.0
         for keys in ({"modes": {"y": 1}, "basis": "modes"}, {"modes": {"y": 5}})
     ]
     assert missed[0] > 1e-3
